@@ -1,0 +1,104 @@
+"""Faults in the user's input: where they are, what they are, and what would be right.
+
+Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics`
+collector, goes on as far as it can, and lets the collector raise one `InputError` that holds all faults of
+the file. The two doors (`cli`, `gapi`) print it and exit with 1; nobody else catches it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NoReturn
+
+
+@dataclass(frozen=True)
+class SourceRef:
+    """A place in a text: `line` and `column` count from 1, `text` is that whole line, `width` the characters meant."""
+
+    file: str
+    line: int
+    column: int
+    text: str = ""
+    width: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+    def excerpt(self) -> str:
+        """The line with a caret under the place, or nothing where the text is unknown."""
+        if not self.text:
+            return ""
+        number = f"{self.line:5d}"
+        # Tabs keep their width under the caret only if they are repeated there.
+        indent = "".join("\t" if c == "\t" else " " for c in self.text[: self.column - 1])
+        underline = "^" + "~" * (self.width - 1)
+        return f"{number} | {self.text}\n{' ' * len(number)} | {indent}{underline}"
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One fault: a sentence, its place (None where the input has no lines) and, if known, what is legal."""
+
+    message: str
+    source: SourceRef | None = None
+    hint: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.source}: " if self.source else ""
+        lines = [f"{place}error: {self.message}"]
+        if self.source and (excerpt := self.source.excerpt()):
+            lines.append(excerpt)
+        if self.hint:
+            lines.append(f"      = {self.hint}")
+        return "\n".join(lines)
+
+
+class InputError(Exception):
+    """All faults of an input; `str()` is ready to be printed."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics = tuple(diagnostics)
+        super().__init__("\n".join(str(d) for d in self.diagnostics))
+
+
+@dataclass
+class Diagnostics:
+    """Collects faults so that a user sees all of them at once."""
+
+    found: list[Diagnostic] = field(default_factory=list)
+
+    def error(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
+        """Note a fault and go on; the same fault at the same place is noted once."""
+        diagnostic = Diagnostic(message, source, hint)
+        if diagnostic not in self.found:
+            self.found.append(diagnostic)
+
+    def raise_if_any(self) -> None:
+        """Raise `InputError` with every fault, in the order of files, lines and columns."""
+        if self.found:
+            raise InputError(sorted(self.found, key=_position))
+
+
+def _position(diagnostic: Diagnostic) -> tuple[str, int, int]:
+    source = diagnostic.source
+    return (source.file, source.line, source.column) if source else ("", 0, 0)
+
+
+def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoReturn:
+    """Raise an `InputError` of a single fault, where nothing else can be checked behind it."""
+    raise InputError([Diagnostic(message, source, hint)])
+
+
+def nearest(word: str, choices: Iterable[str]) -> str:
+    """A hint for an unknown word: the nearest legal one, or the legal ones if none is near."""
+    legal = sorted(set(choices))
+    lowered = {choice.lower(): choice for choice in legal}
+    close = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean '{lowered[close[0]]}'?"
+    if not legal:
+        return ""
+    shown = ", ".join(legal[:20]) + (", ..." if len(legal) > 20 else "")
+    return f"legal here: {shown}"

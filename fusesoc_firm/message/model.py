@@ -1,0 +1,123 @@
+"""The Message model: the first stage, a definition as its author wrote it.
+
+Nothing here knows how a message lies on the wire (`frame`) or in hardware (`converter`). All values are
+frozen, so a definition can be a dictionary key and can be shared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from fusesoc_firm.diagnostics import SourceRef
+
+
+class RosVersion(IntEnum):
+    """The middleware's generation: it decides the legal types and the layout on the wire."""
+
+    ROS1 = 1
+    ROS2 = 2
+
+
+@dataclass(frozen=True, order=True)
+class MessageName:
+    """`geometry_msgs/Quaternion`; the ROS 2 spelling `geometry_msgs/msg/Quaternion` reads as the same name."""
+
+    package: str
+    name: str
+
+    def __str__(self) -> str:
+        return f"{self.package}/{self.name}"
+
+
+@dataclass(frozen=True)
+class PrimitiveType:
+    """A number, `bool`, or ROS 1's `time` and `duration`, by the name ROS gives it (`byte` and `char` included)."""
+
+    name: str
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class StringType:
+    """`string` or, if `is_wide`, `wstring`; `bound` counts characters and is None where there is none."""
+
+    is_wide: bool = False
+    bound: int | None = None
+
+    def __str__(self) -> str:
+        name = "wstring" if self.is_wide else "string"
+        return name if self.bound is None else f"{name}<={self.bound}"
+
+
+@dataclass(frozen=True)
+class MessageType:
+    """A field whose type is another message."""
+
+    name: MessageName
+
+    def __str__(self) -> str:
+        return str(self.name)
+
+
+ElementType = PrimitiveType | StringType | MessageType
+
+
+@dataclass(frozen=True)
+class ArrayType:
+    """A fixed number of elements: `float64[9]`."""
+
+    element: ElementType
+    length: int
+
+    def __str__(self) -> str:
+        return f"{self.element}[{self.length}]"
+
+
+@dataclass(frozen=True)
+class SequenceType:
+    """A variable number of elements: `float64[]`, or `float64[<=9]` with a bound."""
+
+    element: ElementType
+    bound: int | None = None
+
+    def __str__(self) -> str:
+        return f"{self.element}[]" if self.bound is None else f"{self.element}[<={self.bound}]"
+
+
+FieldType = ElementType | ArrayType | SequenceType
+Scalar = bool | int | float | str
+DefaultValue = Scalar | tuple[Scalar, ...]
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field; `default` is None where the definition gives none (only ROS 2 can)."""
+
+    name: str
+    type: FieldType
+    source: SourceRef
+    default: DefaultValue | None = None
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A named value of the definition; it is never sent."""
+
+    name: str
+    type: PrimitiveType | StringType
+    value: Scalar
+    source: SourceRef
+
+
+@dataclass(frozen=True)
+class MessageDefinition:
+    """A `.msg` file: its fields in wire order and its constants."""
+
+    name: MessageName
+    ros: RosVersion
+    fields: tuple[Field, ...]
+    constants: tuple[Constant, ...]
+    source: SourceRef
