@@ -1,0 +1,1 @@
+"""FIRM: from a Frame to the configuration of a converter's template."""

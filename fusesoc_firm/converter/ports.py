@@ -1,0 +1,58 @@
+"""The message side of a converter: one port a leaf of the message."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fusesoc_firm.frame.model import Frame, FrameField
+from fusesoc_firm.naming import distinct_identifiers
+
+# What the templates declare or use by name: a field of that name gets another port name.
+_TAKEN = """
+    clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
+    m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
+    segment_valid msg_valid msg_ready frame_error frame_error_code
+    id code_t no_fault bad_length short_frame long_frame bad_encoding end_position frame_bytes
+    position_r position_last trailing_r carry_r fields_r fault_r msg_valid_r fault beat_fault ready beat store frame
+    check receive send u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
+    std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
+""".split()
+
+
+@dataclass(frozen=True)
+class FieldPort:
+    """A port and the leaf it carries; `width` is None for a `std_logic`."""
+
+    name: str
+    width: int | None
+    field: FrameField
+
+    @property
+    def vhdl_type(self) -> str:
+        return vhdl_type(self.width)
+
+    @property
+    def comment(self) -> str:
+        """The ROS name and type, so that a port can be traced back: `pose.position.x: float64`."""
+        return f"{_ros_path(self.field)}: {self.field.type.name}"
+
+
+def vhdl_type(width: int | None) -> str:
+    """`std_logic` for None, else a vector of `width` bits."""
+    return "std_logic" if width is None else f"std_logic_vector({width - 1} downto 0)"
+
+
+def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
+    """A port for every leaf that has a value, in wire order."""
+    fields = [field for field in frame.fields if field.count]
+    names = distinct_identifiers((field.names for field in fields), reserved=_TAKEN)
+    return tuple(FieldPort(name, _width(field), field) for name, field in zip(names, fields, strict=True))
+
+
+def _width(field: FrameField) -> int | None:
+    is_bit = field.type.bits == 1 and not field.is_array
+    return None if is_bit else field.count * field.type.bits
+
+
+def _ros_path(field: FrameField) -> str:
+    return ".".join(step.name if step.count is None else f"{step.name}[{step.count}]" for step in field.path)

@@ -1,0 +1,58 @@
+"""Which bits of a port are which bytes of the payload."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from fusesoc_firm.converter.ports import FieldPort
+from fusesoc_firm.frame.model import Frame
+
+
+@dataclass(frozen=True)
+class Slice:
+    """`width` bits of a port from bit `low` on, in the payload from byte `offset` on; `bytes` as sent.
+
+    A bool is one bit of the port and a byte of the payload; everything else has 8 bits a byte.
+    """
+
+    port: FieldPort
+    low: int
+    width: int
+    offset: int
+    bytes: int
+
+
+def slices_of(port: FieldPort) -> Iterator[Slice]:
+    """The pieces of a port that lie in one piece in the payload, lowest bits first."""
+    type_ = port.field.type
+    low = 0
+    for run in port.field.runs:
+        # Bits of neighbouring bools are not neighbours on the wire.
+        pieces, elements = (run.count, 1) if type_.bits == 1 else (1, run.count)
+        for piece in range(pieces):
+            yield Slice(port, low, elements * type_.bits, run.offset + piece * type_.size, elements * type_.size)
+            low += elements * type_.bits
+
+
+def windows_of(frame: Frame) -> list[tuple[int, int]]:
+    """The parts of the payload that hold values, as (first, end) offsets in order, touching parts joined."""
+    windows: list[tuple[int, int]] = []
+    for first, end in sorted(
+        (run.offset, run.offset + run.count * field.type.size) for field in frame.fields for run in field.runs
+    ):
+        if windows and windows[-1][1] == first:
+            windows[-1] = (windows[-1][0], end)
+        else:
+            windows.append((first, end))
+    return windows
+
+
+def stored_offset(windows: Sequence[tuple[int, int]], offset: int) -> int:
+    """Where the payload's byte `offset` lies once the bytes outside the windows are left out."""
+    stored = 0
+    for first, end in windows:
+        if offset < end:
+            return stored + offset - first
+        stored += end - first
+    raise ValueError(f"byte {offset} lies in no window")

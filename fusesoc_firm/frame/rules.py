@@ -1,0 +1,53 @@
+"""What a middleware decides about the wire: types, alignment and the bytes around a message.
+
+A middleware is one `WireRules` value; the layout and the codec ask nothing else. `ros1` and `cdr` hold one each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from fusesoc_firm.frame.model import WireType
+
+INTEGER_AND_FLOAT = MappingProxyType(
+    {
+        name: WireType(name, size, code)
+        for name, size, code in (
+            ("bool", 1, "?"),
+            ("int8", 1, "b"),
+            ("uint8", 1, "B"),
+            ("int16", 2, "h"),
+            ("uint16", 2, "H"),
+            ("int32", 4, "i"),
+            ("uint32", 4, "I"),
+            ("int64", 8, "q"),
+            ("uint64", 8, "Q"),
+            ("float32", 4, "f"),
+            ("float64", 8, "d"),
+        )
+    }
+)
+
+
+@dataclass(frozen=True)
+class WireRules:
+    """The layout rules of one serialisation.
+
+    `scalars` gives the wire type of every primitive of one value; `compounds` the named parts of a primitive
+    that is sent as several values (ROS 1's `time`). `max_alignment` is 1 where nothing is aligned; offsets for
+    alignment count from behind `prefix`. `empty_bytes` is what a message without fields is sent as.
+    """
+
+    scalars: MappingProxyType[str, WireType]
+    compounds: MappingProxyType[str, tuple[tuple[str, WireType], ...]]
+    max_alignment: int
+    prefix: bytes
+    checked_prefix: int
+    empty_bytes: int
+    trailing_bytes: int
+
+    def align(self, offset: int, size: int) -> int:
+        """The first offset at or behind `offset` where a value of `size` bytes may start."""
+        alignment = min(size, self.max_alignment)
+        return offset + -offset % alignment
