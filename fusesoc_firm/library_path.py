@@ -1,8 +1,8 @@
 """Where the FuseSoC library lies that this package brings along: its reusable cores, generators and example systems.
 
-In a wheel `library/` holds the files; in a checkout it holds relative links to `cores`, `generators` and `specs`. Either
-way it holds nothing else, so a project that adds it never finds what a build or a virtual environment left in the
-checkout: FuseSoC takes every `.core` below a library's folder, generated ones included.
+In a wheel `library/` holds the files; in a checkout it holds relative links to `cores`, `generators` and `specs`.
+Either way it holds nothing else: FuseSoC takes every `.core` below a library's folder, and a project that adds this
+one never finds what a build or a virtual environment left in the checkout.
 """
 
 from __future__ import annotations

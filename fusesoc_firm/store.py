@@ -153,7 +153,7 @@ def _write(folder: Path, files: Files) -> None:
 def _read(folder: Path) -> Files | None:
     """The files of an entry, in the order they were made, or None if it is not there or not whole."""
     try:
-        digests = json.loads((folder / "manifest.json").read_bytes())["files"]
+        digests = dict(json.loads((folder / "manifest.json").read_bytes())["files"])
         files = {name: (folder / "files" / name).read_bytes() for name in digests}
     except (OSError, ValueError, KeyError, TypeError):
         return None

@@ -97,7 +97,7 @@ def test_a_partial_within_a_line_is_not_indented(expand: Expand) -> None:
         ("{{#x}}a{{/x}}", {"x": "text"}, "'x' is of type str; a section takes a bool, a list, a mapping or None"),
         ("{{#x}}a{{/x}}", {"x": 0}, "'x' is of type int; a section takes a bool, a list, a mapping or None"),
         ("{{> nowhere}}", {}, "cannot read nowhere.mustache: No such file or directory"),
-        ("{{#a}}", {"a": True}, "t.vhd.mustache: Unexpected EOF the tag \"a\" was never closed was opened at line 1"),
+        ("{{#a}}", {"a": True}, 't.vhd.mustache: Unexpected EOF the tag "a" was never closed was opened at line 1'),
     ],
 )
 def test_what_does_not_fit_is_an_error(expand: Expand, template: str, context: dict[str, object], message: str) -> None:
