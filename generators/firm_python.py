@@ -18,7 +18,13 @@ from pathlib import Path
 from typing import NoReturn
 
 _NEEDED = ("fusesoc_firm", "chevron", "rosbags", "yaml")
-_PROBE = f"import sys; from importlib.util import find_spec as f; sys.exit(not all(map(f, {_NEEDED})))"
+# Without the current folder, which `-c` can import from and a script cannot.
+_PROBE = f"""
+import sys
+from importlib.util import find_spec
+sys.path = [folder for folder in sys.path if folder]
+sys.exit(not all(map(find_spec, {_NEEDED})))
+"""
 # Set to a Python to use just that.
 _CHOSEN = "FUSESOC_FIRM_PYTHON"
 # Set for the second start, so that there is no third.
