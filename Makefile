@@ -15,7 +15,7 @@ WAVES ?=
 # Further options for the simulator.
 SIM_OPTIONS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
-PYTEST_OPTIONS ?= -n auto
+PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
