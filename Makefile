@@ -1,0 +1,59 @@
+# The two commands to start with are `make sim` and `make test`. Each installs what is missing, then does its job.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+
+VENV := .venv
+BIN := $(VENV)/bin
+
+SYSTEM ?= robot:sys:quat2euler
+# The test bench's seed of random stalls; empty is the one of the system's .core.
+SEED ?=
+# WAVES=1 writes waves.ghw into the build folder.
+WAVES ?=
+# Further options for the simulator.
+SIM_OPTIONS ?=
+# Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
+PYTEST_OPTIONS ?= -n auto --dist loadgroup
+
+# With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core.
+SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
+
+.PHONY: help sim test lint setup tools clean distclean
+
+help: ## List the targets
+	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIONS='...'
+	@$(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)")
+
+test: setup ## Run all tests; PYTEST_OPTIONS='...'
+	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+
+lint: setup ## Check style and types
+	@$(BIN)/ruff check .
+	@$(BIN)/mypy
+
+setup: tools $(VENV)/.installed ## Install what the other targets need: programs by apt, Python packages into .venv
+
+tools:
+	@./.ci/install-tools >/dev/null
+
+# Installed anew when the dependencies change. FUSESOC_IGNORE: no folder of ours but the library is to be searched for
+# cores, even if somebody adds the whole checkout.
+$(VENV)/.installed: pyproject.toml | tools
+	@test -x $(BIN)/pip || "$$(./.ci/install-tools)" -m venv --clear $(VENV)
+	@touch $(VENV)/FUSESOC_IGNORE
+	@echo "Installing Python packages into $(VENV)"
+	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]' || \
+	  { echo "pip could not install what pyproject.toml lists; its message is above." >&2; exit 1; }
+	@touch $@
+
+clean: ## Remove what was built; .venv stays
+	@find build -mindepth 1 -maxdepth 1 ! -name FUSESOC_IGNORE -exec rm -rf {} +
+	@rm -rf dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+distclean: clean ## Remove .venv too
+	@rm -rf $(VENV)

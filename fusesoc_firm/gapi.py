@@ -1,0 +1,143 @@
+"""The door for FuseSoC: answers its call of a generator.
+
+FuseSoC starts a generator in an empty folder with one argument, a YAML file that holds the new core's name, the
+requesting core's folder and the parameters. It loads every `.core` that it finds in the folder afterwards, so that file
+is written last. What the generator prints is shown to the user as it is.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.generation import GeneratedCore, Request, as_files
+from fusesoc_firm.parameters import Parameter, check_parameters
+from fusesoc_firm.render import write_if_changed
+from fusesoc_firm.requesting_core import find_requesting_core
+from fusesoc_firm.store import Store, default_root, store_key
+
+_LARGEST_SEED = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Generator:
+    """A generator: its parameters, the files whose content it depends on, and what it makes of them.
+
+    `inputs` is cheap, since it is asked on every run; a path in it need not exist. `generate` raises `InputError` for
+    what its user did wrong.
+    """
+
+    parameters: tuple[Parameter, ...]
+    inputs: Callable[[Request], list[Path]]
+    generate: Callable[[Request], GeneratedCore]
+
+
+def _converter_inputs(request: Request) -> list[Path]:
+    from fusesoc_firm.converter import generator
+
+    return generator.inputs(request)
+
+
+def _generate_converters(request: Request) -> GeneratedCore:
+    from fusesoc_firm.converter import generator
+
+    return generator.generate(request)
+
+
+def _system_inputs(request: Request) -> list[Path]:
+    from fusesoc_firm.system import generator
+
+    return generator.inputs(request)
+
+
+def _generate_system(request: Request) -> GeneratedCore:
+    from fusesoc_firm.system import generator
+
+    return generator.generate(request)
+
+
+_PATHS = Parameter("paths", "list", "folders with message definitions, relative to the core")
+
+GENERATORS: Mapping[str, Generator] = {
+    "firm": Generator(
+        (
+            Parameter("message", "str", "the message's type, such as geometry_msgs/Quaternion", is_required=True),
+            Parameter("ros", "int", "the ROS version whose wire format is spoken", is_required=True, choices=(1, 2)),
+            Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
+            Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            _PATHS,
+            Parameter("distro", "str", "the ROS distribution whose standard messages are meant"),
+        ),
+        _converter_inputs,
+        _generate_converters,
+    ),
+    "far": Generator(
+        (
+            Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
+            Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation")),
+            Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
+            Parameter("model", "str", "a Python file with the function that says what the system answers"),
+            Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
+            Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
+            _PATHS,
+        ),
+        _system_inputs,
+        _generate_system,
+    ),
+}
+
+
+def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GENERATORS) -> int:
+    """Run the generator `command` on the file that FuseSoC names; the exit status is 1 if the input has faults."""
+    start = time.monotonic()
+    try:
+        if len(argv) != 1:
+            fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
+        request = read_request(command, Path(argv[0]), generators[command].parameters)
+        is_from_store = _write(request, generators[command])
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    origin = "from store" if is_from_store else "generated"
+    print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
+    return 0
+
+
+def read_request(command: str, path: Path, parameters: tuple[Parameter, ...]) -> Request:
+    """The request in FuseSoC's file, with checked parameters. Raises `InputError`."""
+    try:
+        call: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+        vlnv, files_root = str(call["vlnv"]), Path(call["files_root"])
+        given = call.get("parameters") or {}
+    except (OSError, yaml.YAMLError, KeyError, TypeError) as error:
+        fail(f"{path} is no file of FuseSoC's generator call: {error}")
+    origin = find_requesting_core(files_root, vlnv.split(":")[2])
+    return Request(command, vlnv, files_root, check_parameters(given, parameters, origin))
+
+
+def _write(request: Request, generator: Generator) -> bool:
+    """Write the core into the current folder; tell whether it came from the store."""
+    key = store_key(
+        {"command": request.command, "vlnv": request.vlnv, "parameters": dict(request.parameters)},
+        {_name(path, request): _content(path) for path in generator.inputs(request)},
+    )
+    entry = Store(default_root()).obtain(key, lambda: as_files(generator.generate(request), request))
+    for name, content in entry.files.items():
+        write_if_changed(Path(name), content)
+    return entry.is_from_store
+
+
+def _name(path: Path, request: Request) -> str:
+    """An input's name in the key: the same for copies of a project in different folders."""
+    return str(path.relative_to(request.files_root)) if path.is_relative_to(request.files_root) else str(path)
+
+
+def _content(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None

@@ -1,0 +1,84 @@
+"""What passes between FuseSoC's generator call and the stages that answer it: a request in, a generated core out.
+
+It knows no stage, so `converter` and `system` can return what `gapi` writes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yaml
+
+Plain = str | int | bool | list[str] | None
+"""What a generator's parameter can be; None is one that was not given and has no default."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's."""
+
+    command: str
+    vlnv: str
+    files_root: Path
+    parameters: Mapping[str, Plain]
+
+    @property
+    def name(self) -> str:
+        """The new core's name, `<requesting core>-<instance>`."""
+        return self.vlnv.split(":")[2]
+
+
+@dataclass(frozen=True)
+class GeneratedFile:
+    """A file of a generated core.
+
+    `file_type` is FuseSoC's (`vhdlSource-93`, `user`, ...), `logical_name` the VHDL library, and `copyto` where in the
+    work folder the tool finds it; "" leaves them out.
+    """
+
+    content: str | bytes
+    file_type: str
+    logical_name: str = ""
+    copyto: str = ""
+    tags: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class GeneratedCore:
+    """A core as a generator returns it: files by path relative to the core, in the order in which a tool reads them."""
+
+    description: str
+    files: Mapping[str, GeneratedFile] = field(default_factory=dict)
+
+
+def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
+    """The files to write for FuseSoC, by path; the `.core` is last, since with it the others are taken to be there."""
+    contents = {path: _encoded(file.content) for path, file in core.files.items()}
+    return contents | {f"{request.name}.core": core_text(core, request.vlnv).encode()}
+
+
+def core_text(core: GeneratedCore, vlnv: str) -> str:
+    """The `.core` file, the same text for the same core."""
+    description = {
+        "name": vlnv,
+        "description": core.description,
+        "filesets": {"generated": {"files": [{path: _attributes(file)} for path, file in core.files.items()]}},
+        "targets": {"default": {"filesets": ["generated"]}},
+    }
+    return "CAPI=2:\n" + yaml.safe_dump(description, sort_keys=False, allow_unicode=True, width=120)
+
+
+def _attributes(file: GeneratedFile) -> dict[str, object]:
+    attributes = {
+        "file_type": file.file_type,
+        "logical_name": file.logical_name,
+        "copyto": file.copyto,
+        "tags": list(file.tags),
+    }
+    return {name: value for name, value in attributes.items() if value}
+
+
+def _encoded(content: str | bytes) -> bytes:
+    return content.encode() if isinstance(content, str) else content

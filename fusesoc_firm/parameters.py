@@ -1,0 +1,80 @@
+"""The parameters of the generators: which there are, and the check of those that a core gives.
+
+A fault is shown where its author wrote it, in the requesting `.core` file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fusesoc_firm.diagnostics import Diagnostics, nearest
+from fusesoc_firm.generation import Plain
+from fusesoc_firm.requesting_core import RequestingCore
+
+_TYPES: dict[str, tuple[type, str]] = {
+    "str": (str, "a string"),
+    "int": (int, "an integer"),
+    "list": (list, "a list of strings"),
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: `type` and `meaning` are words of the generator's usage text, `bounds` its least and greatest value.
+
+    One that is neither given nor required has its `default`.
+    """
+
+    name: str
+    type: str
+    meaning: str
+    default: Plain = None
+    is_required: bool = False
+    choices: tuple[str | int, ...] = ()
+    bounds: tuple[int, int] | None = None
+
+    def usage(self) -> str:
+        """`name (type): text`, as the generator core lists it."""
+        facts = []
+        if self.choices:
+            facts.append(" | ".join(map(str, self.choices)))
+        if self.bounds:
+            facts.append(f"{self.bounds[0]} to {self.bounds[1]}")
+        if self.is_required:
+            facts.append("required")
+        elif self.default is not None:
+            facts.append(f"default {self.default}")
+        ending = f" ({'; '.join(facts)})" if facts else ""
+        return f"{self.name} ({self.type}): {self.meaning}{ending}"
+
+
+def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origin: RequestingCore) -> dict[str, Plain]:
+    """Every known parameter with the value given or its default. Raises `InputError` with all faults."""
+    table = {parameter.name: parameter for parameter in known}
+    faults = Diagnostics()
+    for name in given:
+        if name not in table:
+            faults.error(f"unknown parameter '{name}'", origin.key(name), nearest(name, table))
+    for name, parameter in table.items():
+        if name not in given:
+            if parameter.is_required:
+                faults.error(f"parameter '{name}' is missing; it is {parameter.meaning}", origin.instance())
+        elif fault := _fault(parameter, given[name]):
+            faults.error(f"parameter '{name}' is {given[name]!r}, but must be {fault}", origin.value(name))
+    faults.raise_if_any()
+    return {name: given.get(name, parameter.default) for name, parameter in table.items()}
+
+
+def _fault(parameter: Parameter, value: object) -> str:
+    """What `value` must be and is not, or ""."""
+    expected, words = _TYPES[parameter.type]
+    # Exact types, since to Python a bool is an integer.
+    if type(value) is not expected or (isinstance(value, list) and not all(type(item) is str for item in value)):
+        return words
+    if parameter.choices and value not in parameter.choices:
+        return f"one of {', '.join(map(str, parameter.choices))}"
+    if parameter.bounds and isinstance(value, int) and not parameter.bounds[0] <= value <= parameter.bounds[1]:
+        return f"{parameter.bounds[0]} to {parameter.bounds[1]}"
+    return ""

@@ -1,0 +1,233 @@
+"""Strict mustache: a template and plain data in, text out, and an error wherever mustache would guess.
+
+Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks a key up in the outer
+scopes if the inner one lacks it. In hardware each of these is a fault that compiles. So chevron only parses the
+templates, and the tree is expanded here, by these rules:
+
+* `{{x}}` prints a string or an integer as it is. Nothing is escaped; a bool or None has no agreed spelling.
+* A key is looked up in the innermost scope and nowhere else. It must be there, also in a part that is left out.
+* `{{#x}}` takes a bool (part or no part, same scope), a list (the part once an item), or a mapping or None (the part in
+  the mapping's scope, or no part). `{{^x}}` is the part for false, an empty list or None.
+* A list holds mappings, each the scope of its turn, or strings and integers, which `{{.}}` prints.
+* `{{> name}}` includes `partials/name.mustache`; alone on a line, its indentation is that of every line included.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from chevron.tokenizer import ChevronError, tokenize
+
+TEMPLATES = Path(__file__).resolve().parent / "templates"
+
+
+class TemplateError(Exception):
+    """A template and its context do not fit: a fault of this package, never of its user."""
+
+
+@dataclass(frozen=True)
+class _Literal:
+    text: str
+
+
+@dataclass(frozen=True)
+class _Value:
+    key: str
+
+
+@dataclass(frozen=True)
+class _Section:
+    key: str
+    is_inverted: bool
+    body: tuple[_Node, ...]
+
+
+@dataclass(frozen=True)
+class _Partial:
+    name: str
+    indentation: str
+
+
+_Node = _Literal | _Value | _Section | _Partial
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """Where keys are looked up, and the way there from the context's root (`ports[3]`), for messages."""
+
+    data: object
+    path: str = ""
+
+    def path_to(self, key: str) -> str:
+        if key == ".":
+            return self.path
+        return f"{self.path}.{key}" if self.path else key
+
+
+def render(template_name: str, context: Mapping[str, object], templates: Path = TEMPLATES) -> str:
+    """The text of `templates/<template_name>.mustache` for `context`.
+
+    The context may hold dict, list, str, int, bool and None only. Raises `TemplateError`, which names template, key and
+    scope, if the two do not fit.
+    """
+    try:
+        _require_plain(context, "")
+        return _Expansion(templates).expand(_parse(templates / f"{template_name}.mustache"), _Scope(context), True)
+    except TemplateError as error:
+        raise TemplateError(f"template {template_name}: {error}") from error
+
+
+def write_if_changed(path: Path, content: str | bytes) -> bool:
+    """Write a file unless it holds just that already; tell whether it was written.
+
+    An unchanged file keeps its time, so nothing behind it is built again. A changed one is replaced at once, so that no
+    reader sees half of it. Raises `OSError`.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    if path.is_file() and path.read_bytes() == data:
+        return False
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_bytes(data)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    return True
+
+
+@dataclass(frozen=True)
+class _Expansion:
+    """One walk over a parsed template."""
+
+    templates: Path
+
+    def expand(self, nodes: tuple[_Node, ...], scope: _Scope, is_taken: bool) -> str:
+        """The text of `nodes`; none where they are not taken, but then too every key is looked up."""
+        text = "".join([self._node(node, scope, is_taken) for node in nodes])
+        return text if is_taken else ""
+
+    def _node(self, node: _Node, scope: _Scope, is_taken: bool) -> str:
+        match node:
+            case _Literal(text):
+                return text
+            case _Value(key):
+                value = _look_up(key, scope)
+                return _printed(value, scope.path_to(key)) if is_taken else ""
+            case _Section():
+                return self._section(node, scope, is_taken)
+            case _Partial(name, indentation):
+                text = self.expand(_parse(self.templates / "partials" / f"{name}.mustache"), scope, is_taken)
+                return _indented(text, indentation)
+
+    def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
+        value = _look_up(section.key, scope)
+        path = scope.path_to(section.key)
+        if not isinstance(value, bool | list | dict | None):
+            raise TemplateError(f"'{path}' is {_kind(value)}; a section takes a bool, a list, a mapping or None")
+        return "".join(
+            self.expand(section.body, inner, is_taken and is_inner_taken)
+            for inner, is_inner_taken in _turns(section, value, scope, path)
+        )
+
+
+def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
+    """The scopes in which a section's body is expanded, each with whether its text counts."""
+    if section.is_inverted:
+        yield scope, value is None or value is False or value == []
+    elif isinstance(value, bool):
+        yield scope, value
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            yield _Scope(item, f"{path}[{number}]"), True
+    elif value is not None:
+        yield _Scope(value, path), True
+
+
+def _look_up(key: str, scope: _Scope) -> object:
+    if key == ".":
+        return scope.data
+    value, path = scope.data, scope.path
+    for step in key.split("."):
+        if not isinstance(value, dict) or step not in value:
+            legal = f"it has {', '.join(sorted(value))}" if isinstance(value, dict) else f"it is {_kind(value)}"
+            raise TemplateError(f"no '{key}' in {path or 'the context'}; {legal}")
+        value, path = value[step], f"{path}.{step}" if path else step
+    return value
+
+
+def _printed(value: object, path: str) -> str:
+    if isinstance(value, bool) or not isinstance(value, str | int):
+        raise TemplateError(f"'{path}' is {_kind(value)}; only a string or an integer can be printed")
+    return str(value)
+
+
+def _kind(value: object) -> str:
+    return "None" if value is None else f"of type {type(value).__name__}"
+
+
+def _indented(text: str, indentation: str) -> str:
+    """Indent every line that is not empty; an empty one would only get blanks at its end."""
+    return "".join(indentation + line if line.strip() else line for line in text.splitlines(keepends=True))
+
+
+def _require_plain(value: object, path: str) -> None:
+    """Raise unless `value` is made of plain data: what is computed while it is rendered could not be printed before."""
+    # Exact types: a subclass may print itself in another way (an IntEnum does).
+    if value is None or type(value) in (str, int, bool):
+        return
+    if type(value) is list:
+        for number, item in enumerate(value):
+            _require_plain(item, f"{path}[{number}]")
+    elif type(value) is dict:
+        for key, item in value.items():
+            if type(key) is not str:
+                raise TemplateError(f"the key {key!r} in {path or 'the context'} is {_kind(key)}, not a string")
+            _require_plain(item, f"{path}.{key}" if path else key)
+    else:
+        raise TemplateError(f"'{path or 'the context'}' is {_kind(value)}; a context holds plain data only")
+
+
+@cache
+def _parse(path: Path) -> tuple[_Node, ...]:
+    """The tree of a template file."""
+    try:
+        tokens = iter(list(tokenize(path.read_text(encoding="utf-8"))))
+    except OSError as error:
+        raise TemplateError(f"cannot read {path.name}: {error.strerror}") from error
+    except ChevronError as error:
+        raise TemplateError(f"{path.name}: {' '.join(str(error).split())}") from error
+    return _nodes(tokens)
+
+
+def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
+    """The nodes up to the end of the section that `tokens` stands in, or of the file."""
+    nodes: list[_Node] = []
+    for kind, key in tokens:
+        match kind:
+            case "literal":
+                nodes.append(_Literal(key))
+            case "variable" | "no escape":
+                nodes.append(_Value(key))
+            case "section" | "inverted section":
+                nodes.append(_Section(key, kind == "inverted section", _nodes(tokens)))
+            case "partial":
+                nodes.append(_Partial(key, _take_indentation(nodes)))
+            case "end":
+                break
+    return tuple(nodes)
+
+
+def _take_indentation(nodes: list[_Node]) -> str:
+    """Take off and return the blanks with which the last line of `nodes` begins, if it holds nothing else."""
+    match nodes:
+        case [*before, _Literal(text)] if not (before and isinstance(before[-1], _Value) and "\n" not in text):
+            rest, newline, line = text.rpartition("\n")
+            if line.isspace():
+                nodes[-1] = _Literal(rest + newline)
+                return line
+    return ""

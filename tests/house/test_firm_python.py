@@ -1,0 +1,122 @@
+"""The generators find a Python that has the package, whatever `python3` FuseSoC starts them with."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+
+GENERATORS = Path(__file__).resolve().parents[2] / "generators"
+# Stands in for the package: it says who answers, and with what.
+GAPI = "import sys\ndef main(command, argv):\n    print(command, *argv, 'in', sys.prefix)\n    return 3\n"
+
+
+def make_environment(folder: Path, *, has_package: bool) -> Path:
+    """A virtual environment; its Python."""
+    venv.create(folder, symlinks=True)
+    site_packages = folder / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
+    if has_package:
+        (site_packages / "fusesoc_firm").mkdir()
+        (site_packages / "fusesoc_firm" / "gapi.py").write_text(GAPI)
+        for name in ("fusesoc_firm/__init__.py", "chevron.py", "rosbags.py", "yaml.py"):
+            (site_packages / name).write_text("")
+    return folder / "bin" / "python3"
+
+
+@pytest.fixture
+def bare(tmp_path: Path) -> Path:
+    """The `python3` of somebody who activated nothing."""
+    return make_environment(tmp_path / "bare", has_package=False)
+
+
+@pytest.fixture
+def owner(tmp_path: Path) -> Path:
+    """The Python that has the package."""
+    return make_environment(tmp_path / "owner", has_package=True)
+
+
+def put_generators(folder: Path) -> Path:
+    """Copy the commands into `folder`; the one of `far`."""
+    shutil.copytree(GENERATORS, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    return folder / "far_generator.py"
+
+
+def call(*command: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a command from a shell, with nothing around it that could lead to the package."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "FUSESOC", "VIRTUAL_"))}
+    return subprocess.run(
+        ["sh", "-c", '"$@"; exit $?', "sh", *map(str, command)],
+        env=kept | environment,
+        text=True,
+        capture_output=True,
+        check=False,
+        timeout=60,
+    )
+
+
+def answer(environment: Path) -> tuple[str, int]:
+    """What the stand-in prints and exits with, run by the Python of an environment."""
+    return f"far input.yml in {environment.parents[1]}\n", 3
+
+
+def test_the_python_it_is_started_with_is_used_if_it_has_the_package(tmp_path: Path, owner: Path) -> None:
+    done = call(owner, put_generators(tmp_path / "generators"), "input.yml")
+    assert (done.stdout, done.returncode) == answer(owner)
+
+
+def test_the_environment_it_is_installed_in(tmp_path: Path, bare: Path, owner: Path) -> None:
+    generator = put_generators(owner.parents[1] / "lib" / "firm" / "library" / "generators")
+    done = call(bare, generator, "input.yml")
+    assert (done.stdout, done.returncode) == answer(owner)
+
+
+def test_the_environment_of_the_checkout(tmp_path: Path, bare: Path) -> None:
+    generator = put_generators(tmp_path / "checkout" / "generators")
+    (tmp_path / "checkout" / "library").mkdir()
+    link = tmp_path / "checkout" / "library" / "generators"
+    link.symlink_to("../generators")
+    python = make_environment(tmp_path / "checkout" / ".venv", has_package=True)
+    done = call(bare, link / generator.name, "input.yml")
+    assert (done.stdout, done.returncode) == answer(python)
+
+
+# As FuseSoC does: start a generator as a child and hand its exit status on.
+PARENT = "import subprocess, sys\nsys.exit(subprocess.run(sys.argv[1:]).returncode)\n"
+
+
+def test_the_python_that_runs_fusesoc(tmp_path: Path, bare: Path, owner: Path) -> None:
+    (tmp_path / "fusesoc").write_text(PARENT)
+    generator = put_generators(tmp_path / "generators")
+    done = call(owner, tmp_path / "fusesoc", bare, generator, "input.yml")
+    assert (done.stdout, done.returncode) == answer(owner)
+
+
+def test_the_environment_of_the_fusesoc_script(tmp_path: Path, bare: Path, owner: Path) -> None:
+    script = owner.parent / "fusesoc"
+    script.write_text(PARENT)
+    generator = put_generators(tmp_path / "generators")
+    done = call(bare, script, bare, generator, "input.yml")
+    assert (done.stdout, done.returncode) == answer(owner)
+
+
+def test_a_chosen_python_is_used_and_no_other(tmp_path: Path, bare: Path, owner: Path) -> None:
+    other = make_environment(tmp_path / "other", has_package=True)
+    generator = put_generators(tmp_path / "generators")
+    done = call(owner, generator, "input.yml", FUSESOC_FIRM_PYTHON=str(other))
+    assert (done.stdout, done.returncode) == answer(other)
+    failed = call(owner, generator, "input.yml", FUSESOC_FIRM_PYTHON=str(bare))
+    assert failed.returncode == 1
+    assert f"These were tried:\n  {bare}\nInstall" in failed.stderr
+
+
+def test_where_there_is_none_the_message_says_what_to_do(tmp_path: Path, bare: Path) -> None:
+    done = call(bare, put_generators(tmp_path / "generators"), "input.yml")
+    assert (done.stdout, done.returncode) == ("", 1)
+    assert done.stderr.startswith("far: error: no Python with the packages fusesoc_firm, chevron, rosbags, yaml was")
+    assert f"  {bare}\n" in done.stderr
+    assert "set FUSESOC_FIRM_PYTHON to its python3" in done.stderr

@@ -1,0 +1,199 @@
+"""Another project adds the library and calls the generators, from a wheel and from a checkout, nothing activated."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import venv
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+# One worker does them all, so that each kind is installed once.
+pytestmark = pytest.mark.xdist_group("installation")
+
+needs_cores = pytest.mark.skipif(not (ROOT / "cores" / "manager").is_dir(), reason="needs the reusable cores")
+needs_converter = pytest.mark.skipif(not find_spec("fusesoc_firm.converter"), reason="needs the converter")
+
+PROJECT_CORE = """\
+CAPI=2:
+name: me:proj:robot:1.0
+filesets:
+  base:
+    depend: ["robot:firm:generators"]
+generate:
+  pose:
+    generator: firm
+    parameters:
+      message: geometry_msgs/Quaternion
+      {ros}
+    position: prepend
+targets:
+  default:
+    filesets: [base]
+    generate: [pose]
+    toplevel: axis_to_geometry_msgs_quaternion
+    flow: generic
+    flow_options: {{tool: ghdl}}
+"""
+# A core as a build leaves it behind.
+LEFT_BEHIND = "CAPI=2:\nname: robot:sys:left-behind:0\ntargets: {default: {}}\n"
+
+
+@dataclass(frozen=True)
+class Installation:
+    """An environment with the package, and the source folder that it was installed from."""
+
+    environment: Path
+    source: Path
+
+    def python(self, *arguments: str) -> str:
+        return self._run(self.environment / "bin" / "python3", *arguments, cwd=self.environment).stdout.strip()
+
+    def fusesoc(self, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+        return self._run(self.environment / "bin" / "fusesoc", *arguments, cwd=cwd, check=False)
+
+    def library(self) -> Path:
+        return Path(self.python("-c", "from fusesoc_firm.library_path import library_root; print(library_root())"))
+
+    def _run(self, *command: str | Path, cwd: Path, check: bool = True) -> subprocess.CompletedProcess[str]:
+        home = self.environment.parent / "home"
+        # Nothing is activated: `python3` is the system's, and knows no package of ours.
+        environment = {"PATH": "/usr/bin:/bin", "HOME": str(home), "LANG": "C.UTF-8"}
+        return subprocess.run(
+            command, cwd=cwd, env=environment, text=True, capture_output=True, check=check, timeout=120
+        )
+
+
+def copy_source(destination: Path) -> None:
+    ignored = shutil.ignore_patterns(".git", ".venv", "*.egg-info", "__pycache__", ".*_cache", ".hypothesis")
+    shutil.copytree(ROOT, destination, symlinks=True, ignore=ignored)
+    # A checkout in which somebody works: builds, and an environment, that hold cores.
+    for folder in ("build/robot_sys_x_0/sim/generator_cache/y", "build/lib/fusesoc_firm"):
+        (destination / folder).mkdir(parents=True)
+        (destination / folder / "left-behind.core").write_text(LEFT_BEHIND)
+
+
+def pip(*arguments: str | Path) -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    command = [sys.executable, "-m", "pip", "--disable-pip-version-check", *map(str, arguments)]
+    done = subprocess.run(command, env=environment, text=True, capture_output=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def lend_packages(environment: Path) -> None:
+    """Let an environment import what the tests' one has, so that nothing is downloaded."""
+    (site_packages,) = environment.glob("lib/python3*/site-packages")
+    (site_packages / "lent.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    script = environment / "bin" / "fusesoc"
+    script.write_text(f"#!{environment}/bin/python3\nimport sys\nfrom fusesoc.main import main\nsys.exit(main())\n")
+    script.chmod(0o755)
+
+
+@pytest.fixture(scope="module", params=["wheel", "editable"])
+def installation(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Installation:
+    """The package installed in a fresh environment."""
+    folder = tmp_path_factory.mktemp(request.param)
+    made = Installation(folder / "environment", folder / "source")
+    copy_source(made.source)
+    venv.create(made.environment, symlinks=True)
+    into = (
+        "--python",
+        made.environment / "bin" / "python3",
+        "install",
+        "--no-deps",
+        "--no-index",
+        "--ignore-installed",
+    )
+    if request.param == "wheel":
+        pip("wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, made.source)
+        pip(*into, *folder.glob("*.whl"))
+        lend_packages(made.environment)
+    else:
+        lend_packages(made.environment)
+        pip(*into, "--no-build-isolation", "--editable", made.source)
+    return made
+
+
+@pytest.fixture
+def project(installation: Installation, tmp_path: Path) -> Path:
+    """Another project, which has added the library as docs/packaging.md says."""
+    (tmp_path / "robot").mkdir()
+    (tmp_path / "fusesoc.conf").write_text("")
+    for name, location in (("firm", installation.library()), ("own", tmp_path / "robot")):
+        done = installation.fusesoc("library", "add", name, str(location), cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    return tmp_path
+
+
+def files_below(library: Path) -> set[str]:
+    paths = [path for room in ("cores", "generators", "specs") for path in (library / room).rglob("*")]
+    files = {path.relative_to(library).as_posix() for path in paths if path.is_file()}
+    return {name for name in files if "__pycache__" not in name}
+
+
+def test_the_library_is_installed_whole(installation: Installation) -> None:
+    library = installation.library()
+    assert library.is_relative_to(installation.environment) or library.is_relative_to(installation.source)
+    assert "generators/generators.core" in files_below(library)
+    assert files_below(library) == files_below(installation.source)
+    assert {path.name for path in library.iterdir()} <= {"cores", "generators", "specs"}
+
+
+def test_another_project_sees_each_core_once(installation: Installation, project: Path) -> None:
+    done = installation.fusesoc("core", "list", cwd=project)
+    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert "left-behind" not in done.stdout
+    assert "Replacing" not in done.stderr
+    assert "Parse error" not in done.stderr
+    shown = installation.fusesoc("gen", "show", "far", cwd=project)
+    assert "spec (str): " in shown.stdout
+
+
+def test_a_whole_checkout_can_be_the_library(installation: Installation, tmp_path: Path) -> None:
+    (tmp_path / "fusesoc.conf").write_text(f"[library.firm]\nlocation = {installation.source}\n")
+    done = installation.fusesoc("core", "list", cwd=tmp_path)
+    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert "left-behind" not in done.stdout
+    assert "Replacing" not in done.stderr
+
+
+def test_the_checkout_itself_is_a_project(installation: Installation) -> None:
+    done = installation.fusesoc("core", "list", cwd=installation.source)
+    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert "left-behind" not in done.stdout
+    assert "Replacing" not in done.stderr
+
+
+@needs_cores
+def test_a_fault_in_another_projects_core_is_shown_there(installation: Installation, project: Path) -> None:
+    core = project / "robot" / "robot.core"
+    core.write_text(PROJECT_CORE.format(ros="ros: 3"))
+    done = installation.fusesoc("run", "--setup", "me:proj:robot", cwd=project)
+    assert done.returncode == 1
+    assert f"{core}:11:12: error: parameter 'ros' is 3, but must be one of 1, 2\n" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@needs_cores
+@needs_converter
+def test_another_projects_core_calls_a_generator(installation: Installation, project: Path) -> None:
+    (project / "robot" / "robot.core").write_text(PROJECT_CORE.format(ros="ros: 1"))
+    done = installation.fusesoc("run", "--setup", "me:proj:robot", cwd=project)
+    assert done.returncode == 0, done.stderr
+    (description,) = project.glob("build/me_proj_robot_1.0/default/*.eda.yml")
+    files = {Path(file["name"]).name: file for file in yaml.safe_load(description.read_text())["files"]}
+    for name in ("axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"):
+        assert files[name]["file_type"] == "vhdlSource-93"
+        assert files[name]["core"] == "me:proj:robot-pose:1.0"
+    # The run-time cores come along with the generators; the simulated host stays out of a target that is not `sim`.
+    cores = {file["core"] for file in files.values()}
+    assert "robot:manager:manager:0.1.0" in cores
+    assert not any(core.startswith("robot:sim:") for core in cores)
