@@ -16,7 +16,7 @@ entity firm_axis_mux is
 
     -- Source 0 lies lowest.
     s_axis_tdata  : in  std_logic_vector(SOURCES*WIDTH-1 downto 0);
-    s_axis_tkeep  : in  std_logic_vector(SOURCES*WIDTH/8-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(SOURCES*(WIDTH/8)-1 downto 0);
     s_axis_tvalid : in  std_logic_vector(SOURCES-1 downto 0);
     s_axis_tlast  : in  std_logic_vector(SOURCES-1 downto 0);
     s_axis_tready : out std_logic_vector(SOURCES-1 downto 0);
@@ -87,11 +87,14 @@ begin
       index    => source,
       word     => chosen_tvalid);
 
-  widen_source : process (source)
-  begin
-    m_axis_tid                      <= (others => '0');
-    m_axis_tid(source'length-1 downto 0) <= source;
-  end process widen_source;
+  widen_source : for place in 0 to 7 generate
+    used : if place < source'length generate
+      m_axis_tid(place) <= source(place);
+    end generate used;
+    unused : if place >= source'length generate
+      m_axis_tid(place) <= '0';
+    end generate unused;
+  end generate widen_source;
 
   take          <= enable and m_axis_tready;
   m_axis_tvalid <= enable and chosen_tvalid(0);

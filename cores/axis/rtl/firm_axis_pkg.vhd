@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- What the stream cores share: sizes, and the two functions of an index that synthesis maps badly if they are
 -- written as a dynamic array access. They are plain logic on std_logic, so an unknown bit gives an unknown
--- result and no warning. To select with an index, see firm_axis_select.
+-- result and no warning. To select with an index, see firm_axis_select. Sizes may be illegal numbers: an entity's
+-- own assert, which speaks only after elaboration, shall name them.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -10,18 +11,18 @@ package firm_axis_pkg is
   function max(left, right : integer) return integer;
 
   -- Bits to tell `values` things apart: 0 for 1, 1 for 2, 8 for 256.
-  function clog2(values : positive) return natural;
+  function clog2(values : integer) return natural;
 
   -- Bits of an index to `values` things. A port cannot be empty, so it is 1 where one thing needs no index.
-  function index_bits(values : positive) return positive;
+  function index_bits(values : integer) return positive;
 
   function is_stream_width(width : integer) return boolean;
 
   -- '1' if `index`, read as an unsigned number, is less than `bound`.
-  function is_below(index : std_logic_vector; bound : positive) return std_logic;
+  function is_below(index : std_logic_vector; bound : natural) return std_logic;
 
   -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one AND.
-  function decode(index : std_logic_vector; enable : std_logic; outputs : positive) return std_logic_vector;
+  function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector;
 
 end package firm_axis_pkg;
 
@@ -35,7 +36,7 @@ package body firm_axis_pkg is
     return right;
   end function max;
 
-  function clog2(values : positive) return natural is
+  function clog2(values : integer) return natural is
     variable bits     : natural := 0;
     variable capacity : positive := 1;
   begin
@@ -46,7 +47,7 @@ package body firm_axis_pkg is
     return bits;
   end function clog2;
 
-  function index_bits(values : positive) return positive is
+  function index_bits(values : integer) return positive is
   begin
     return max(1, clog2(values));
   end function index_bits;
@@ -56,7 +57,7 @@ package body firm_axis_pkg is
     return width = 8 or width = 16 or width = 32 or width = 64 or width = 128 or width = 256 or width = 512;
   end function is_stream_width;
 
-  function is_below(index : std_logic_vector; bound : positive) return std_logic is
+  function is_below(index : std_logic_vector; bound : natural) return std_logic is
     variable bits  : std_logic_vector(index'length-1 downto 0);
     variable less  : std_logic := '0';
     variable equal : std_logic := '1';
@@ -92,7 +93,7 @@ package body firm_axis_pkg is
     return equal;
   end function is_equal;
 
-  function decode(index : std_logic_vector; enable : std_logic; outputs : positive) return std_logic_vector is
+  function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector is
     constant LOW_BITS  : natural := index'length / 2;
     constant HIGH_BITS : positive := index'length - LOW_BITS;
     variable bits      : std_logic_vector(index'length-1 downto 0);

@@ -8,7 +8,7 @@ use firm.firm_axis_pkg.all;
 
 entity firm_axis_select is
   generic (
-    WORDS : positive := 4;
+    WORDS : integer  := 4;  -- 1 and more
     WIDTH : positive := 8);
   port (
     words_in : in  std_logic_vector(WORDS*WIDTH-1 downto 0);  -- word 0 lowest

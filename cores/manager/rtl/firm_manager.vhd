@@ -40,7 +40,7 @@ entity firm_manager is
 
     -- From the publishers; publisher 0 lies lowest.
     pub_axis_tdata  : in  std_logic_vector(PUBLISHERS*WIDTH-1 downto 0);
-    pub_axis_tkeep  : in  std_logic_vector(PUBLISHERS*WIDTH/8-1 downto 0);
+    pub_axis_tkeep  : in  std_logic_vector(PUBLISHERS*(WIDTH/8)-1 downto 0);
     pub_axis_tvalid : in  std_logic_vector(PUBLISHERS-1 downto 0);
     pub_axis_tlast  : in  std_logic_vector(PUBLISHERS-1 downto 0);
     pub_axis_tready : out std_logic_vector(PUBLISHERS-1 downto 0);
