@@ -1,0 +1,116 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Takes the id off a frame and routes the rest to one of DESTINATIONS. Data is broadcast, only `tvalid` and
+-- `tready` are decoded. At 8 bits the id's beat ends here; at wider streams it goes on with its lowest lane void
+-- (the bytes are still there, `tkeep` is unchanged), so nothing has to be re-aligned. A frame whose id belongs to
+-- nobody, or that is nothing but its id at 8 bits, is swallowed and `id_error` pulses in the cycle after its first beat.
+-- The paths from input to output are combinational: put a register slice in front.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_axis_demux is
+  generic (
+    WIDTH        : integer := 8;
+    DESTINATIONS : integer := 2);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- One for all.
+    m_axis_tdata : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tlast : out std_logic;
+    -- One bit a destination.
+    m_axis_tvalid : out std_logic_vector(DESTINATIONS-1 downto 0);
+    m_axis_tready : in  std_logic_vector(DESTINATIONS-1 downto 0);
+
+    id_error : out std_logic);
+end entity firm_axis_demux;
+
+architecture rtl of firm_axis_demux is
+
+  constant INDEX_BITS_USED : positive := index_bits(DESTINATIONS);
+
+  signal first_r : std_logic;  -- the next beat is the first of a frame
+  signal index_r : std_logic_vector(INDEX_BITS_USED-1 downto 0);
+  signal known_r : std_logic;
+
+  signal known_id : std_logic;  -- the lowest lane, read as an id, belongs to a destination
+  signal index    : std_logic_vector(INDEX_BITS_USED-1 downto 0);
+  signal forward  : std_logic;  -- this beat goes to a destination
+  signal valid    : std_logic;
+  signal ready    : std_logic_vector(0 downto 0);
+  signal taken    : std_logic;
+
+  signal s_axis_tready_out : std_logic;
+
+begin
+
+  assert is_stream_width(WIDTH)
+    report "firm_axis_demux: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+  assert DESTINATIONS >= 1 and DESTINATIONS <= 256
+    report "firm_axis_demux: DESTINATIONS is " & integer'image(DESTINATIONS) & "; legal: 1 to 256"
+    severity failure;
+
+  known_id <= is_below(s_axis_tdata(7 downto 0), DESTINATIONS);
+
+  byte_wide : if WIDTH = 8 generate
+    index   <= index_r;
+    forward <= known_r and not first_r;
+  end generate byte_wide;
+
+  wider : if WIDTH > 8 generate
+    index   <= s_axis_tdata(INDEX_BITS_USED-1 downto 0) when first_r = '1' else index_r;
+    forward <= known_id when first_r = '1' else known_r;
+  end generate wider;
+
+  u_select_ready : entity firm.firm_axis_select
+    generic map (
+      WORDS => DESTINATIONS,
+      WIDTH => 1)
+    port map (
+      words_in => m_axis_tready,
+      index    => index,
+      word     => ready);
+
+  valid             <= s_axis_tvalid and forward;
+  s_axis_tready_out <= ready(0) or not forward;
+  taken             <= s_axis_tvalid and s_axis_tready_out;
+
+  remember_destination : process (clk)
+  begin
+    if rising_edge(clk) then
+      id_error <= '0';
+      if rst_n = '0' then
+        first_r <= '1';
+      elsif taken = '1' then
+        first_r <= s_axis_tlast;
+        if first_r = '1' then
+          id_error <= not known_id;
+          if WIDTH = 8 and s_axis_tlast = '1' then
+            id_error <= '1';
+          end if;
+        end if;
+      end if;
+      if first_r = '1' then
+        index_r <= s_axis_tdata(INDEX_BITS_USED-1 downto 0);
+        known_r <= known_id;
+      end if;
+    end if;
+  end process remember_destination;
+
+  s_axis_tready <= s_axis_tready_out;
+  m_axis_tdata  <= s_axis_tdata;
+  m_axis_tkeep  <= s_axis_tkeep;
+  m_axis_tlast  <= s_axis_tlast;
+  m_axis_tvalid <= decode(index, valid, DESTINATIONS);
+
+end architecture rtl;

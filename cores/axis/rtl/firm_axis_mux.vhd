@@ -1,0 +1,104 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- One stream out of SOURCES: `source` says which while `enable` is '1'; `tid` says it to those behind. Purely
+-- combinational, and it does not know frames: who drives `source` keeps them whole (a scheduler).
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_axis_mux is
+  generic (
+    WIDTH   : integer := 8;
+    SOURCES : integer := 2);
+  port (
+    source : in std_logic_vector(index_bits(SOURCES)-1 downto 0);
+    enable : in std_logic;
+
+    -- Source 0 lies lowest.
+    s_axis_tdata  : in  std_logic_vector(SOURCES*WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(SOURCES*(WIDTH/8)-1 downto 0);
+    s_axis_tvalid : in  std_logic_vector(SOURCES-1 downto 0);
+    s_axis_tlast  : in  std_logic_vector(SOURCES-1 downto 0);
+    s_axis_tready : out std_logic_vector(SOURCES-1 downto 0);
+
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tid    : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic);
+end entity firm_axis_mux;
+
+architecture rtl of firm_axis_mux is
+
+  signal chosen_tvalid : std_logic_vector(0 downto 0);
+  signal chosen_tlast  : std_logic_vector(0 downto 0);
+  signal take          : std_logic;
+
+begin
+
+  assert is_stream_width(WIDTH)
+    report "firm_axis_mux: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+  assert SOURCES >= 1 and SOURCES <= 256
+    report "firm_axis_mux: SOURCES is " & integer'image(SOURCES) & "; legal: 1 to 256"
+    severity failure;
+
+  u_select_tdata : entity firm.firm_axis_select
+    generic map (
+      WORDS => SOURCES,
+      WIDTH => WIDTH)
+    port map (
+      words_in => s_axis_tdata,
+      index    => source,
+      word     => m_axis_tdata);
+
+  -- A beat of one byte is full.
+  byte_wide : if WIDTH = 8 generate
+    m_axis_tkeep <= "1";
+  end generate byte_wide;
+
+  wider : if WIDTH > 8 generate
+    u_select_tkeep : entity firm.firm_axis_select
+      generic map (
+        WORDS => SOURCES,
+        WIDTH => WIDTH/8)
+      port map (
+        words_in => s_axis_tkeep,
+        index    => source,
+        word     => m_axis_tkeep);
+  end generate wider;
+
+  u_select_tlast : entity firm.firm_axis_select
+    generic map (
+      WORDS => SOURCES,
+      WIDTH => 1)
+    port map (
+      words_in => s_axis_tlast,
+      index    => source,
+      word     => chosen_tlast);
+
+  u_select_tvalid : entity firm.firm_axis_select
+    generic map (
+      WORDS => SOURCES,
+      WIDTH => 1)
+    port map (
+      words_in => s_axis_tvalid,
+      index    => source,
+      word     => chosen_tvalid);
+
+  widen_source : for place in 0 to 7 generate
+    used : if place < source'length generate
+      m_axis_tid(place) <= source(place);
+    end generate used;
+    unused : if place >= source'length generate
+      m_axis_tid(place) <= '0';
+    end generate unused;
+  end generate widen_source;
+
+  take          <= enable and m_axis_tready;
+  m_axis_tvalid <= enable and chosen_tvalid(0);
+  m_axis_tlast  <= chosen_tlast(0);
+  s_axis_tready <= decode(source, take, SOURCES);
+
+end architecture rtl;

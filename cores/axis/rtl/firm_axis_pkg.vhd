@@ -1,0 +1,120 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- What the stream cores share: sizes, and the two functions of an index that synthesis maps badly if they are
+-- written as a dynamic array access. They are plain logic on std_logic, so an unknown bit gives an unknown
+-- result and no warning. To select with an index, see firm_axis_select. Sizes may be illegal numbers: an entity's
+-- own assert, which speaks only after elaboration, shall name them.
+library ieee;
+use ieee.std_logic_1164.all;
+
+package firm_axis_pkg is
+
+  function max(left, right : integer) return integer;
+
+  -- Bits to tell `values` things apart: 0 for 1, 1 for 2, 8 for 256.
+  function clog2(values : integer) return natural;
+
+  -- Bits of an index to `values` things. A port cannot be empty, so it is 1 where one thing needs no index.
+  function index_bits(values : integer) return positive;
+
+  function is_stream_width(width : integer) return boolean;
+
+  -- '1' if `index`, read as an unsigned number, is less than `bound`.
+  function is_below(index : std_logic_vector; bound : natural) return std_logic;
+
+  -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one AND.
+  function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector;
+
+end package firm_axis_pkg;
+
+package body firm_axis_pkg is
+
+  function max(left, right : integer) return integer is
+  begin
+    if left > right then
+      return left;
+    end if;
+    return right;
+  end function max;
+
+  function clog2(values : integer) return natural is
+    variable bits     : natural := 0;
+    variable capacity : positive := 1;
+  begin
+    while capacity < values loop
+      bits     := bits + 1;
+      capacity := 2 * capacity;
+    end loop;
+    return bits;
+  end function clog2;
+
+  function index_bits(values : integer) return positive is
+  begin
+    return max(1, clog2(values));
+  end function index_bits;
+
+  function is_stream_width(width : integer) return boolean is
+  begin
+    return width = 8 or width = 16 or width = 32 or width = 64 or width = 128 or width = 256 or width = 512;
+  end function is_stream_width;
+
+  function is_below(index : std_logic_vector; bound : natural) return std_logic is
+    variable bits  : std_logic_vector(index'length-1 downto 0);
+    variable less  : std_logic := '0';
+    variable equal : std_logic := '1';
+  begin
+    if bound >= 2**index'length then
+      return '1';
+    end if;
+    bits := index;
+    for place in bits'range loop
+      if (bound / 2**place) mod 2 = 1 then
+        less  := less or (equal and not bits(place));
+        equal := equal and bits(place);
+      else
+        equal := equal and not bits(place);
+      end if;
+    end loop;
+    return less;
+  end function is_below;
+
+  -- '1' if the bits of `index` spell `value`.
+  function is_equal(index : std_logic_vector; value : natural) return std_logic is
+    variable bits  : std_logic_vector(index'length-1 downto 0);
+    variable equal : std_logic := '1';
+  begin
+    bits := index;
+    for place in bits'range loop
+      if (value / 2**place) mod 2 = 1 then
+        equal := equal and bits(place);
+      else
+        equal := equal and not bits(place);
+      end if;
+    end loop;
+    return equal;
+  end function is_equal;
+
+  function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector is
+    constant LOW_BITS  : natural := index'length / 2;
+    constant HIGH_BITS : positive := index'length - LOW_BITS;
+    variable bits      : std_logic_vector(index'length-1 downto 0);
+    variable column    : std_logic_vector(2**LOW_BITS-1 downto 0);
+    variable row       : std_logic_vector(2**HIGH_BITS-1 downto 0);
+    variable decoded   : std_logic_vector(outputs-1 downto 0);
+  begin
+    bits   := index;
+    column := (others => '1');
+    if LOW_BITS > 0 then
+      for value in column'range loop
+        column(value) := is_equal(bits(LOW_BITS-1 downto 0), value);
+      end loop;
+    end if;
+    for value in row'range loop
+      row(value) := enable and is_equal(bits(index'length-1 downto LOW_BITS), value);
+    end loop;
+    for value in decoded'range loop
+      decoded(value) := row(value / 2**LOW_BITS) and column(value mod 2**LOW_BITS);
+    end loop;
+    return decoded;
+  end function decode;
+
+end package body firm_axis_pkg;

@@ -1,0 +1,99 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Cuts every path of a stream at the full rate of a beat a cycle. All outputs are registers, `s_axis_tready`
+-- included: as it is a cycle late, a second register holds the beat that arrives when the output has just stalled.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_axis_register_slice is
+  generic (
+    WIDTH : integer := 8);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tid    : in  std_logic_vector(7 downto 0) := (others => '0');
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tid    : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic);
+end entity firm_axis_register_slice;
+
+architecture rtl of firm_axis_register_slice is
+
+  type beat_t is record
+    tdata : std_logic_vector(WIDTH-1 downto 0);
+    tkeep : std_logic_vector(WIDTH/8-1 downto 0);
+    tid   : std_logic_vector(7 downto 0);
+    tlast : std_logic;
+  end record beat_t;
+
+  signal arriving  : beat_t;
+  signal output_r  : beat_t;
+  signal skid_r    : beat_t;
+  signal valid_r   : std_logic;
+  signal skidded_r : std_logic;  -- skid_r holds a beat
+  signal ready_r   : std_logic;  -- `not skidded_r`, but '0' in reset
+
+begin
+
+  assert is_stream_width(WIDTH)
+    report "firm_axis_register_slice: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+
+  arriving.tdata <= s_axis_tdata;
+  arriving.tkeep <= s_axis_tkeep;
+  arriving.tid   <= s_axis_tid;
+  arriving.tlast <= s_axis_tlast;
+
+  move_beats : process (clk)
+  begin
+    if rising_edge(clk) then
+      if ready_r = '1' then
+        skid_r <= arriving;
+      end if;
+      if valid_r = '0' or m_axis_tready = '1' then
+        if skidded_r = '1' then
+          output_r <= skid_r;
+        else
+          output_r <= arriving;
+        end if;
+      end if;
+    end if;
+  end process move_beats;
+
+  track_beats : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        valid_r   <= '0';
+        skidded_r <= '0';
+        ready_r   <= '0';
+      elsif valid_r = '0' or m_axis_tready = '1' then
+        valid_r   <= skidded_r or (s_axis_tvalid and ready_r);
+        skidded_r <= '0';
+        ready_r   <= '1';
+      elsif s_axis_tvalid = '1' and ready_r = '1' then
+        skidded_r <= '1';
+        ready_r   <= '0';
+      end if;
+    end if;
+  end process track_beats;
+
+  s_axis_tready <= ready_r;
+  m_axis_tdata  <= output_r.tdata;
+  m_axis_tkeep  <= output_r.tkeep;
+  m_axis_tid    <= output_r.tid;
+  m_axis_tlast  <= output_r.tlast;
+  m_axis_tvalid <= valid_r;
+
+end architecture rtl;

@@ -1,0 +1,162 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Stands between the host's two streams and the converters. Host to subscribers: takes the id off a frame and routes
+-- it. Publishers to host: sends the frames of the publisher that the scheduler in the slot grants. Register slices on
+-- the host's sides cut every path between the host and the converters.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_manager is
+  generic (
+    WIDTH       : integer := 8;
+    SUBSCRIBERS : integer := 1;
+    PUBLISHERS  : integer := 1);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- From the host.
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- To the host; `tid` is the publisher's id on every beat.
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tid    : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic;
+
+    -- To the subscribers: data for all, one bit each to say for whom.
+    sub_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    sub_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    sub_axis_tlast  : out std_logic;
+    sub_axis_tvalid : out std_logic_vector(SUBSCRIBERS-1 downto 0);
+    sub_axis_tready : in  std_logic_vector(SUBSCRIBERS-1 downto 0);
+
+    -- From the publishers; publisher 0 lies lowest.
+    pub_axis_tdata  : in  std_logic_vector(PUBLISHERS*WIDTH-1 downto 0);
+    pub_axis_tkeep  : in  std_logic_vector(PUBLISHERS*(WIDTH/8)-1 downto 0);
+    pub_axis_tvalid : in  std_logic_vector(PUBLISHERS-1 downto 0);
+    pub_axis_tlast  : in  std_logic_vector(PUBLISHERS-1 downto 0);
+    pub_axis_tready : out std_logic_vector(PUBLISHERS-1 downto 0);
+
+    -- The scheduler's slot.
+    sched_request      : out std_logic_vector(PUBLISHERS-1 downto 0);
+    sched_beat         : out std_logic;
+    sched_last         : out std_logic;
+    sched_grant_valid  : in  std_logic;
+    sched_grant_select : in  std_logic_vector(index_bits(PUBLISHERS)-1 downto 0);
+
+    -- Pulses for a frame from the host that reaches no subscriber.
+    id_error : out std_logic);
+end entity firm_manager;
+
+architecture rtl of firm_manager is
+
+  signal routed_tdata  : std_logic_vector(WIDTH-1 downto 0);
+  signal routed_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal routed_tvalid : std_logic;
+  signal routed_tlast  : std_logic;
+  signal routed_tready : std_logic;
+
+  signal granted_tdata  : std_logic_vector(WIDTH-1 downto 0);
+  signal granted_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal granted_tid    : std_logic_vector(7 downto 0);
+  signal granted_tvalid : std_logic;
+  signal granted_tlast  : std_logic;
+  signal granted_tready : std_logic;
+
+begin
+
+  assert SUBSCRIBERS >= 1 and SUBSCRIBERS <= 256
+    report "firm_manager: SUBSCRIBERS is " & integer'image(SUBSCRIBERS) & "; legal: 1 to 256"
+    severity failure;
+  assert PUBLISHERS >= 1 and PUBLISHERS <= 256
+    report "firm_manager: PUBLISHERS is " & integer'image(PUBLISHERS) & "; legal: 1 to 256"
+    severity failure;
+
+  u_slice_in : entity firm.firm_axis_register_slice
+    generic map (
+      WIDTH => WIDTH)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      m_axis_tdata  => routed_tdata,
+      m_axis_tkeep  => routed_tkeep,
+      m_axis_tid    => open,
+      m_axis_tvalid => routed_tvalid,
+      m_axis_tlast  => routed_tlast,
+      m_axis_tready => routed_tready);
+
+  u_demux : entity firm.firm_axis_demux
+    generic map (
+      WIDTH        => WIDTH,
+      DESTINATIONS => SUBSCRIBERS)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => routed_tdata,
+      s_axis_tkeep  => routed_tkeep,
+      s_axis_tvalid => routed_tvalid,
+      s_axis_tlast  => routed_tlast,
+      s_axis_tready => routed_tready,
+      m_axis_tdata  => sub_axis_tdata,
+      m_axis_tkeep  => sub_axis_tkeep,
+      m_axis_tlast  => sub_axis_tlast,
+      m_axis_tvalid => sub_axis_tvalid,
+      m_axis_tready => sub_axis_tready,
+      id_error      => id_error);
+
+  u_mux : entity firm.firm_axis_mux
+    generic map (
+      WIDTH   => WIDTH,
+      SOURCES => PUBLISHERS)
+    port map (
+      source        => sched_grant_select,
+      enable        => sched_grant_valid,
+      s_axis_tdata  => pub_axis_tdata,
+      s_axis_tkeep  => pub_axis_tkeep,
+      s_axis_tvalid => pub_axis_tvalid,
+      s_axis_tlast  => pub_axis_tlast,
+      s_axis_tready => pub_axis_tready,
+      m_axis_tdata  => granted_tdata,
+      m_axis_tkeep  => granted_tkeep,
+      m_axis_tid    => granted_tid,
+      m_axis_tvalid => granted_tvalid,
+      m_axis_tlast  => granted_tlast,
+      m_axis_tready => granted_tready);
+
+  u_slice_out : entity firm.firm_axis_register_slice
+    generic map (
+      WIDTH => WIDTH)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => granted_tdata,
+      s_axis_tkeep  => granted_tkeep,
+      s_axis_tid    => granted_tid,
+      s_axis_tvalid => granted_tvalid,
+      s_axis_tlast  => granted_tlast,
+      s_axis_tready => granted_tready,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tid    => m_axis_tid,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready);
+
+  sched_request <= pub_axis_tvalid;
+  sched_beat    <= granted_tvalid and granted_tready;
+  sched_last    <= granted_tlast;
+
+end architecture rtl;

@@ -1,0 +1,384 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- The frame files of the simulation host (docs/simulation.md): read, checked and kept in memory, a character a byte.
+-- Simulation only. A fault of form ends the simulation with `file:line: what`.
+library ieee;
+use ieee.std_logic_1164.all;
+use std.textio.all;
+library firm;
+use firm.firm_axis_pkg.max;
+
+package firm_sim_pkg is
+
+  subtype byte_t is std_logic_vector(7 downto 0);
+
+  type frame_t;
+  type frame_ptr_t is access frame_t;
+  type frame_t is record
+    label_text  : line;         -- without the mark and without `@n`
+    cause       : integer;      -- index of the stimulus frame that causes this one; -1 where the file does not say
+    bytes       : line;         -- byte k is character k+1
+    any_byte    : line;         -- '.' at byte k+1 where every value is right; null where there is no such byte
+    size        : natural;      -- bytes
+    first_cycle : natural;      -- the host notes when the first and the last beat of a stimulus frame were taken
+    last_cycle  : natural;
+    is_received : boolean;      -- set by the host
+    next_frame  : frame_ptr_t;  -- in the order of the file
+    next_of_id  : frame_ptr_t;  -- the next one with the same id
+  end record frame_t;
+
+  type frame_per_id_t is array (0 to 255) of frame_ptr_t;
+
+  type frame_file_t is record
+    first          : frame_ptr_t;
+    last           : frame_ptr_t;
+    frames         : natural;
+    first_of_id    : frame_per_id_t;  -- the next frame to come; the host moves it on
+    last_of_id     : frame_per_id_t;
+    id_errors      : natural;
+    frame_errors   : natural;
+  end record frame_file_t;
+
+  procedure read_stimulus_file(path : in string; content : inout frame_file_t);
+  procedure read_expected_file(path : in string; content : inout frame_file_t);
+
+  function to_byte(char : character) return byte_t;
+  -- Two digits; an undefined bit makes its digit an `X`.
+  function to_hex(value : byte_t) return string;
+  function is_defined(value : std_logic_vector) return boolean;
+
+  procedure print(text : in string);
+
+end package firm_sim_pkg;
+
+package body firm_sim_pkg is
+
+  constant HEX_DIGITS : string(1 to 16) := "0123456789abcdef";
+  constant HEADER_BYTES : positive := 5;
+
+  type byte_table_t is array (character) of byte_t;
+
+  function byte_table return byte_table_t is
+    variable table : byte_table_t;
+    variable rest  : natural;
+  begin
+    for char in character loop
+      rest := character'pos(char);
+      for place in 0 to 7 loop
+        table(char)(place) := '0';
+        if rest mod 2 = 1 then
+          table(char)(place) := '1';
+        end if;
+        rest := rest / 2;
+      end loop;
+    end loop;
+    return table;
+  end function byte_table;
+
+  constant BYTE_OF : byte_table_t := byte_table;
+
+  function to_byte(char : character) return byte_t is
+  begin
+    return BYTE_OF(char);
+  end function to_byte;
+
+  function to_hex(value : byte_t) return string is
+    variable text  : string(1 to 2);
+    variable digit : natural;
+  begin
+    for place in 0 to 1 loop
+      digit := 0;
+      for bit_place in 7 - 4*place downto 4 - 4*place loop
+        digit := 2 * digit;
+        if to_x01(value(bit_place)) = '1' then
+          digit := digit + 1;
+        end if;
+      end loop;
+      text(place+1) := HEX_DIGITS(digit+1);
+      if not is_defined(value(7 - 4*place downto 4 - 4*place)) then
+        text(place+1) := 'X';
+      end if;
+    end loop;
+    return text;
+  end function to_hex;
+
+  function is_defined(value : std_logic_vector) return boolean is
+  begin
+    for place in value'range loop
+      if value(place) /= '0' and value(place) /= '1' then
+        return false;
+      end if;
+    end loop;
+    return true;
+  end function is_defined;
+
+  procedure print(text : in string) is
+    variable output_line : line;
+  begin
+    write(output_line, text);
+    writeline(output, output_line);
+  end procedure print;
+
+  procedure fail_at(path : in string; line_number : in natural; what : in string) is
+  begin
+    print(path & ":" & integer'image(line_number) & ": " & what);
+    assert false report "firm_sim_host: ill-formed file of frames" severity failure;
+  end procedure fail_at;
+
+  -- The value of a hexadecimal digit, or -1.
+  function digit_value(char : character) return integer is
+  begin
+    case char is
+      when '0' to '9' => return character'pos(char) - character'pos('0');
+      when 'a' to 'f' => return character'pos(char) - character'pos('a') + 10;
+      when 'A' to 'F' => return character'pos(char) - character'pos('A') + 10;
+      when others     => return -1;
+    end case;
+  end function digit_value;
+
+  -- Text that grows by doubling, so that a long frame is not copied once a line.
+  procedure make_room(text : inout line; used : in natural; wanted : in positive) is
+    variable wider : line;
+    variable size  : positive := 64;
+  begin
+    if text /= null then
+      if wanted <= text'length then
+        return;
+      end if;
+      size := text'length;
+    end if;
+    while size < wanted loop
+      size := 2 * size;
+    end loop;
+    wider := new string(1 to size);
+    if text /= null then
+      wider(1 to used) := text(1 to used);
+      deallocate(text);
+    end if;
+    text := wider;
+  end procedure make_room;
+
+  procedure append_byte(frame : inout frame_t; value : in natural; is_any : in boolean) is
+  begin
+    make_room(frame.bytes, frame.size, frame.size + 1);
+    if is_any or frame.any_byte /= null then
+      make_room(frame.any_byte, frame.size, frame.bytes'length);
+    end if;
+    frame.size              := frame.size + 1;
+    frame.bytes(frame.size) := character'val(value);
+    if is_any then
+      frame.any_byte(frame.size) := '.';
+    end if;
+  end procedure append_byte;
+
+  -- The number of one to nine digits from `first` to the next blank or the end; -1 if there is something else.
+  function parse_number(text : string; first : positive) return integer is
+    variable number : natural := 0;
+    variable place  : positive := first;
+  begin
+    while place <= text'high loop
+      exit when text(place) = ' ';
+      if text(place) < '0' or text(place) > '9' or place - first = 9 then
+        return -1;
+      end if;
+      number := 10 * number + digit_value(text(place));
+      place  := place + 1;
+    end loop;
+    if place = first then
+      return -1;
+    end if;
+    return number;
+  end function parse_number;
+
+  -- The place behind the blank that follows `first`, or behind the end.
+  function next_word(text : string; first : positive) return positive is
+    variable place : positive := first;
+  begin
+    while place <= text'high loop
+      place := place + 1;
+      exit when text(place-1) = ' ';
+    end loop;
+    return place;
+  end function next_word;
+
+  -- `mark label` or `mark @n label`: a new frame without bytes at the end of the list.
+  procedure start_frame(path : in string; line_number : in natural; text : in string; content : inout frame_file_t) is
+    variable frame       : frame_ptr_t;
+    variable label_start : positive := 3;
+    variable cause       : integer  := -1;
+  begin
+    if text'length >= 2 then
+      if text(2) /= ' ' then
+        fail_at(path, line_number, "a blank is missing behind the first character");
+      end if;
+    end if;
+    if text'length >= 3 and text(1) = '<' then
+      if text(3) = '@' then
+        cause := parse_number(text, 4);
+        if cause < 0 then
+          fail_at(path, line_number, "'@' must be followed by the number of a stimulus frame");
+        end if;
+        label_start := next_word(text, 4);
+      end if;
+    end if;
+    frame            := new frame_t;
+    frame.label_text := new string'(text(label_start to text'high));
+    frame.cause      := cause;
+    if content.first = null then
+      content.first := frame;
+    else
+      content.last.next_frame := frame;
+    end if;
+    content.last   := frame;
+    content.frames := content.frames + 1;
+  end procedure start_frame;
+
+  procedure append_bytes(path : in string; line_number : in natural; text : in string; is_mask_legal : in boolean;
+                         frame : inout frame_t) is
+    variable place : positive := 1;
+    variable high  : integer;
+    variable low   : integer;
+  begin
+    while place <= text'high loop
+      if text(place) = ' ' or text(place) = HT then
+        place := place + 1;
+      elsif place = text'high then
+        fail_at(path, line_number, "half a byte at the end of the line");
+      elsif text(place to place+1) = ".." then
+        if not is_mask_legal or frame.size = 0 then
+          fail_at(path, line_number, "'..' stands only in an expected frame, behind the id");
+        end if;
+        append_byte(frame, 0, true);
+        place := place + 2;
+      else
+        high := digit_value(text(place));
+        low  := digit_value(text(place+1));
+        if high < 0 or low < 0 then
+          fail_at(path, line_number, "'" & text(place to place+1) & "' is not a byte of two hexadecimal digits");
+        end if;
+        append_byte(frame, 16*high + low, false);
+        place := place + 2;
+      end if;
+    end loop;
+  end procedure append_bytes;
+
+  -- `! id_error n` or `! frame_error n`.
+  procedure announce_errors(path : in string; line_number : in natural; text : in string; content : inout frame_file_t) is
+    constant ID_ERROR    : string := "! id_error ";
+    constant FRAME_ERROR : string := "! frame_error ";
+    variable pulses      : integer := -1;
+  begin
+    if text'length > ID_ERROR'length then
+      if text(ID_ERROR'range) = ID_ERROR then
+        pulses            := parse_number(text, ID_ERROR'length + 1);
+        content.id_errors := max(pulses, 0);
+      end if;
+    end if;
+    if text'length > FRAME_ERROR'length then
+      if text(FRAME_ERROR'range) = FRAME_ERROR then
+        pulses               := parse_number(text, FRAME_ERROR'length + 1);
+        content.frame_errors := max(pulses, 0);
+      end if;
+    end if;
+    if pulses < 0 then
+      fail_at(path, line_number, "expected '! id_error <pulses>' or '! frame_error <pulses>'");
+    end if;
+  end procedure announce_errors;
+
+  -- The last frame is complete: check it and put it behind the others with its id.
+  procedure close_frame(path : in string; line_number : in natural; mark : in character; content : inout frame_file_t) is
+    variable announced : natural := HEADER_BYTES;
+    variable is_masked : boolean := false;
+    variable id        : natural;
+  begin
+    if content.last = null then
+      return;
+    end if;
+    if content.last.size = 0 then
+      fail_at(path, line_number, "the frame before this line has no bytes");
+    end if;
+    if mark = '<' then
+      if content.last.size < HEADER_BYTES then
+        fail_at(path, line_number, "the frame before this line is shorter than id and length");
+      end if;
+      for place in HEADER_BYTES downto 2 loop
+        if content.last.any_byte /= null then
+          is_masked := is_masked or content.last.any_byte(place) = '.';
+        end if;
+        if place = HEADER_BYTES and content.last.bytes(place) > character'val(127) then
+          fail_at(path, line_number, "the frame before this line announces more than 2 GiB");
+        end if;
+      end loop;
+      announced := character'pos(content.last.bytes(2)) + 2**8*character'pos(content.last.bytes(3))
+                   + 2**16*character'pos(content.last.bytes(4)) + 2**24*character'pos(content.last.bytes(5));
+      if not is_masked and announced /= content.last.size - HEADER_BYTES then
+        fail_at(path, line_number, "the frame before this line announces " & integer'image(announced)
+                & " bytes of payload but has " & integer'image(content.last.size - HEADER_BYTES));
+      end if;
+    end if;
+    id := character'pos(content.last.bytes(1));
+    if content.first_of_id(id) = null then
+      content.first_of_id(id) := content.last;
+    else
+      content.last_of_id(id).next_of_id := content.last;
+    end if;
+    content.last_of_id(id) := content.last;
+  end procedure close_frame;
+
+  procedure read_line(path : in string; line_number : in natural; mark : in character; text : in string;
+                      content : inout frame_file_t) is
+    alias characters : string(1 to text'length) is text;
+    variable frame   : frame_ptr_t;
+  begin
+    if text'length = 0 then
+      return;
+    elsif characters(characters'high) = CR then
+      read_line(path, line_number, mark, characters(1 to characters'high-1), content);
+    elsif characters(1) = '#' then
+      return;
+    elsif characters(1) = mark then
+      close_frame(path, line_number, mark, content);
+      start_frame(path, line_number, characters, content);
+    elsif characters(1) = '!' and mark = '<' then
+      announce_errors(path, line_number, characters, content);
+    elsif content.last = null then
+      fail_at(path, line_number, "expected a label line, which starts with '" & mark & "'");
+    else
+      frame := content.last;
+      append_bytes(path, line_number, characters, mark = '<', frame.all);
+    end if;
+  end procedure read_line;
+
+  procedure read_frame_file(path : in string; mark : in character; content : inout frame_file_t) is
+    file source          : text;
+    variable status      : file_open_status;
+    variable line_text   : line;
+    variable line_number : natural := 0;
+  begin
+    file_open(status, source, path, read_mode);
+    if status /= open_ok then
+      fail_at(path, 1, "the file cannot be opened");
+    end if;
+    while not endfile(source) loop
+      readline(source, line_text);
+      line_number := line_number + 1;
+      read_line(path, line_number, mark, line_text.all, content);
+    end loop;
+    file_close(source);
+    deallocate(line_text);
+    close_frame(path, line_number + 1, mark, content);
+    if mark = '>' and content.frames = 0 then
+      fail_at(path, line_number + 1, "the file has no frame");
+    end if;
+  end procedure read_frame_file;
+
+  procedure read_stimulus_file(path : in string; content : inout frame_file_t) is
+  begin
+    read_frame_file(path, '>', content);
+  end procedure read_stimulus_file;
+
+  procedure read_expected_file(path : in string; content : inout frame_file_t) is
+  begin
+    read_frame_file(path, '<', content);
+  end procedure read_expected_file;
+
+end package body firm_sim_pkg;

@@ -1,0 +1,135 @@
+"""GHDL for tests: analyse VHDL-93, simulate, synthesise to a netlist, find latches, simulate the netlist instead.
+
+    work = Library("firm", tmp_path)
+    work.analyse(core_files("axis/axis", "manager/manager"))
+    result = work.run("some_tb", generics={"SEED": 7})
+    assert result.exit_code == 0, result.output
+    work.replace_by_netlist("firm_manager", {"WIDTH": 8})      # from here on, benches see the netlist
+
+Several libraries may share a directory; GHDL finds one beside the other.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+CORES = REPOSITORY / "cores"
+
+# GHDL sets generics of these types from the command line; a real one would make no netlist.
+Generic = int | str | bool
+
+_CASE = re.compile(r"\bcase\b.*?\bendcase\b", re.DOTALL)
+_DEFAULT = re.compile(r"\bdefault\s*:")
+
+
+class GhdlError(Exception):
+    """GHDL refused the input; the text is what it printed."""
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A finished simulation: `output` is what it printed on both streams, in lines."""
+
+    exit_code: int
+    output: str
+
+
+@dataclass(frozen=True)
+class Library:
+    """A VHDL library by its logical name and the directory in which GHDL keeps it."""
+
+    name: str
+    directory: Path
+
+    def analyse(self, files: Iterable[Path]) -> None:
+        """Analyse files in this order as strict VHDL-93; raise `GhdlError` on a fault."""
+        self._ghdl("-a", *(str(file) for file in files))
+
+    def run(
+        self,
+        entity: str,
+        generics: Mapping[str, Generic] | None = None,
+        *,
+        directory: Path | None = None,
+        options: Sequence[str] = (),
+        timeout: float = 120,
+    ) -> RunResult:
+        """Simulate `entity`; its files are relative to `directory` (default: the library's). `timeout` is in seconds."""
+        command = ["ghdl", "-r", *self._options(), entity, *_generic_options(generics), *options]
+        process = subprocess.run(
+            command,
+            cwd=directory or self.directory,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            timeout=timeout,
+            check=False,
+        )
+        return RunResult(process.returncode, process.stdout)
+
+    def synthesise(self, entity: str, generics: Mapping[str, Generic] | None = None, language: str = "vhdl") -> str:
+        """The netlist of `entity` as `vhdl` or `verilog`; raise `GhdlError` on a fault, a latch GHDL sees included."""
+        return self._ghdl("--synth", f"--out={language}", *_generic_options(generics), entity)
+
+    def latches(self, entity: str, generics: Mapping[str, Generic] | None = None) -> list[str]:
+        """What would become a latch in `entity`, empty if all is well.
+
+        GHDL reports a latch in the source itself. It makes new ones in its Verilog, though: it drops `when others`
+        of a `case`, and a Verilog `case` without `default` keeps the old value.
+        """
+        try:
+            netlist = self.synthesise(entity, generics, "verilog")
+        except GhdlError as error:
+            found = [line for line in str(error).splitlines() if "latch" in line]
+            if not found:
+                raise
+            return found
+        return [case for case in _CASE.findall(netlist) if not _DEFAULT.search(case)]
+
+    def replace_by_netlist(self, entity: str, generics: Mapping[str, Generic] | None = None) -> Path:
+        """Put the netlist of `entity` in its place in this library and return its file.
+
+        The netlist keeps the entity's name, generics and ports, so benches stay as they are; they must be analysed
+        again and use the same generics.
+        """
+        netlist = self.directory / f"{entity}_netlist.vhd"
+        netlist.write_text(self.synthesise(entity, generics), encoding="utf-8")
+        self.analyse([netlist])
+        return netlist
+
+    def _options(self) -> list[str]:
+        return ["--std=93", f"--work={self.name}", f"--workdir={self.directory}", f"-P{self.directory}"]
+
+    def _ghdl(self, command: str, *arguments: str) -> str:
+        process = subprocess.run(
+            ["ghdl", command, *self._options(), *arguments], capture_output=True, text=True, errors="replace", check=False
+        )
+        if process.returncode != 0:
+            raise GhdlError(process.stdout + process.stderr)
+        return process.stdout
+
+
+def core_files(*cores: str, fileset: str = "rtl") -> list[Path]:
+    """The files that the .core files name in `fileset`, in order: `core_files("axis/axis", "manager/manager")`."""
+    files = []
+    for core in cores:
+        description = CORES / f"{core}.core"
+        names = yaml.safe_load(description.read_text(encoding="utf-8"))["filesets"][fileset]["files"]
+        files += [description.parent / name for name in names]
+    return files
+
+
+def _generic_options(generics: Mapping[str, Generic] | None) -> list[str]:
+    return [f"-g{name}={_generic_value(value)}" for name, value in (generics or {}).items()]
+
+
+def _generic_value(value: Generic) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
