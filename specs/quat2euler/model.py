@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 FRACTION = 60
 ITERATIONS = 35
@@ -45,8 +45,7 @@ PI = 4 * ARCTANGENTS[0]
 TWO_PI = 8 * ARCTANGENTS[0]
 
 
-@dataclass(frozen=True)
-class Block:
+class Block(NamedTuple):
     """Numbers with a common exponent, and whether one was not finite or all were zero or denormal."""
 
     numbers: tuple[int, ...]

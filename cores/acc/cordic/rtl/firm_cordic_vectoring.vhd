@@ -57,12 +57,22 @@ architecture rtl of firm_cordic_vectoring is
     variable result : angles_t := (others => (others => '0'));
   begin
     for i in result'range loop
-      if i < ITERATIONS then
+      -- Illegal generics are for the asserts below, not for a bound check in here.
+      if i < ITERATIONS and i <= FRACTION and FRACTION <= 64 then
         result(i) := signed("000" & arctangent(i, FRACTION));
       end if;
     end loop;
     return result;
   end function all_angles;
+
+  -- Not numeric_std's abs, which ghdl 2.0 leaves as it is when it translates to Verilog.
+  function absolute(number : std_logic_vector) return magnitude_t is
+  begin
+    if number(number'left) = '1' then
+      return -signed(number);
+    end if;
+    return signed(number);
+  end function absolute;
 
   constant ANGLES  : angles_t := all_angles;
   -- Multiples of the first angle, so that folding and rotating agree to the bit.
@@ -123,15 +133,15 @@ begin
 
   rotate : process (clk)
     variable below    : boolean;
-    variable distance : scaled_t;
+    variable distance : unsigned(WIDTH downto 0);
     variable step     : angle_t;
   begin
     if rising_edge(clk) then
       if ready = '1' and in_valid = '1' then
         mirrored_r  <= in_x(WIDTH-1) xor in_y(WIDTH-1);
         exact_r     <= '0';
-        magnitude_r <= abs signed(in_x);
-        scaled_r    <= resize(abs signed(in_y), WIDTH+1);
+        magnitude_r <= absolute(in_x);
+        scaled_r    <= resize(absolute(in_y), WIDTH+1);
         angle_r     <= (others => '0');
         if signed(in_x) < 0 then
           angle_r <= PI;
@@ -140,7 +150,7 @@ begin
           end if;
         elsif signed(in_x) = 0 then
           -- On the y axis: turned onto the x axis at once, which is exact.
-          magnitude_r <= abs signed(in_y);
+          magnitude_r <= absolute(in_y);
           scaled_r    <= (others => '0');
           if signed(in_y) < 0 then
             angle_r <= -HALF_PI;
@@ -151,15 +161,16 @@ begin
       elsif busy_r = '1' then
         below := scaled_r(WIDTH) = '1';
         -- One's complement stands for |y|: at most one unit short, and it saves the carry.
-        distance := scaled_r;
+        distance := unsigned(scaled_r);
         if below then
-          distance := not scaled_r;
+          distance := not unsigned(scaled_r);
           scaled_r <= shift_left(scaled_r + magnitude_r, 1);
         else
           scaled_r <= shift_left(scaled_r - magnitude_r, 1);
         end if;
         -- |y| * 2**i reaches x as |y| * 2**-i.
-        magnitude_r <= magnitude_r + resize(shift_right(distance, to_integer(count_r & '0')), WIDTH);
+        distance    := shift_right(distance, to_integer(count_r & '0'));
+        magnitude_r <= magnitude_r + signed(distance(WIDTH-1 downto 0));
 
         step := ANGLES(to_integer(count_r));
         if scaled_r = 0 then

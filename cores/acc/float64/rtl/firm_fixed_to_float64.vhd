@@ -71,8 +71,12 @@ begin
   begin
     if rising_edge(clk) then
       if in_valid = '1' then
-        magnitude_r <= unsigned(abs signed(in_number));
+        -- Not numeric_std's abs, which ghdl 2.0 leaves as it is when it translates to Verilog.
+        magnitude_r <= unsigned(in_number);
         sign_r      <= in_number(63);
+        if in_number(63) = '1' then
+          magnitude_r <= unsigned(-signed(in_number));
+        end if;
       end if;
 
       if valid_r(0) = '1' then
