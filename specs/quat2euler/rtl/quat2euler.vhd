@@ -53,16 +53,7 @@ architecture rtl of quat2euler is
   -- An angle of the CORDIC units, -pi to pi.
   subtype angle_vector_t is std_logic_vector(FRACTION+2 downto 0);
 
-  function multiple_of_quarter_pi(factor_log2 : natural) return word_t is
-  begin
-    return shift_left(resize(signed('0' & arctangent(0, FRACTION)), WIDTH), factor_log2);
-  end function multiple_of_quarter_pi;
-
-  constant HALF_PI : word_t := multiple_of_quarter_pi(1);
-  constant PI      : word_t := multiple_of_quarter_pi(2);
-  constant TWO_PI  : word_t := multiple_of_quarter_pi(3);
-
-  constant NOT_A_NUMBER : std_logic_vector(63 downto 0) := X"7FF8000000000000";
+  constant QUARTER_PI : unsigned(FRACTION-1 downto 0) := arctangent(0, FRACTION);
 
   -- What a message has besides numbers; it travels beside them from stage to stage.
   type kind_t is record
@@ -72,6 +63,12 @@ architecture rtl of quat2euler is
 
   -- The angle that goes to float64 next; HOLD until the message is taken.
   type turn_t is (ROLL, YAW, PITCH, HOLD);
+
+  -- The CORDIC units' own pi, to the bit. Signals, set bit by bit: ghdl 2.0 translates a constant of more
+  -- than 32 bits to a Verilog string.
+  signal half_pi         : word_t;
+  signal pi              : word_t;
+  signal two_pi          : word_t;
 
   -- x, y, z and w with a common exponent.
   signal in_numbers      : std_logic_vector(4*64-1 downto 0);
@@ -131,6 +128,17 @@ architecture rtl of quat2euler is
   signal out_z_r         : std_logic_vector(63 downto 0);
 
 begin
+
+  multiples : for k in half_pi'range generate
+    inside : if k >= 1 and k <= FRACTION generate
+      half_pi(k) <= QUARTER_PI(k-1);
+    end generate inside;
+    outside : if k < 1 or k > FRACTION generate
+      half_pi(k) <= '0';
+    end generate outside;
+  end generate multiples;
+  pi     <= shift_left(half_pi, 1);
+  two_pi <= shift_left(half_pi, 2);
 
   out_x                <= out_x_r;
   out_y                <= out_y_r;
@@ -314,11 +322,11 @@ begin
         end if;
         offset := (others => '0');
         if turn_r = PITCH then
-          offset := -HALF_PI;
-        elsif raw > PI then
-          offset := -TWO_PI;
-        elsif raw <= -PI then
-          offset := TWO_PI;
+          offset := -half_pi;
+        elsif raw > pi then
+          offset := -two_pi;
+        elsif raw <= -pi then
+          offset := two_pi;
         end if;
         angle_r <= raw + offset;
       end if;
@@ -350,7 +358,9 @@ begin
         out_z_r <= out_y_r;
         out_y_r <= float;
         if out_kind_r.undefined = '1' then
-          out_y_r <= NOT_A_NUMBER;
+          -- The quiet NaN; in slices, as ghdl 2.0 synthesises X"7FF8000000000000" to zeros.
+          out_y_r               <= (others => '0');
+          out_y_r(62 downto 51) <= (others => '1');
         elsif out_kind_r.zero = '1' then
           out_y_r <= (others => '0');
         end if;

@@ -74,10 +74,13 @@ architecture rtl of firm_cordic_vectoring is
     return signed(number);
   end function absolute;
 
-  constant ANGLES  : angles_t := all_angles;
-  -- Multiples of the first angle, so that folding and rotating agree to the bit.
-  constant HALF_PI : angle_t  := shift_left(ANGLES(0), 1);
-  constant PI      : angle_t  := shift_left(ANGLES(0), 2);
+  constant ANGLES : angles_t := all_angles;
+
+  -- Multiples of the first angle, so that folding and rotating agree to the bit. Signals, set bit by bit:
+  -- ghdl 2.0 translates a constant of more than 32 bits to a Verilog string.
+  signal quarter_pi  : angle_t;
+  signal half_pi     : angle_t;
+  signal pi          : angle_t;
 
   signal count_r     : unsigned(COUNT_WIDTH-1 downto 0);
   signal busy_r      : std_logic;
@@ -104,6 +107,12 @@ begin
   assert WIDTH >= 4
     report "firm_cordic_vectoring: WIDTH is " & integer'image(WIDTH) & ", legal: 4 and more"
     severity failure;
+
+  multiples : for k in quarter_pi'range generate
+    quarter_pi(k) <= ANGLES(0)(k);
+  end generate multiples;
+  half_pi <= shift_left(quarter_pi, 1);
+  pi      <= shift_left(quarter_pi, 2);
 
   ready         <= not busy_r and (not done_r or out_ready);
   in_ready      <= ready;
@@ -144,18 +153,18 @@ begin
         scaled_r    <= resize(absolute(in_y), WIDTH+1);
         angle_r     <= (others => '0');
         if signed(in_x) < 0 then
-          angle_r <= PI;
+          angle_r <= pi;
           if signed(in_y) < 0 then
-            angle_r <= -PI;
+            angle_r <= -pi;
           end if;
         elsif signed(in_x) = 0 then
           -- On the y axis: turned onto the x axis at once, which is exact.
           magnitude_r <= absolute(in_y);
           scaled_r    <= (others => '0');
           if signed(in_y) < 0 then
-            angle_r <= -HALF_PI;
+            angle_r <= -half_pi;
           elsif signed(in_y) > 0 then
-            angle_r <= HALF_PI;
+            angle_r <= half_pi;
           end if;
         end if;
       elsif busy_r = '1' then
