@@ -1,0 +1,198 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Angle and length of the vector (x, y): CORDIC in vectoring mode, one rotation a cycle, no multiplier.
+--
+-- The vector is folded into the quadrant x >= 0, y >= 0, so mirrored vectors give the same length to the
+-- bit and mirrored angles, and is then turned towards the x axis by atan(2**-i), i = 0, 1, ...
+-- `scaled_r` holds y * 2**i: it needs no shifter and loses no bit, so small vectors keep their accuracy.
+-- As soon as y is 0 the angle is exact and stays: multiples of pi/4 come out without any error, and
+-- (0, 0) has the angle 0. Otherwise the error is at most 2**-(ITERATIONS-1) rad.
+-- A vector takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
+
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+library firm;
+use firm.firm_cordic_table.all;
+
+entity firm_cordic_vectoring is
+  generic (
+    -- Bits of x, y and the length, two's complement. 1.6468 * sqrt(x**2 + y**2) < 2**(WIDTH-1) must hold.
+    WIDTH      : positive := 64;
+    -- Fraction bits of the angle: 8 to 64. The angle has 3 bits more, sign and integer part up to pi.
+    FRACTION   : positive := 60;
+    -- Rotations: 2 to FRACTION.
+    ITERATIONS : positive := 35
+  );
+  port (
+    clk           : in  std_logic;
+    rst_n         : in  std_logic;
+
+    in_valid      : in  std_logic;
+    in_ready      : out std_logic;
+    in_x          : in  std_logic_vector(WIDTH-1 downto 0);
+    in_y          : in  std_logic_vector(WIDTH-1 downto 0);
+
+    out_valid     : out std_logic;
+    out_ready     : in  std_logic;
+    -- The length times the product of sqrt(1 + 4**-i) over all rotations (1.6468); never negative.
+    out_magnitude : out std_logic_vector(WIDTH-1 downto 0);
+    -- atan2(y, x) in rad, from -pi to pi, two's complement.
+    out_angle     : out std_logic_vector(FRACTION+2 downto 0)
+  );
+end entity firm_cordic_vectoring;
+
+architecture rtl of firm_cordic_vectoring is
+
+  -- 64 rotations are all that the table has and all that an angle of 64 fraction bits can use.
+  constant COUNT_WIDTH : positive := 6;
+
+  subtype magnitude_t is signed(WIDTH-1 downto 0);
+  -- After rotation i, y <= x * 2**-i: so y * 2**(i+1) needs one bit more than x.
+  subtype scaled_t is signed(WIDTH downto 0);
+  subtype angle_t is signed(FRACTION+2 downto 0);
+  type angles_t is array (natural range 0 to 2**COUNT_WIDTH-1) of angle_t;
+
+  function all_angles return angles_t is
+    variable result : angles_t := (others => (others => '0'));
+  begin
+    for i in result'range loop
+      -- Illegal generics are for the asserts below, not for a bound check in here.
+      if i < ITERATIONS and i <= FRACTION and FRACTION <= 64 then
+        result(i) := signed("000" & arctangent(i, FRACTION));
+      end if;
+    end loop;
+    return result;
+  end function all_angles;
+
+  -- Not numeric_std's abs, which ghdl 2.0 leaves as it is when it translates to Verilog.
+  function absolute(number : std_logic_vector) return magnitude_t is
+  begin
+    if number(number'left) = '1' then
+      return -signed(number);
+    end if;
+    return signed(number);
+  end function absolute;
+
+  constant ANGLES : angles_t := all_angles;
+
+  -- Multiples of the first angle, so that folding and rotating agree to the bit. Signals, set bit by bit:
+  -- ghdl 2.0 translates a constant of more than 32 bits to a Verilog string.
+  signal quarter_pi  : angle_t;
+  signal half_pi     : angle_t;
+  signal pi          : angle_t;
+
+  signal count_r     : unsigned(COUNT_WIDTH-1 downto 0);
+  signal busy_r      : std_logic;
+  signal done_r      : std_logic;
+  signal ready       : std_logic;
+
+  signal magnitude_r : magnitude_t;
+  signal scaled_r    : scaled_t;
+  signal angle_r     : angle_t;
+  -- The folded vector is mirrored: its angle counts backwards.
+  signal mirrored_r  : std_logic;
+  -- y was 0 once: the angle stays.
+  signal exact_r     : std_logic;
+
+begin
+
+  assert FRACTION >= 8 and FRACTION <= 64
+    report "firm_cordic_vectoring: FRACTION is " & integer'image(FRACTION) & ", legal: 8 to 64"
+    severity failure;
+  assert ITERATIONS >= 2 and ITERATIONS <= FRACTION
+    report "firm_cordic_vectoring: ITERATIONS is " & integer'image(ITERATIONS) & ", legal: 2 to FRACTION ("
+      & integer'image(FRACTION) & ")"
+    severity failure;
+  assert WIDTH >= 4
+    report "firm_cordic_vectoring: WIDTH is " & integer'image(WIDTH) & ", legal: 4 and more"
+    severity failure;
+
+  multiples : for k in quarter_pi'range generate
+    quarter_pi(k) <= ANGLES(0)(k);
+  end generate multiples;
+  half_pi <= shift_left(quarter_pi, 1);
+  pi      <= shift_left(quarter_pi, 2);
+
+  ready         <= not busy_r and (not done_r or out_ready);
+  in_ready      <= ready;
+  out_valid     <= done_r;
+  out_magnitude <= std_logic_vector(magnitude_r);
+  out_angle     <= std_logic_vector(angle_r);
+
+  control : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        busy_r <= '0';
+        done_r <= '0';
+      elsif ready = '1' then
+        busy_r  <= in_valid;
+        done_r  <= '0';
+        count_r <= (others => '0');
+      elsif busy_r = '1' then
+        count_r <= count_r + 1;
+        if count_r = ITERATIONS-1 then
+          busy_r <= '0';
+          done_r <= '1';
+        end if;
+      end if;
+    end if;
+  end process control;
+
+  rotate : process (clk)
+    variable below    : boolean;
+    variable distance : unsigned(WIDTH downto 0);
+    variable step     : angle_t;
+  begin
+    if rising_edge(clk) then
+      if ready = '1' and in_valid = '1' then
+        mirrored_r  <= in_x(WIDTH-1) xor in_y(WIDTH-1);
+        exact_r     <= '0';
+        magnitude_r <= absolute(in_x);
+        scaled_r    <= resize(absolute(in_y), WIDTH+1);
+        angle_r     <= (others => '0');
+        if signed(in_x) < 0 then
+          angle_r <= pi;
+          if signed(in_y) < 0 then
+            angle_r <= -pi;
+          end if;
+        elsif signed(in_x) = 0 then
+          -- On the y axis: turned onto the x axis at once, which is exact.
+          magnitude_r <= absolute(in_y);
+          scaled_r    <= (others => '0');
+          if signed(in_y) < 0 then
+            angle_r <= -half_pi;
+          elsif signed(in_y) > 0 then
+            angle_r <= half_pi;
+          end if;
+        end if;
+      elsif busy_r = '1' then
+        below := scaled_r(WIDTH) = '1';
+        -- One's complement stands for |y|: at most one unit short, and it saves the carry.
+        distance := unsigned(scaled_r);
+        if below then
+          distance := not unsigned(scaled_r);
+          scaled_r <= shift_left(scaled_r + magnitude_r, 1);
+        else
+          scaled_r <= shift_left(scaled_r - magnitude_r, 1);
+        end if;
+        -- |y| * 2**i reaches x as |y| * 2**-i.
+        distance    := shift_right(distance, to_integer(count_r & '0'));
+        magnitude_r <= magnitude_r + signed(distance(WIDTH-1 downto 0));
+
+        step := ANGLES(to_integer(count_r));
+        if scaled_r = 0 then
+          exact_r <= '1';
+        elsif exact_r = '0' then
+          if below xor mirrored_r = '1' then
+            angle_r <= angle_r - step;
+          else
+            angle_r <= angle_r + step;
+          end if;
+        end if;
+      end if;
+    end if;
+  end process rotate;
+
+end architecture rtl;
