@@ -1,0 +1,99 @@
+"""The system specification as its author wrote it: the grammar of the dissertation's listing 6.6.
+
+This is the one source of the grammar. A section is a class, a key a field; spelling, form, legal values and meaning
+stand at the field. What the sections say together (names that must be known, connections) is for `analysis`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.converter.configuration import WIDTHS
+from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.system.grammar import Section, key, read
+from fusesoc_firm.yaml_text import Text, read_yaml
+
+MIDDLEWARES = {"ROS": RosVersion.ROS1, "ROS1": RosVersion.ROS1, "ROS2": RosVersion.ROS2}
+ACCELERATOR_TYPES = ("HLS", "VHDL")
+MODES = ("subscriber", "publisher")
+SCHEDULERS = ("fixed_priority",)
+
+_MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
+
+
+@dataclass(frozen=True)
+class Project(Section):
+    """What holds for the whole system."""
+
+    name: Text = key("the system's name; the top level is <name>_system", is_required=True)
+    # The dissertation's listings 6.1, 6.6 and 5.1 spell it in three ways.
+    fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
+    width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
+    scheduler: Text = key("who may send to the host next", choices=SCHEDULERS, default=Text(SCHEDULERS[0]))
+
+
+@dataclass(frozen=True)
+class InterfaceType(Section):
+    """A message that an accelerator takes or gives."""
+
+    middleware: Text = key("whose message it is", **_MIDDLEWARE)
+    message: Text = key("the message's type, such as geometry_msgs/Quaternion", is_required=True)
+
+
+@dataclass(frozen=True)
+class Interface(Section):
+    """All messages of an accelerator."""
+
+    input: tuple[InterfaceType, ...] = key("messages it takes", form="sections", section=InterfaceType)
+    output: tuple[InterfaceType, ...] = key("messages it gives", form="sections", section=InterfaceType)
+
+
+@dataclass(frozen=True)
+class Accelerator(Section):
+    """A type of accelerator; blocks are its instances."""
+
+    name: Text = key("the type's name; for VHDL that of the entity", is_required=True)
+    type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
+    sources: tuple[Text, ...] = key("its source files, relative to the specification", form="texts", is_required=True)
+    interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
+
+
+@dataclass(frozen=True)
+class Outgoing(Section):
+    """A connection from the block it stands in."""
+
+    name: Text = key("the block that the message goes to", is_required=True)
+
+
+@dataclass(frozen=True)
+class Block(Section):
+    """An instance: of an accelerator (it has a type) or a converter (it has middleware, mode and message)."""
+
+    name: Text = key("the block's name", is_required=True)
+    type: Text | None = key("the accelerator it is an instance of; empty for a converter")
+    middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES))
+    mode: Text | None = key("which way a converter works", choices=MODES)
+    message: Text | None = key("a converter's message")
+    outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
+
+
+@dataclass(frozen=True)
+class Specification(Section):
+    """The whole file."""
+
+    project: Project = key("what holds for the whole system", form="section", section=Project, is_required=True)
+    accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
+    blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
+
+
+def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification | None:
+    """The specification in a file, called `file` in messages; None if too much of it is wrong to go on.
+
+    Raises `InputError` if the file cannot be read or is no YAML.
+    """
+    text = read_yaml(path, file)
+    if text.root is None:
+        fail(f"{file} is empty; a specification needs the keys 'project' and 'blocks'")
+    return read(Specification, text.root, text, faults, "a specification")
