@@ -46,7 +46,7 @@ def _restart_if_needed(command: str) -> None:
     chosen = os.environ.get(_CHOSEN)
     if not chosen and all(map(find_spec, _NEEDED)):
         return
-    pythons = [chosen] if chosen else [sys.executable, *dict.fromkeys(_candidates())]
+    pythons = [chosen] if chosen else list(dict.fromkeys([sys.executable, *_candidates()]))
     for python in pythons[0 if chosen else 1 :]:
         if _is_suitable(python):
             os.execve(python, [python, *sys.argv], {**os.environ, _RESTARTED: "1"})
@@ -60,8 +60,8 @@ def _restart_if_needed(command: str) -> None:
 def _candidates() -> Iterator[str]:
     """Pythons that may have the package, the likeliest first."""
     interpreter, script = _parent_command()
-    # Only an absolute or a bare name is the same seen from here.
-    if interpreter and (found := shutil.which(interpreter)):
+    # Where no Python but, say, a shell is the parent, it is not to be asked what only Python understands.
+    if Path(interpreter).name.startswith(("python", "pypy")) and (found := shutil.which(interpreter)):
         yield found
     for file in filter(None, (script, __file__)):
         yield from _environments_above(Path(file).absolute())

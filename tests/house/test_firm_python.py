@@ -120,3 +120,14 @@ def test_where_there_is_none_the_message_says_what_to_do(tmp_path: Path, bare: P
     assert done.stderr.startswith("far: error: no Python with the packages fusesoc_firm, chevron, rosbags, yaml was")
     assert f"  {bare}\n" in done.stderr
     assert "set FUSESOC_FIRM_PYTHON to its python3" in done.stderr
+
+
+def test_the_folder_it_is_called_in_does_not_count(tmp_path: Path, bare: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other = make_environment(tmp_path / "other", has_package=False)
+    here = tmp_path / "here"
+    (here / "fusesoc_firm").mkdir(parents=True)
+    for name in ("fusesoc_firm/__init__.py", "fusesoc_firm/gapi.py", "chevron.py", "rosbags.py", "yaml.py"):
+        (here / name).write_text("")
+    monkeypatch.chdir(here)
+    done = call(bare, put_generators(other.parents[1] / "lib" / "generators"), "input.yml")
+    assert f"These were tried:\n  {bare}\n  {other}\nInstall" in done.stderr
