@@ -1,0 +1,275 @@
+"""Derived System -> template configuration: the top level and its test bench as plain dictionaries.
+
+The message side of a block is the same few ports everywhere: the fields, `segment_valid`, `msg_valid` and
+`msg_ready`. Every block has a signal for each of its ports, called `<block>_<port>`; a connection is then a list of
+assignments between signals, as in the dissertation's listing 6.9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.ports import field_ports, vhdl_type
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.naming import distinct_identifiers, identifier
+from fusesoc_firm.system.derived import AcceleratorBlock, AcceleratorType, Connection, Converter, DerivedSystem, End
+
+Configuration = dict[str, Any]
+
+SYSTEM_TEMPLATE = "vhdl/system.vhd"
+TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
+
+# Signals and ports of the top level's own: no block's signal may be called so.
+_TAKEN = """
+    clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
+    s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
+    m_axis_tdata m_axis_tkeep m_axis_tid m_axis_tvalid m_axis_tlast m_axis_tready
+    sub_axis_tdata sub_axis_tkeep sub_axis_tlast sub_axis_tvalid sub_axis_tready
+    pub_axis_tdata pub_axis_tkeep pub_axis_tvalid pub_axis_tlast pub_axis_tready
+    sched_request sched_beat sched_last sched_grant_valid sched_grant_select
+""".split()
+_ERROR_CODE_BITS = 4
+
+
+@dataclass(frozen=True)
+class SidePort:
+    """A port of a message side, without the side's prefix."""
+
+    name: str
+    width: int | None
+    is_output: bool
+    comment: str = ""
+
+
+def side_ports(frame: Frame, *, gives: bool, has_valid: bool) -> list[SidePort]:
+    """The ports of a message side; `gives` tells whether its block is where the message comes from.
+
+    `has_valid`: whoever gets a message from a converter also learns by `msg_valid` that all of it came.
+    """
+    ports = [SidePort(port.name, port.width, gives, port.comment) for port in field_ports(frame)]
+    ports.append(SidePort("segment_valid", 1, gives))
+    if has_valid:
+        ports.append(SidePort("msg_valid", None, gives))
+    ports.append(SidePort("msg_ready", None, not gives))
+    return ports
+
+
+def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]]:
+    """Every port of an accelerator's message sides with its prefix, in the order of the interface."""
+    taken = [(side.prefix, port) for side in accelerator.inputs for port in _input_ports(side.frame)]
+    given = [(side.prefix, port) for side in accelerator.outputs for port in _output_ports(side.frame)]
+    return taken + given
+
+
+def accelerator_entity(accelerator: AcceleratorType) -> str:
+    """The entity that the top level instantiates: the user's own, or the wrapper of a C++ function."""
+    name = identifier(accelerator.accelerator.name)
+    return f"{name}_wrapper" if accelerator.accelerator.type == "HLS" else name
+
+
+def system_configuration(system: DerivedSystem) -> Configuration:
+    """The configuration of the top level."""
+    names = _SignalNames(system)
+    return {
+        **_dimensions(system),
+        "name": system.name,
+        "scheduler": system.scheduler,
+        "signals": [_signals(names, *block) for block in _blocks(system)],
+        "subscribers": [_subscriber(names, converter) for converter in system.subscribers],
+        "publishers": [_publisher(names, converter, system.width) for converter in system.publishers],
+        "accelerators": [_accelerator(names, block) for block in system.accelerators],
+        "connections": [_connection(names, connection) for connection in system.connections],
+    }
+
+
+def test_bench_configuration(system: DerivedSystem, seed: int, stall_percent: int) -> Configuration:
+    """The configuration of the test bench: the simulated host beside the system."""
+    return {**_dimensions(system), "name": system.name, "seed": seed, "stall_percent": stall_percent}
+
+
+def _dimensions(system: DerivedSystem) -> Configuration:
+    publishers = len(system.publishers)
+    return {
+        "entity": system.entity,
+        "width": system.width,
+        "data_high": system.width - 1,
+        "keep_high": system.width // 8 - 1,
+        "subscriber_count": len(system.subscribers),
+        "publisher_count": publishers,
+        "subscriber_high": len(system.subscribers) - 1,
+        "publisher_high": publishers - 1,
+        "pub_data_high": publishers * system.width - 1,
+        "pub_keep_high": publishers * system.width // 8 - 1,
+        "select_high": max(1, (publishers - 1).bit_length()) - 1,
+        "error_code_high": _ERROR_CODE_BITS * len(system.subscribers) - 1,
+    }
+
+
+def _input_ports(frame: Frame) -> list[SidePort]:
+    return side_ports(frame, gives=False, has_valid=True)
+
+
+def _output_ports(frame: Frame) -> list[SidePort]:
+    return side_ports(frame, gives=True, has_valid=False)
+
+
+def _blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]]:
+    """Each block with all ports of its message sides and their prefixes, in the order of the data flow."""
+    blocks = []
+    for converter in system.subscribers:
+        ports = side_ports(converter.frame, gives=True, has_valid=True)
+        blocks.append((converter.block, [("", port) for port in ports]))
+    for block in system.accelerators:
+        blocks.append((block.block, accelerator_ports(block.type)))
+    for converter in system.publishers:
+        ports = side_ports(converter.frame, gives=False, has_valid=False)
+        blocks.append((converter.block, [("", port) for port in ports]))
+    return blocks
+
+
+class _SignalNames:
+    """The signal of each port of each block."""
+
+    def __init__(self, system: DerivedSystem) -> None:
+        ports = [(block, f"{prefix}{port.name}") for block, found in _blocks(system) for prefix, port in found]
+        forks = [
+            (connection.source.block, f"{connection.source.prefix}{word}")
+            for connection in system.connections
+            for word in ("fork_valid", "fork_ready")
+        ]
+        entities = {subscriber_entity(item.frame) for item in system.subscribers}
+        entities |= {publisher_entity(item.frame) for item in system.publishers}
+        entities |= {accelerator_entity(item) for item in system.accelerator_types}
+        labels = {f"u_{identifier(block)}" for block, _ in _blocks(system)}
+        keys = [*ports, *forks]
+        reserved = {*_TAKEN, system.entity, *entities, *labels}
+        self._names: Mapping[tuple[str, str], str] = dict(
+            zip(keys, distinct_identifiers(keys, reserved), strict=True)
+        )
+
+    def __call__(self, block: str, port: str) -> str:
+        return self._names[block, port]
+
+    def at(self, end: End, port: str) -> str:
+        return self(end.block, f"{end.prefix}{port}")
+
+
+def _signals(names: _SignalNames, block: str, ports: list[tuple[str, SidePort]]) -> Configuration:
+    declared = [(names(block, f"{prefix}{port.name}"), vhdl_type(port.width)) for prefix, port in ports]
+    column = max(len(name) for name, _ in declared)
+    return {
+        "block": block,
+        "declarations": [{"name": name.ljust(column), "type": type_} for name, type_ in declared],
+    }
+
+
+def port_map(pairs: Iterable[tuple[str, str]]) -> list[Configuration]:
+    """Formal and actual of each port, in columns; every line but the last ends with a comma."""
+    lines = list(pairs)
+    column = max(len(formal) for formal, _ in lines)
+    return [
+        {"formal": formal.ljust(column), "actual": actual, "comma": "," if number < len(lines) - 1 else ""}
+        for number, (formal, actual) in enumerate(lines)
+    ]
+
+
+def _subscriber(names: _SignalNames, converter: Converter) -> Configuration:
+    number = converter.id
+    low, high = _ERROR_CODE_BITS * number, _ERROR_CODE_BITS * (number + 1) - 1
+    ports = side_ports(converter.frame, gives=True, has_valid=True)
+    return {
+        **_instance(converter.block, subscriber_entity(converter.frame)),
+        "message": str(converter.frame.message),
+        "id": number,
+        "ports": port_map(
+            [
+                ("clk", "clk"),
+                ("rst_n", "rst_n"),
+                ("s_axis_tdata", "sub_axis_tdata"),
+                ("s_axis_tkeep", "sub_axis_tkeep"),
+                ("s_axis_tvalid", f"sub_axis_tvalid({number})"),
+                ("s_axis_tlast", "sub_axis_tlast"),
+                ("s_axis_tready", f"sub_axis_tready({number})"),
+                *((port.name, names(converter.block, port.name)) for port in ports),
+                ("frame_error", f"frame_error({number})"),
+                ("frame_error_code", f"frame_error_code({high} downto {low})"),
+            ]
+        ),
+    }
+
+
+def _publisher(names: _SignalNames, converter: Converter, width: int) -> Configuration:
+    number = converter.id
+    lanes = width // 8
+    ports = side_ports(converter.frame, gives=False, has_valid=False)
+    return {
+        **_instance(converter.block, publisher_entity(converter.frame)),
+        "message": str(converter.frame.message),
+        "id": number,
+        "ports": port_map(
+            [
+                ("clk", "clk"),
+                ("rst_n", "rst_n"),
+                *((port.name, names(converter.block, port.name)) for port in ports),
+                ("m_axis_tdata", f"pub_axis_tdata({width * (number + 1) - 1} downto {width * number})"),
+                ("m_axis_tkeep", f"pub_axis_tkeep({lanes * (number + 1) - 1} downto {lanes * number})"),
+                ("m_axis_tvalid", f"pub_axis_tvalid({number})"),
+                ("m_axis_tlast", f"pub_axis_tlast({number})"),
+                ("m_axis_tready", f"pub_axis_tready({number})"),
+            ]
+        ),
+    }
+
+
+def _accelerator(names: _SignalNames, block: AcceleratorBlock) -> Configuration:
+    formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type)]
+    return {
+        **_instance(block.block, accelerator_entity(block.type)),
+        "ports": port_map(
+            [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names(block.block, formal)) for formal in formals)]
+        ),
+    }
+
+
+def _instance(block: str, entity: str) -> Configuration:
+    return {"block": block, "label": f"u_{identifier(block)}", "entity": entity}
+
+
+def _connection(names: _SignalNames, connection: Connection) -> Configuration:
+    """The assignments of a connection; with several sinks, a fork lets each take the message in its own time."""
+    source, sinks = connection.source, connection.sinks
+    fields = field_ports(connection.frame)
+    is_forked = len(sinks) > 1
+    pairs: list[tuple[str, str]] = []
+    for number, sink in enumerate(sinks):
+        pairs += [(names.at(sink, port.name), names.at(source, port.name)) for port in fields]
+        valid = f"{names.at(source, 'fork_valid')}({number})" if is_forked else f"{names.at(source, 'segment_valid')}(0)"
+        pairs.append((f"{names.at(sink, 'segment_valid')}(0)", valid))
+        if sink.prefix:
+            pairs.append((names.at(sink, "msg_valid"), valid))
+        ready = f"{names.at(source, 'fork_ready')}({number})" if is_forked else names.at(source, "msg_ready")
+        pairs.append((ready, names.at(sink, "msg_ready")))
+    column = max(len(target) for target, _ in pairs)
+    return {
+        "message": str(connection.frame.message),
+        "source": source.block,
+        "sinks": ", ".join(sink.block for sink in sinks),
+        "fork": _fork(names, source, len(sinks)) if is_forked else None,
+        "assignments": [{"target": target.ljust(column), "source": value} for target, value in pairs],
+    }
+
+
+def _fork(names: _SignalNames, source: End, count: int) -> Configuration:
+    return {
+        "label": f"u_{identifier(source.block, source.prefix, 'fork')}",
+        "count": count,
+        "high": count - 1,
+        "valid": names.at(source, "fork_valid"),
+        "ready": names.at(source, "fork_ready"),
+        "source_valid": f"{names.at(source, 'segment_valid')}(0)",
+        "source_ready": names.at(source, "msg_ready"),
+    }
+
