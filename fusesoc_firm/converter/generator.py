@@ -1,0 +1,85 @@
+"""The generator `firm`: the converters of one message as a core."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from fusesoc_firm.converter.configuration import (
+    PUBLISHER_TEMPLATE,
+    SUBSCRIBER_TEMPLATE,
+    publisher_configuration,
+    publisher_entity,
+    subscriber_configuration,
+    subscriber_entity,
+)
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.render import render
+
+VHDL = "vhdlSource-93"
+
+
+def message_library(request: Request, ros: RosVersion) -> MessageLibrary:
+    """The library that a request's parameters and the environment ask for."""
+    paths = request.parameters.get("paths") or []
+    distro = request.parameters.get("distro")
+    assert isinstance(paths, list)
+    return MessageLibrary(
+        ros,
+        [request.files_root / path for path in paths],
+        environment=os.environ,
+        store=None if distro is None else str(distro),
+    )
+
+
+def inputs(request: Request) -> list[Path]:
+    """The files that hold the message and those below it; none for a definition of a type store."""
+    library, name = _message(request)
+    return library.files(library.closure(name))
+
+
+def generate(request: Request) -> GeneratedCore:
+    """The converters in the direction that the request names. Raises `InputError`."""
+    library, name = _message(request)
+    frame = frame_of(name, library.closure(name))
+    direction, width = request.parameters["direction"], request.parameters["width"]
+    assert isinstance(width, int)
+    directions = ("subscriber", "publisher") if direction == "both" else (direction,)
+    files: dict[str, GeneratedFile] = {}
+    if "subscriber" in directions:
+        files |= subscriber_files([frame], width)
+    if "publisher" in directions:
+        files |= publisher_files([frame], width)
+    return GeneratedCore(f"Converters of {name} (ROS {int(library.ros)})", files)
+
+
+def subscriber_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
+    """`axis_to_<pkg>_<type>.vhd` of each frame."""
+    return {
+        f"{subscriber_entity(frame)}.vhd": GeneratedFile(
+            render(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width)), VHDL
+        )
+        for frame in frames
+    }
+
+
+def publisher_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
+    """`<pkg>_<type>_to_axis.vhd` of each frame."""
+    return {
+        f"{publisher_entity(frame)}.vhd": GeneratedFile(
+            render(PUBLISHER_TEMPLATE, publisher_configuration(frame, width)), VHDL
+        )
+        for frame in frames
+    }
+
+
+def _message(request: Request) -> tuple[MessageLibrary, MessageName]:
+    ros = request.parameters["ros"]
+    assert isinstance(ros, int)
+    return message_library(request, RosVersion(ros)), parse_name(str(request.parameters["message"]))

@@ -1,0 +1,101 @@
+"""The generator `far`: a system's converters, accelerators and top level as a core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from fusesoc_firm.converter.generator import VHDL, message_library, publisher_files, subscriber_files
+from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.render import render
+from fusesoc_firm.system.analysis import derive, source_files
+from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
+from fusesoc_firm.system.derived import AcceleratorType, Converter, DerivedSystem
+from fusesoc_firm.system.hls import wrapper_file
+from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
+
+
+@dataclass(frozen=True)
+class LoadedSystem:
+    """A specification, the folder its paths are relative to, and the system derived from it."""
+
+    specification: Specification
+    folder: Path
+    libraries: dict[RosVersion, MessageLibrary]
+    system: DerivedSystem
+
+    def inputs(self) -> list[Path]:
+        """The accelerators' sources and the files of all messages."""
+        return source_files(self.specification, self.folder) + self._message_files()
+
+    def _message_files(self) -> list[Path]:
+        found: list[Path] = []
+        for frame in self.system.frames:
+            library = self.libraries[frame.ros]
+            found += library.files(library.closure(frame.message))
+        return list(dict.fromkeys(found))
+
+
+def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary]) -> LoadedSystem:
+    """Read and derive the system of a specification. Raises `InputError` with all its faults."""
+    faults = Diagnostics()
+    specification = read_specification(path, str(path), faults)
+    if specification is None:
+        faults.raise_if_any()
+    assert specification is not None
+    system = derive(specification, path.parent, libraries, faults)
+    return LoadedSystem(specification, path.parent, libraries, system)
+
+
+def load_requested(request: Request) -> LoadedSystem:
+    """The system of a generator call."""
+    return load_system(specification_path(request), {ros: message_library(request, ros) for ros in RosVersion})
+
+
+def specification_path(request: Request) -> Path:
+    return request.files_root / str(request.parameters["spec"])
+
+
+def inputs(request: Request) -> list[Path]:
+    """The specification and every file that it leads to. Raises `InputError`."""
+    return [specification_path(request), *load_requested(request).inputs()]
+
+
+def generate(request: Request) -> GeneratedCore:
+    """The system as a core, its files in the order in which a tool reads them. Raises `InputError`."""
+    loaded = load_requested(request)
+    system = loaded.system
+    files = {
+        **subscriber_files(_frames(system.subscribers), system.width),
+        **publisher_files(_frames(system.publishers), system.width),
+    }
+    for accelerator in system.accelerator_types:
+        files |= _accelerator_files(accelerator, loaded.folder)
+    files[f"{system.entity}.vhd"] = GeneratedFile(render(SYSTEM_TEMPLATE, system_configuration(system)), VHDL)
+    return GeneratedCore(f"System {system.name}", files)
+
+
+def _frames(converters: Iterable[Converter]) -> list[Frame]:
+    return list(dict.fromkeys(converter.frame for converter in converters))
+
+
+def _accelerator_files(type_: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:
+    """The user's VHDL, or the wrapper around the user's C++."""
+    accelerator = type_.accelerator
+    if accelerator.type == "HLS":
+        return wrapper_file(type_)
+    return {
+        source_name(accelerator, source): GeneratedFile((folder / source).read_bytes(), VHDL)
+        for source in accelerator.sources
+    }
+
+
+def source_name(accelerator: Accelerator, source: str) -> str:
+    """Where a source file lies in the generated core: below a folder of its accelerator, as in the specification."""
+    parts = [part for part in PurePosixPath(source).parts if part not in ("..", "/", ".")]
+    return str(PurePosixPath(str(accelerator.name), *parts))
