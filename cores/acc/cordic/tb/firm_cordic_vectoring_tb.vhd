@@ -2,7 +2,7 @@
 -- Feeds firm_cordic_vectoring from a file and writes its results; both sides stall now and then.
 --
 -- A line of VECTORS is x y, a line of RESULTS magnitude angle, as binary digits. The values are judged by
--- who reads RESULTS; that a waiting result does not change is judged here.
+-- who reads RESULTS; that there is one a vector and that it does not change is judged here.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -109,6 +109,9 @@ begin
     variable angle       : std_logic_vector(FRACTION+2 downto 0);
   begin
     wait until rising_edge(clk) and out_valid = '1';
+    assert received < sent
+      report "firm_cordic_vectoring_tb: more results than vectors"
+      severity failure;
     magnitude := out_magnitude;
     angle     := out_angle;
     for idle in 1 to (received mod 7) * 15 loop
