@@ -52,11 +52,11 @@ void QuaternionToEuler(double x_in, double y_in, double z_in, double w_in,
     const double z = std::ldexp(z_in, -exponent);
     const double w = std::ldexp(w_in, -exponent);
 
-    // Adding 0.0 turns -0 into 0: atan2 tells them apart, rotations do not.
+    // Adding 0.0 turns -0 into 0, for atan2(0, -0) is pi.
     const double p = w + y + 0.0;
     const double q = w - y + 0.0;
-    const double r = x + z + 0.0;
-    const double s = z - x + 0.0;
+    const double r = x + z;
+    const double s = z - x;
     const double alpha = std::atan2(r, q);
     const double beta = std::atan2(s, p);
 

@@ -31,8 +31,8 @@ def quaternion_to_euler(x: float, y: float, z: float, w: float) -> tuple[float, 
     x, y, z, w = (math.ldexp(component, -exponent) for component in (x, y, z, w))
     p = w + y + 0.0
     q = w - y + 0.0
-    r = x + z + 0.0
-    s = z - x + 0.0
+    r = x + z
+    s = z - x
     alpha = math.atan2(r, q)
     beta = math.atan2(s, p)
     # Not math.hypot, which rounds otherwise.

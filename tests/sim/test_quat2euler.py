@@ -6,6 +6,7 @@ import importlib.util
 import math
 import random
 import re
+import shutil
 import struct
 import subprocess
 from collections.abc import Sequence
@@ -28,6 +29,7 @@ FIRM_SOURCES = [
 ]
 TOP = SPEC / "rtl" / "quat2euler.vhd"
 BENCH = SPEC / "tb" / "quat2euler_tb.vhd"
+VERILOG_BENCH = SPEC / "tb" / "quat2euler_netlist_tb.v"
 SEED = 4711
 # A frame of a Quaternion in ROS 1: id, length and 32 bytes.
 FRAME_BYTES = 37
@@ -91,12 +93,13 @@ def quaternions(count: int) -> list[Quaternion]:
         (1.0, 2.0**-60, -(2.0**-61), 2.0**-62),
         (1.0, 3 * 2.0**-62, -3 * 2.0**-62, 2.0**-200),
     ]
-    result += [tuple(sign if k == axis else 0.0 for k in range(4)) for axis in range(4) for sign in (1.0, -1.0)]  # type: ignore[misc]
+    for sign in (1.0, -1.0):
+        result += [(sign, 0.0, 0.0, 0.0), (0.0, sign, 0.0, 0.0), (0.0, 0.0, sign, 0.0), (0.0, 0.0, 0.0, sign)]
     while len(result) < count:
         spread = generator.choice((0, 0, 10, 70))
-        x, y, z, w = (generator.gauss(0, 1) * 2.0 ** -generator.randint(0, spread) for _ in range(4))
         exponent = generator.choice((0, 0, -1000, 1000))
-        result.append((math.ldexp(x, exponent), math.ldexp(y, exponent), math.ldexp(z, exponent), math.ldexp(w, exponent)))
+        x, y, z, w = (math.ldexp(generator.gauss(0, 1), exponent - generator.randint(0, spread)) for _ in range(4))
+        result.append((x, y, z, w))
     return result
 
 
@@ -168,8 +171,9 @@ def test_synthesis_makes_no_latch(netlists: dict[str, str]) -> None:
 
 
 def test_the_verilog_netlist_is_verilog(netlists: dict[str, str]) -> None:
-    """ghdl 2.0 copies `abs` and some shifts over as VHDL, and shifts signed numbers without their sign."""
+    """ghdl 2.0 copies `abs` over as VHDL, wide constants as strings, and shifts signed numbers without their sign."""
     assert "std_logic" not in netlists["verilog"]
+    assert '"' not in netlists["verilog"]
     assert not re.search(r"\$signed\([^;]*>>[^>]", netlists["verilog"])
 
 
@@ -179,6 +183,19 @@ def test_the_netlist_is_the_model(netlists: dict[str, str], tmp_path: Path) -> N
     analyse([TABLE], tmp_path, library="firm")
     analyse([tmp_path / "netlist.vhd", BENCH], tmp_path)
     check_bench(tmp_path, quaternions(60), tmp_path, SEED=6, STALL_IN=50, STALL_OUT=90)
+
+
+@pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed")
+def test_the_verilog_netlist_is_the_model(netlists: dict[str, str], tmp_path: Path) -> None:
+    vectors = quaternions(200)
+    (tmp_path / "netlist.v").write_text(netlists["verilog"])
+    (tmp_path / "vectors.txt").write_text("".join(f"{text(vector)}\n" for vector in vectors))
+    sources = [str(tmp_path / "netlist.v"), str(VERILOG_BENCH)]
+    messages = f"-Pquat2euler_netlist_tb.MESSAGES={len(vectors)}"
+    subprocess.run(["iverilog", messages, "-o", str(tmp_path / "netlist.vvp"), *sources], check=True)
+    command = ["vvp", str(tmp_path / "netlist.vvp"), f"+vectors={tmp_path / 'vectors.txt'}"]
+    result = subprocess.run(command, check=True, capture_output=True, text=True, timeout=300)
+    assert result.stdout.upper().split() == [text(MODEL.quaternion_to_euler(*vector)) for vector in vectors]
 
 
 def arctangent(index: int, precision: int) -> Fraction:

@@ -53,7 +53,7 @@ architecture rtl of quat2euler is
   -- An angle of the CORDIC units, -pi to pi.
   subtype angle_vector_t is std_logic_vector(FRACTION+2 downto 0);
 
-  constant QUARTER_PI : unsigned(FRACTION-1 downto 0) := arctangent(0, FRACTION);
+  constant FIRST_ANGLE : word_t := resize(signed('0' & arctangent(0, FRACTION)), WIDTH);
 
   -- What a message has besides numbers; it travels beside them from stage to stage.
   type kind_t is record
@@ -66,6 +66,7 @@ architecture rtl of quat2euler is
 
   -- The CORDIC units' own pi, to the bit. Signals, set bit by bit: ghdl 2.0 translates a constant of more
   -- than 32 bits to a Verilog string.
+  signal quarter_pi      : word_t;
   signal half_pi         : word_t;
   signal pi              : word_t;
   signal two_pi          : word_t;
@@ -106,7 +107,6 @@ architecture rtl of quat2euler is
   signal roll_r          : word_t;
   signal yaw_r           : word_t;
 
-  signal pitch_in_valid  : std_logic;
   signal pitch_in_ready  : std_logic;
   signal pitch_out_valid : std_logic;
   signal pitch_out_ready : std_logic;
@@ -129,16 +129,12 @@ architecture rtl of quat2euler is
 
 begin
 
-  multiples : for k in half_pi'range generate
-    inside : if k >= 1 and k <= FRACTION generate
-      half_pi(k) <= QUARTER_PI(k-1);
-    end generate inside;
-    outside : if k < 1 or k > FRACTION generate
-      half_pi(k) <= '0';
-    end generate outside;
+  multiples : for k in quarter_pi'range generate
+    quarter_pi(k) <= FIRST_ANGLE(k);
   end generate multiples;
-  pi     <= shift_left(half_pi, 1);
-  two_pi <= shift_left(half_pi, 2);
+  half_pi <= shift_left(quarter_pi, 1);
+  pi      <= shift_left(quarter_pi, 2);
+  two_pi  <= shift_left(quarter_pi, 3);
 
   out_x                <= out_x_r;
   out_y                <= out_y_r;
@@ -233,10 +229,10 @@ begin
       out_angle     => beta
     );
 
-  -- The lengths and the angles part here; both must find room in the same cycle.
+  -- The lengths and the angles part here. A pitch leaves its unit after its roll and yaw left `angles`, so
+  -- when that unit has room, `angles` has.
   half_out_valid <= alpha_out_valid and beta_out_valid;
-  half_out_ready <= half_out_valid and pitch_in_ready and not angles_valid_r;
-  pitch_in_valid <= half_out_valid and not angles_valid_r;
+  half_out_ready <= half_out_valid and pitch_in_ready;
 
   angles : process (clk)
   begin
@@ -267,7 +263,7 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      in_valid      => pitch_in_valid,
+      in_valid      => half_out_valid,
       in_ready      => pitch_in_ready,
       in_x          => length_qr,
       in_y          => length_ps,

@@ -1,0 +1,156 @@
+"""The cores under cores/acc in simulation, over their generics, against exact arithmetic."""
+
+from __future__ import annotations
+
+import math
+import random
+import struct
+import subprocess
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+ACC = Path(__file__).parents[2] / "cores" / "acc"
+CORDIC = ACC / "cordic"
+FLOAT64 = ACC / "float64"
+SEED = 1618
+PI = Fraction("3.14159265358979323846264338327950288")
+
+
+def ghdl(*arguments: str | Path, folder: Path) -> str:
+    result = subprocess.run(
+        ["ghdl", *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout + result.stderr
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("acc")
+    sources = [CORDIC / "rtl" / "firm_cordic_table.vhd", CORDIC / "rtl" / "firm_cordic_vectoring.vhd"]
+    ghdl("-a", "--std=93", "--work=firm", *sources, *sorted((FLOAT64 / "rtl").glob("*.vhd")), folder=folder)
+    ghdl("-a", "--std=93", *sorted(ACC.glob("*/tb/*.vhd")), folder=folder)
+    return folder
+
+
+def binary(number: int, width: int) -> str:
+    return format(number & ((1 << width) - 1), f"0{width}b")
+
+
+def signed(digits: str) -> int:
+    return int(digits, 2) - (int(digits[0]) << len(digits))
+
+
+def float_bits(number: float) -> str:
+    return binary(int.from_bytes(struct.pack("<d", number), "little"), 64)
+
+
+@pytest.mark.parametrize(
+    ("width", "fraction", "iterations"),
+    [(64, 60, 35), (16, 8, 8), (24, 16, 12), (40, 64, 64), (80, 62, 50), (33, 20, 2)],
+)
+def test_cordic(library: Path, tmp_path: Path, width: int, fraction: int, iterations: int) -> None:
+    print(f"seed {SEED}")
+    generator = random.Random(SEED)
+    # Twice a vector's length must have room.
+    limit = int(2 ** (width - 1) / 1.6468 / math.sqrt(2)) - iterations
+    vectors = [(0, 0), (limit, 0), (-limit, 0), (0, limit), (0, -limit), (limit, limit), (-limit, limit)]
+    vectors += [(-limit, -limit), (limit, -limit), (1, 0), (0, -1)]
+    vectors += [(generator.randint(-limit, limit), generator.randint(-limit, limit)) for _ in range(60)]
+    (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, width)} {binary(y, width)}\n" for x, y in vectors))
+    generics = {"WIDTH": width, "FRACTION": fraction, "ITERATIONS": iterations}
+    generics_and_files = [f"-g{name}={value}" for name, value in generics.items()]
+    generics_and_files += [f"-gVECTORS={tmp_path / 'vectors.txt'}", f"-gRESULTS={tmp_path / 'results.txt'}"]
+    ghdl("-r", "--std=93", "firm_cordic_vectoring_tb", *generics_and_files, folder=library)
+    results = [line.split() for line in (tmp_path / "results.txt").read_text().splitlines()]
+    assert len(results) == len(vectors)
+
+    gain = math.prod(math.sqrt(1 + 4.0**-i) for i in range(iterations))
+    for (x, y), (magnitude_digits, angle_digits) in zip(vectors, results, strict=True):
+        magnitude, angle = signed(magnitude_digits), Fraction(signed(angle_digits), 2**fraction)
+        length = math.hypot(x, y)
+        # The last rotation is left over; every rotation rounds angle and length by a unit at most.
+        left = 2.0 ** (1 - iterations)
+        slack = iterations * (2.0**-fraction + 2 / max(length, 1)) + 1e-15
+        if 0 in (x, y) or abs(x) == abs(y):
+            assert abs(float(angle) - math.atan2(y, x)) <= 2.0 ** (1 - fraction) + 1e-15
+        else:
+            assert abs(float(angle) - math.atan2(y, x)) <= left + slack
+        shortfall = length * gain * (left**2 / 2 + 1e-15) + 2 * iterations
+        assert abs(magnitude - length * gain) <= shortfall
+
+
+def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Path, tmp_path: Path) -> None:
+    print(f"seed {SEED}")
+    generator = random.Random(SEED)
+    vectors = []
+    for _ in range(20):
+        x, y = generator.randint(1, 2**60), generator.randint(1, 2**60)
+        vectors += [(x, y), (-x, y), (-x, -y), (x, -y)]
+    (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, 64)} {binary(y, 64)}\n" for x, y in vectors))
+    files = [f"-gVECTORS={tmp_path / 'vectors.txt'}", f"-gRESULTS={tmp_path / 'results.txt'}"]
+    ghdl("-r", "--std=93", "firm_cordic_vectoring_tb", *files, folder=library)
+    results = [tuple(map(signed, line.split())) for line in (tmp_path / "results.txt").read_text().splitlines()]
+    for first, second, third, fourth in zip(*[iter(results)] * 4, strict=True):
+        assert len({first[0], second[0], third[0], fourth[0]}) == 1
+        assert fourth[1] == -first[1] and third[1] == -second[1]
+        # pi is four times the angle of the first rotation.
+        assert first[1] + second[1] == 4 * round(PI / 4 * 2**60)
+
+
+def block_of(numbers: list[float], fraction: int) -> tuple[list[int], int, bool, bool]:
+    """What firm_float64_to_block makes of them, by exact arithmetic."""
+    exponents = [int(float_bits(number)[1:12], 2) for number in numbers]
+    largest = max(exponents)
+    if largest in (0, 2047):
+        return [0] * len(numbers), largest, largest == 2047, largest == 0
+    results = []
+    for number in numbers:
+        exact = abs(Fraction(number)) * Fraction(2) ** (1022 - largest + fraction)
+        magnitude = math.floor(exact + Fraction(1, 2))
+        results.append(-magnitude if number < 0 else magnitude)
+    return results, largest, False, False
+
+
+@pytest.mark.parametrize(
+    ("count", "block_fraction", "fixed_fraction"), [(4, 60, 60), (1, 53, 0), (2, 62, 63), (5, 56, 512), (3, 61, 17)]
+)
+def test_float64(library: Path, tmp_path: Path, count: int, block_fraction: int, fixed_fraction: int) -> None:
+    print(f"seed {SEED}")
+    generator = random.Random(SEED)
+    specials = (0.0, -0.0, 2.0**-1074, -(2.0**-1022), 1.7e308, -math.inf, math.nan, 1.0, -(1 - 2.0**-53))
+
+    def number() -> float:
+        if generator.random() < 0.2:
+            return generator.choice(specials)
+        return math.ldexp(
+            generator.uniform(-1, 1), generator.choice((-1074, -1020, 0, 1, 1000)) - generator.randint(0, 66)
+        )
+
+    blocks = [[number() for _ in range(count)] for _ in range(200)]
+    lines = ["".join(float_bits(value) for value in reversed(block)) for block in blocks]
+    (tmp_path / "block_vectors.txt").write_text("\n".join(lines) + "\n")
+    fixed = [0, 1, -1, 2**63 - 1, -(2**63), 2**53 + 1, 2**54 - 1, -(2**54 + 2), 3 << 53, 2**63 - 512, 2**63 - 513]
+    fixed += [generator.randint(-(2**63), 2**63 - 1) >> generator.randint(0, 63) for _ in range(400)]
+    (tmp_path / "fixed_vectors.txt").write_text("".join(f"{binary(value, 64)}\n" for value in fixed))
+
+    generics = {"COUNT": count, "BLOCK_FRACTION": block_fraction, "FIXED_FRACTION": fixed_fraction}
+    options = [f"-g{name}={value}" for name, value in generics.items()]
+    for kind in ("block_vectors", "block_results", "fixed_vectors", "fixed_results"):
+        options.append(f"-g{kind.upper()}={tmp_path / kind}.txt")
+    ghdl("-r", "--std=93", "firm_float64_tb", *options, folder=library)
+
+    block_results = (tmp_path / "block_results.txt").read_text().splitlines()
+    assert len(block_results) == len(blocks)
+    for block, line in zip(blocks, block_results, strict=True):
+        digits, exponent, undefined, zero = line.split()
+        width = block_fraction + 1
+        found = [signed(digits[k * width : (k + 1) * width]) for k in reversed(range(count))]
+        expected, largest, is_undefined, is_zero = block_of(block, block_fraction)
+        assert (int(exponent, 2), undefined == "1", zero == "1") == (largest, is_undefined, is_zero)
+        assert is_undefined or found == expected
+    fixed_results = (tmp_path / "fixed_results.txt").read_text().splitlines()
+    # Python rounds int / int to nearest, ties to even; all results are normal numbers.
+    assert fixed_results == [float_bits(value / 2**fixed_fraction) for value in fixed]
