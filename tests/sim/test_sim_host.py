@@ -227,9 +227,17 @@ def test_a_missing_file_is_named(library: Library, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("generic", "value"),
-    [("SEED", 0), ("SEED", -5), ("STALL_PERCENT", 100), ("STALL_PERCENT", -1), ("WIDTH", 12), ("WATCHDOG", 0), ("QUIET", 0)],
+    [
+        ("SEED", 0),
+        ("SEED", -5),
+        ("STALL_PERCENT", 100),
+        ("STALL_PERCENT", -1),
+        ("WIDTH", 12),
+        ("WATCHDOG", 0),
+        ("QUIET", 0),
+    ],
 )
 def test_illegal_generics_are_named(library: Library, tmp_path: Path, generic: str, value: int) -> None:
-    result = _run(library, tmp_path, **{generic: value})
+    result = library.run(BENCH, {generic: value}, directory=tmp_path)
     assert result.exit_code != 0
     assert f"firm_sim_host: {generic} is {value}; legal: " in result.output
