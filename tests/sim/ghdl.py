@@ -110,7 +110,11 @@ class Library:
 
     def _ghdl(self, command: str, *arguments: str) -> str:
         process = subprocess.run(
-            ["ghdl", command, *self._options(), *arguments], capture_output=True, text=True, errors="replace", check=False
+            ["ghdl", command, *self._options(), *arguments],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
         )
         if process.returncode != 0:
             raise GhdlError(process.stdout + process.stderr)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.sim.frames import random_frames, traffic, write_expected, write_stimulus
-from tests.sim.ghdl import GhdlError, Library, core_files
+from tests.sim.ghdl import Generic, GhdlError, Library, core_files
 
 WIDTHS = [8, 64, 512]
 SEED = 20240501
@@ -41,7 +41,7 @@ def _write_files(directory: Path, width: int) -> int:
 def test_a_part_keeps_a_stream_under_stalls(library: Library, tmp_path: Path, part: str, width: int) -> None:
     _write_files(tmp_path, width)
     for stall in (20, 50, 80):
-        generics = {"PART": part, "WIDTH": width, "SEED": SEED, "STALL_PERCENT": stall, "DEPTH": 5}
+        generics: dict[str, Generic] = {"PART": part, "WIDTH": width, "SEED": SEED, "STALL_PERCENT": stall, "DEPTH": 5}
         result = library.run("firm_axis_pipe_tb", generics, directory=tmp_path)
         assert result.exit_code == 0, result.output
         assert result.output.splitlines()[-1] == "PASS 100/100"
@@ -56,10 +56,27 @@ def test_a_part_takes_a_beat_a_cycle(library: Library, tmp_path: Path, part: str
     assert traffic(result.output).cycles == beats + LATENCY[part]
 
 
+@pytest.mark.parametrize("part", LATENCY)
+@pytest.mark.parametrize("stall", [20, 50, 80])
+def test_a_part_leaves_no_gap_behind_a_stall(library: Library, tmp_path: Path, part: str, stall: int) -> None:
+    _write_files(tmp_path, 16)
+    generics: dict[str, Generic] = {"PART": part, "WIDTH": 16, "SEED": SEED, "SINK_STALL_PERCENT": stall}
+    result = library.run("firm_axis_pipe_tb", generics, directory=tmp_path)
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize(("part", "depth", "capacity"), [("register_slice", 16, 2), ("fifo", 2, 3), ("fifo", 13, 14)])
+def test_a_part_holds_what_it_says(library: Library, tmp_path: Path, part: str, depth: int, capacity: int) -> None:
+    _write_files(tmp_path, 8)
+    generics: dict[str, Generic] = {"PART": part, "DEPTH": depth, "CAPACITY": capacity}
+    result = library.run("firm_axis_pipe_tb", generics, directory=tmp_path)
+    assert result.exit_code == 0, result.output
+
+
 @pytest.mark.parametrize("depth", [2, 3, 16])
 def test_the_fifo_works_at_any_depth(library: Library, tmp_path: Path, depth: int) -> None:
     _write_files(tmp_path, 16)
-    generics = {"PART": "fifo", "WIDTH": 16, "DEPTH": depth, "SEED": SEED, "STALL_PERCENT": 40}
+    generics: dict[str, Generic] = {"PART": "fifo", "WIDTH": 16, "DEPTH": depth, "SEED": SEED, "STALL_PERCENT": 40}
     result = library.run("firm_axis_pipe_tb", generics, directory=tmp_path)
     assert result.exit_code == 0, result.output
 
@@ -70,7 +87,7 @@ def test_the_netlist_of_a_part_does_the_same(tmp_path: Path, part: str) -> None:
     library.replace_by_netlist(f"firm_axis_{part}", {"WIDTH": 32, **({"DEPTH": 6} if part == "fifo" else {})})
     library.analyse(core_files("axis/axis", fileset="tb"))
     _write_files(tmp_path, 32)
-    generics = {"PART": part, "WIDTH": 32, "DEPTH": 6, "SEED": SEED, "STALL_PERCENT": 40}
+    generics: dict[str, Generic] = {"PART": part, "WIDTH": 32, "DEPTH": 6, "SEED": SEED, "STALL_PERCENT": 40}
     result = library.run("firm_axis_pipe_tb", generics)
     assert result.exit_code == 0, result.output
 

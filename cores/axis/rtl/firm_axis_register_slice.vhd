@@ -82,7 +82,7 @@ begin
         valid_r   <= skidded_r or (s_axis_tvalid and ready_r);
         skidded_r <= '0';
         ready_r   <= '1';
-      elsif s_axis_tvalid = '1' and ready_r = '1' then
+      elsif s_axis_tvalid = '1' then
         skidded_r <= '1';
         ready_r   <= '0';
       end if;

@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A part that a stream goes through unchanged, between the simulation host's two streams.
+-- A part that a stream goes through unchanged, between the simulation host's two streams. A source that never pauses
+-- must be passed on without a gap, whatever the sink does.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -13,7 +14,11 @@ entity firm_axis_pipe_tb is
     STIMULUS_FILE : string  := "stimulus.txt";
     EXPECTED_FILE : string  := "expected.txt";
     SEED          : integer := 1;
-    STALL_PERCENT : integer := 0;
+    -- The host's stalls, and stalls of the sink only.
+    STALL_PERCENT      : integer := 0;
+    SINK_STALL_PERCENT : integer := 0;
+    -- The sink takes nothing until the part is full, which must hold so many beats; 0: not tested.
+    CAPACITY : integer := 0;
     WATCHDOG      : integer := 1000;
     QUIET         : integer := 100);
 end entity firm_axis_pipe_tb;
@@ -29,6 +34,18 @@ architecture simulation of firm_axis_pipe_tb is
   signal in_tvalid : std_logic;
   signal in_tlast  : std_logic;
   signal in_tready : std_logic;
+
+  signal part_tdata  : std_logic_vector(WIDTH-1 downto 0);
+  signal part_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal part_tvalid : std_logic;
+  signal part_tlast  : std_logic;
+  signal part_tready : std_logic;
+
+  signal stalled_tvalid : std_logic;
+  signal stalled_tready : std_logic;
+
+  signal is_filling_r : boolean := CAPACITY > 0;
+  signal has_begun_r  : boolean := false;  -- a beat has left the part
 
   signal out_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal out_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
@@ -91,12 +108,12 @@ begin
         s_axis_tvalid => in_tvalid,
         s_axis_tlast  => in_tlast,
         s_axis_tready => in_tready,
-        m_axis_tdata  => out_tdata,
-        m_axis_tkeep  => out_tkeep,
+        m_axis_tdata  => part_tdata,
+        m_axis_tkeep  => part_tkeep,
         m_axis_tid    => out_tid,
-        m_axis_tvalid => out_tvalid,
-        m_axis_tlast  => out_tlast,
-        m_axis_tready => out_tready);
+        m_axis_tvalid => part_tvalid,
+        m_axis_tlast  => part_tlast,
+        m_axis_tready => part_tready);
 
   end generate slice;
 
@@ -108,10 +125,10 @@ begin
       port map (
         clk         => clk,
         rst_n       => rst_n,
-        axis_tdata  => out_tdata,
-        axis_tvalid => out_tvalid,
-        axis_tlast  => out_tlast,
-        axis_tready => out_tready,
+        axis_tdata  => part_tdata,
+        axis_tvalid => part_tvalid,
+        axis_tlast  => part_tlast,
+        axis_tready => part_tready,
         axis_tid    => out_tid);
 
     u_part : entity firm.firm_axis_fifo
@@ -126,12 +143,62 @@ begin
         s_axis_tvalid => in_tvalid,
         s_axis_tlast  => in_tlast,
         s_axis_tready => in_tready,
-        m_axis_tdata  => out_tdata,
-        m_axis_tkeep  => out_tkeep,
-        m_axis_tvalid => out_tvalid,
-        m_axis_tlast  => out_tlast,
-        m_axis_tready => out_tready);
+        m_axis_tdata  => part_tdata,
+        m_axis_tkeep  => part_tkeep,
+        m_axis_tvalid => part_tvalid,
+        m_axis_tlast  => part_tlast,
+        m_axis_tready => part_tready);
 
   end generate fifo;
+
+  u_stall : entity firm.firm_sim_stall
+    generic map (
+      WIDTH         => WIDTH,
+      SEED          => SEED,
+      STALL_PERCENT => SINK_STALL_PERCENT)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => part_tdata,
+      s_axis_tkeep  => part_tkeep,
+      s_axis_tvalid => part_tvalid,
+      s_axis_tlast  => part_tlast,
+      s_axis_tready => part_tready,
+      m_axis_tdata  => out_tdata,
+      m_axis_tkeep  => out_tkeep,
+      m_axis_tvalid => stalled_tvalid,
+      m_axis_tlast  => out_tlast,
+      m_axis_tready => stalled_tready);
+
+  out_tvalid     <= '0' when is_filling_r else stalled_tvalid;
+  stalled_tready <= '0' when is_filling_r else out_tready;
+
+  fill : process (clk)
+    variable beats : natural := 0;
+  begin
+    if rising_edge(clk) then
+      if is_filling_r and in_tvalid = '1' then
+        if in_tready = '1' then
+          beats := beats + 1;
+        elsif beats > 0 then
+          is_filling_r <= false;
+          assert beats = CAPACITY
+            report "the part holds " & integer'image(beats) & " beats, expected " & integer'image(CAPACITY)
+            severity failure;
+        end if;
+      end if;
+    end if;
+  end process fill;
+
+  find_gaps : process (clk)
+  begin
+    if rising_edge(clk) and STALL_PERCENT = 0 then
+      if part_tvalid = '1' and part_tready = '1' then
+        has_begun_r <= true;
+      end if;
+      assert not (has_begun_r and in_tvalid = '1' and part_tready = '1' and part_tvalid = '0')
+        report "a gap although the source never pauses" severity failure;
+    end if;
+  end process find_gaps;
 
 end architecture simulation;

@@ -95,7 +95,7 @@ begin
     variable expected : frame_file_t;
 
     variable cycle       : natural := 0;
-    variable idle_cycles : natural := 0;  -- since the last beat of either stream
+    variable idle_cycles : natural := 0;  -- since the last beat sent or expected; surplus ones shall not keep a run alive
     variable faults      : natural := 0;
     variable random_1    : positive;
     variable random_2    : positive := 1;
@@ -290,6 +290,7 @@ begin
     begin
       if receiving /= null then
         if bytes_received < receiving.size then
+          idle_cycles := 0;
           compare_byte(value);
         elsif bytes_received = receiving.size then
           frame_fault("goes on behind its " & integer'image(receiving.size) & " bytes");
@@ -340,9 +341,8 @@ begin
     procedure take_beat is
       variable bytes : natural;
     begin
-      beats_out   := beats_out + 1;
-      idle_cycles := 0;
-      last_out    := cycle;
+      beats_out := beats_out + 1;
+      last_out  := cycle;
       if not is_in_frame then
         begin_frame(s_axis_tdata(7 downto 0));
       end if;
@@ -441,7 +441,7 @@ begin
     procedure report_missing is
       variable frame : frame_ptr_t;
     begin
-      fault("no beat for " & integer'image(idle_cycles) & " cycles; " & integer'image(frames_sent) & " of "
+      fault("nothing moved for " & integer'image(idle_cycles) & " cycles; " & integer'image(frames_sent) & " of "
             & integer'image(stimulus.frames) & " frames in, " & integer'image(frames_received) & " of "
             & integer'image(expected.frames) & " out");
       if sending /= null then

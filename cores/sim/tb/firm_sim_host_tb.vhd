@@ -16,7 +16,7 @@ entity firm_sim_host_tb is
     SHOWN         : integer := 10;
     WATCHDOG      : integer := 200;
     QUIET         : integer := 50;
-    -- none, unstable, withdrawn, undefined, unknown_valid, sparse, empty, wrong_tid, stuck, mute, id_pulse, frame_pulse
+    -- The way to break the stream; "none" for none. The process `spoil` shows them all.
     FAULT : string := "none");
 end entity firm_sim_host_tb;
 
@@ -44,6 +44,7 @@ architecture simulation of firm_sim_host_tb is
   signal first_r : std_logic := '1';
   signal id_r    : std_logic_vector(7 downto 0);
   signal beats_r : natural := 0;
+  signal idle_r  : natural := 0;  -- cycles since the last beat
   signal held_r  : boolean := false;  -- a beat has waited for a cycle
 
 begin
@@ -80,7 +81,9 @@ begin
   begin
     if rising_edge(clk) then
       held_r <= out_tvalid = '1' and out_tready = '0';
+      idle_r <= idle_r + 1;
       if out_tvalid = '1' and out_tready = '1' then
+        idle_r  <= 0;
         beats_r <= beats_r + 1;
         first_r <= out_tlast;
         if first_r = '1' then
@@ -90,10 +93,12 @@ begin
     end if;
   end process watch_frames;
 
-  spoil : process (out_tdata, out_tkeep, out_tvalid, out_tlast, in_tready, first_r, id_r, beats_r, held_r)
-    variable is_third : boolean;
+  spoil : process (out_tdata, out_tkeep, out_tvalid, out_tlast, in_tready, first_r, id_r, beats_r, idle_r, held_r)
+    variable is_third  : boolean;
+    variable is_fourth : boolean;
   begin
-    is_third := beats_r = 2;
+    is_third  := beats_r = 2 and out_tvalid = '1';
+    is_fourth := beats_r = 3 and out_tvalid = '1';
 
     out_tready <= in_tready;
     in_tdata   <= out_tdata;
@@ -116,20 +121,45 @@ begin
       in_tdata(3) <= 'U';
     elsif FAULT = "unknown_valid" and is_third then
       in_tvalid <= 'X';
-    elsif FAULT = "sparse" and out_tlast = '0' then
+    elsif FAULT = "sparse" and is_third then
       in_tkeep(0) <= '0';
+    elsif FAULT = "partial" and is_third then
+      in_tkeep(WIDTH/8-1) <= '0';
+    elsif FAULT = "empty" and is_third then
+      in_tkeep <= (in_tkeep'range => '0');
     elsif FAULT = "wrong_tid" and is_third then
       in_tid <= x"a5";
+    elsif FAULT = "unknown_last" and is_third then
+      in_tlast <= 'X';
+    elsif FAULT = "early_last" and is_third then
+      in_tlast <= '1';
+    elsif FAULT = "late_last" and is_fourth then
+      in_tlast <= '0';
+    elsif FAULT = "unknown_ready" and is_third then
+      out_tready <= 'X';
     elsif FAULT = "stuck" and beats_r >= 2 then
       out_tready <= '0';
       in_tvalid  <= '0';
     elsif FAULT = "mute" then
       out_tready <= '1';
       in_tvalid  <= '0';
+    elsif FAULT = "late_surplus" and beats_r > 0 and idle_r = 30 then
+      in_tvalid <= '1';
+      in_tdata  <= (in_tdata'range => '0');
+      in_tkeep  <= (in_tkeep'range => '1');
+      in_tid    <= x"00";
+      in_tlast  <= '1';
+    elsif FAULT = "endless" and beats_r >= 2 then
+      in_tvalid <= '1';
+      in_tdata  <= (in_tdata'range => '0');
+      in_tkeep  <= (in_tkeep'range => '1');
+      in_tlast  <= '0';
     elsif FAULT = "id_pulse" and is_third then
       id_error <= '1';
     elsif FAULT = "frame_pulse" and is_third then
       frame_error(0) <= '1';
+    elsif FAULT = "unknown_pulse" and is_third then
+      id_error <= 'U';
     end if;
   end process spoil;
 
