@@ -166,7 +166,7 @@ def kernel_configuration(accelerator: AcceleratorType) -> Configuration:
         "library": library_name(accelerator),
         "inputs": [_argument(argument, column) for argument in inputs],
         "outputs": [_argument(argument, column) for argument in outputs],
-        "ap_ports": [{"name": name.ljust(column)} for name in _AP_PORTS],
+        **{name: name.ljust(column) for name in _AP_PORTS},
         "input_words": max(1, sum(argument.words for argument in inputs)),
         "output_words": max(1, sum(argument.words for argument in outputs)),
         "calls": [
@@ -189,6 +189,7 @@ def _argument(argument: Argument, column: int) -> Configuration:
         "word": argument.word,
         "words": [
             {
+                "port": argument.port,
                 "index": argument.word + number,
                 "high": min(argument.bits, _WORD_BITS * (number + 1)) - 1,
                 "low": _WORD_BITS * number,

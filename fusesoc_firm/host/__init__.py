@@ -1,0 +1,1 @@
+"""What runs beside the hardware: stimuli and expected frames of a simulation."""

@@ -1,0 +1,57 @@
+"""The simulated host's two files: stimuli and expected frames as text (docs/simulation.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from fusesoc_firm.frame.codec import pack_frame, used_bytes
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
+from fusesoc_firm.host.reference import Response
+from fusesoc_firm.host.stimuli import Stimulus
+from fusesoc_firm.system.derived import Converter
+
+_BYTES_A_LINE = 32
+_LABEL_WIDTH = 160
+
+
+def stimulus_text(stimuli: Iterable[Stimulus]) -> str:
+    """The stimulus file."""
+    lines: list[str] = []
+    for stimulus in stimuli:
+        lines.append(f"> {_label(stimulus.subscriber, stimulus.message)}")
+        lines += _hex_lines(pack_frame(stimulus.subscriber.id, stimulus.payload), None)
+    return "\n".join(lines) + "\n"
+
+
+def expected_text(responses: Iterable[Response]) -> str:
+    """The expected file; padding may hold any byte."""
+    lines: list[str] = []
+    for response in responses:
+        publisher = response.publisher
+        lines.append(f"< @{response.cause} {_label(publisher, response.message)}")
+        used = b"\1" * (ID_BYTES + LENGTH_BYTES) + used_bytes(publisher.frame)
+        lines += _hex_lines(pack_frame(publisher.id, response.payload), used)
+    return "\n".join(lines) + "\n"
+
+
+def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:
+    """The frame's bytes in hex; one that is not used is written as `..`."""
+    digits = [f"{byte:02x}" if used is None or used[index] else ".." for index, byte in enumerate(frame)]
+    for first in range(0, len(digits), _BYTES_A_LINE):
+        yield "  " + " ".join(digits[first : first + _BYTES_A_LINE])
+
+
+def _label(converter: Converter, message: dict[str, Any]) -> str:
+    """Block, type and values on one line of plain ASCII, cut where it gets long."""
+    values = " ".join(f"{name}={value}" for name, value in _values(message))
+    label = f"{converter.block} {converter.frame.message} {values}".encode("ascii", "replace").decode()
+    return label if len(label) <= _LABEL_WIDTH else label[: _LABEL_WIDTH - 3] + "..."
+
+
+def _values(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _values(inner, f"{name}.{key}" if name else key)
+    else:
+        yield name, "".join(str(value).split())
