@@ -1,0 +1,134 @@
+"""What the two generations of ROS allow in a `.msg` file: one table each, so that the parser asks and never tells versions apart.
+
+ROS 1 follows genmsg 0.6.0, ROS 2 follows rosidl_adapter 4.9.5. docs/messages.md lists the few places where FIRM
+takes more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from fusesoc_firm.message.model import MessageName, RosVersion
+
+LARGEST_SIZE = 2**32 - 1  # the wire counts elements and characters in a uint32
+
+
+@dataclass(frozen=True)
+class NameRule:
+    """The legal spellings of one kind of name; `description` completes the hint "a field name has ..."."""
+
+    kind: str
+    pattern: re.Pattern[str]
+    description: str
+
+    def accepts(self, name: str) -> bool:
+        """Whether all of `name` is legal."""
+        return self.pattern.fullmatch(name) is not None
+
+    @property
+    def hint(self) -> str:
+        """What would be legal."""
+        return f"a {self.kind} has {self.description}"
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """The rules of one version. `integer_ranges` hold the smallest and the largest value, both legal."""
+
+    ros: RosVersion
+    package_name: NameRule
+    message_name: NameRule
+    field_name: NameRule
+    constant_name: NameRule
+    integer_ranges: Mapping[str, tuple[int, int]]
+    # Primitives that have no constants: ROS 1's `time` and `duration`.
+    opaque_primitives: frozenset[str]
+    strings: frozenset[str]
+    # Words that stand for a message, and whether they still do so in front of `[`.
+    shorthands: Mapping[str, MessageName]
+    has_array_shorthands: bool
+    booleans: Mapping[str, bool]
+    # `<=` behind a string or within the brackets of an array, default values, `0x10`, quotes round strings: all ROS 2's.
+    has_bounds: bool
+    has_defaults: bool
+    has_integer_prefixes: bool
+    has_quoted_strings: bool
+    # ROS 1's string constant takes the rest of the line, `#` included.
+    has_comments_behind_strings: bool
+    smallest_array: int
+
+    @property
+    def primitives(self) -> frozenset[str]:
+        """The words of every type that is neither a string nor a message."""
+        return frozenset({"bool", "float32", "float64"}) | frozenset(self.integer_ranges) | self.opaque_primitives
+
+
+def _integer_ranges(byte: tuple[int, int]) -> dict[str, tuple[int, int]]:
+    ranges = {"byte": byte, "char": (0, 255)}
+    for bits in (8, 16, 32, 64):
+        ranges[f"int{bits}"] = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+        ranges[f"uint{bits}"] = (0, 2**bits - 1)
+    return ranges
+
+
+_ANY_CASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_ANY_CASE_TEXT = "letters, digits and '_' and starts with a letter"
+_LOWER_SNAKE = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
+_LOWER_SNAKE_TEXT = "lower-case letters, digits and single '_' between them and starts with a letter"
+_UPPER_SNAKE = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
+_UPPER_SNAKE_TEXT = "upper-case letters, digits and single '_' between them and starts with a letter"
+# The suffixes are those of the messages that ROS 2 derives from services and actions.
+_UPPER_CAMEL = re.compile(
+    r"[A-Z][A-Za-z0-9]*(?:_(?:Request|Response|Event|Goal|Result|Feedback|FeedbackMessage|SendGoal|GetResult))*"
+)
+_UPPER_CAMEL_TEXT = "letters and digits and starts with a capital"
+
+ROS1 = Dialect(
+    ros=RosVersion.ROS1,
+    package_name=NameRule("package name", _ANY_CASE, _ANY_CASE_TEXT),
+    message_name=NameRule("message name", _ANY_CASE, _ANY_CASE_TEXT),
+    field_name=NameRule("field name", _ANY_CASE, _ANY_CASE_TEXT),
+    constant_name=NameRule("constant name", _ANY_CASE, _ANY_CASE_TEXT),
+    integer_ranges=_integer_ranges(byte=(-128, 127)),
+    opaque_primitives=frozenset({"time", "duration"}),
+    strings=frozenset({"string"}),
+    shorthands={"Header": MessageName("std_msgs", "Header")},
+    has_array_shorthands=False,
+    booleans={"True": True, "1": True, "False": False, "0": False},
+    has_bounds=False,
+    has_defaults=False,
+    has_integer_prefixes=False,
+    has_quoted_strings=False,
+    has_comments_behind_strings=False,
+    smallest_array=0,
+)
+
+ROS2 = Dialect(
+    ros=RosVersion.ROS2,
+    package_name=NameRule("package name", _LOWER_SNAKE, _LOWER_SNAKE_TEXT),
+    message_name=NameRule("message name", _UPPER_CAMEL, _UPPER_CAMEL_TEXT),
+    field_name=NameRule("field name", _LOWER_SNAKE, _LOWER_SNAKE_TEXT),
+    constant_name=NameRule("constant name", _UPPER_SNAKE, _UPPER_SNAKE_TEXT),
+    integer_ranges=_integer_ranges(byte=(0, 255)),
+    opaque_primitives=frozenset(),
+    strings=frozenset({"string", "wstring"}),
+    shorthands={
+        "time": MessageName("builtin_interfaces", "Time"),
+        "duration": MessageName("builtin_interfaces", "Duration"),
+    },
+    has_array_shorthands=True,
+    booleans={"true": True, "1": True, "false": False, "0": False},
+    has_bounds=True,
+    has_defaults=True,
+    has_integer_prefixes=True,
+    has_quoted_strings=True,
+    has_comments_behind_strings=True,
+    smallest_array=1,
+)
+
+
+def dialect_of(ros: RosVersion) -> Dialect:
+    """The rules of a version."""
+    return ROS1 if ros is RosVersion.ROS1 else ROS2

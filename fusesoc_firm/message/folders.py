@@ -1,0 +1,77 @@
+"""Where `.msg` files lie: in a package, in a workspace of packages, in a flat folder of packages, in an installed ROS."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+
+from fusesoc_firm.message.model import MessageName, RosVersion
+
+# What catkin, colcon and ament leave out; colcon puts one into `build`, `install` and `log` itself.
+_IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"})
+
+MessageFiles = dict[MessageName, list[Path]]
+
+
+def message_files(folder: Path) -> MessageFiles:
+    """Every `.msg` file below a folder by the name of its message; several files where a name is given more than once.
+
+    A file belongs to the package of the nearest `package.xml` above it. Without one, it belongs to the folder above
+    `msg/` or, in a flat layout, to the folder that it lies in. Folders that hide (`.git`) or carry an ignore marker
+    of a build tool are left out.
+    """
+    found: MessageFiles = {}
+    packages: dict[Path, str] = {}
+    for path in _walk(folder):
+        if path.parent not in packages:
+            packages[path.parent] = _package_name(path.parent, folder)
+        found.setdefault(MessageName(packages[path.parent], path.stem), []).append(path)
+    return found
+
+
+def environment_folders(ros: RosVersion, environment: Mapping[str, str]) -> list[Path]:
+    """The folders that a sourced ROS names, in its own order of precedence; missing ones are skipped, as ROS does."""
+    if ros is RosVersion.ROS1:
+        return [path for path in _entries(environment.get("ROS_PACKAGE_PATH", "")) if path.is_dir()]
+    prefixes = _entries(environment.get("AMENT_PREFIX_PATH", ""))
+    return [share for prefix in prefixes if (share := prefix / "share").is_dir()]
+
+
+def _entries(variable: str) -> list[Path]:
+    return [Path(entry) for entry in variable.split(os.pathsep) if entry]
+
+
+def _walk(folder: Path) -> Iterator[Path]:
+    """The `.msg` files in a fixed order. Links are followed, since workspaces are often made of them, but not in circles."""
+    seen: set[str] = set()
+    for parent, folders, files in os.walk(folder, followlinks=True):
+        real = os.path.realpath(parent)
+        if real in seen or (_IGNORE_MARKERS & set(files) and Path(parent) != folder):
+            folders.clear()
+            continue
+        seen.add(real)
+        folders[:] = sorted(name for name in folders if not name.startswith("."))
+        yield from (Path(parent, name) for name in sorted(files) if name.endswith(".msg"))
+
+
+def _package_name(parent: Path, folder: Path) -> str:
+    """The package of the files in `parent`; the search for `package.xml` ends at the folder that the user named."""
+    # A user may name the `msg` folder itself; its package is then still the folder above.
+    top = folder.resolve().parent if folder.resolve().name == "msg" else folder.resolve()
+    start = Path(os.path.abspath(parent))
+    for candidate in (start, *start.parents):
+        if name := _declared_name(candidate / "package.xml"):
+            return name
+        if candidate == top:
+            break
+    return start.parent.name if start.name == "msg" else start.name
+
+
+def _declared_name(manifest: Path) -> str:
+    """The `<name>` in a `package.xml`; empty if there is none, as in rosbuild's `manifest.xml` days."""
+    try:
+        return (ElementTree.parse(manifest).findtext("name") or "").strip()
+    except (OSError, ElementTree.ParseError):
+        return ""

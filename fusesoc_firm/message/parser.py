@@ -1,0 +1,256 @@
+r"""`.msg` text to Message: our own parser, because errors need line and column and rosbags' parser loses defaults.
+
+    line        = [ declaration ] [ "#" comment ]
+    declaration = type name [ default ]             a field; defaults: ROS 2
+                | primitive name "=" value          a constant; ROS 1: the value of a string takes the rest, "#" included
+    type        = element [ "[" [ [ "<=" ] size ] "]" ]
+    element     = primitive | string [ "<=" size ] | [ package "/" [ "msg/" ] ] message
+    default     = scalar | "[" [ scalar { "," scalar } ] "]"
+
+What is legal in which version stands in `dialect`. A line with "=" behind its first word is a constant, in both.
+Each line is read on its own, so one faulty line hides nothing in the next.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
+from fusesoc_firm.message.dialect import LARGEST_SIZE, Dialect, NameRule, dialect_of
+from fusesoc_firm.message.model import (
+    ArrayType,
+    Constant,
+    DefaultValue,
+    ElementType,
+    Field,
+    FieldType,
+    MessageDefinition,
+    MessageName,
+    MessageType,
+    PrimitiveType,
+    RosVersion,
+    SequenceType,
+    StringType,
+)
+from fusesoc_firm.message.piece import Piece, read_lines
+from fusesoc_firm.message.values import read_default, read_value
+
+_SEPARATOR = "---"
+_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:/msg)?/([A-Za-z][A-Za-z0-9_]*)")
+_TYPE = re.compile(r"([^\[\]]+)(?:\[([^\[\]]*)\])?")
+
+
+def parse_name(text: str) -> MessageName:
+    """`pkg/Type` or `pkg/msg/Type` to a name; raises `InputError` for anything else."""
+    match = _NAME.fullmatch(text.strip())
+    if match is None:
+        fail(f"'{text}' is no message name", hint="write 'package/Type', like 'geometry_msgs/Quaternion'")
+    return MessageName(*match.groups())
+
+
+def parse_message(
+    text: str, name: MessageName, ros: RosVersion, file: str, diagnostics: Diagnostics
+) -> MessageDefinition:
+    """The definition in the text of a `.msg` file; every fault goes to `diagnostics`, what is right to the result."""
+    return _parse_lines(read_lines(text, file), name, dialect_of(ros), file, diagnostics)
+
+
+def parse_sections(
+    text: str, names: Sequence[MessageName], ros: RosVersion, file: str, diagnostics: Diagnostics
+) -> list[MessageDefinition]:
+    """The definitions in a `.srv` or `.action` file, whose sections are parted by `---`: one for each of `names`."""
+    sections: list[list[Piece]] = [[]]
+    for line in read_lines(text, file):
+        if not line.text.startswith(_SEPARATOR):
+            sections[-1].append(line)
+        elif len(sections) < len(names):
+            sections.append([])
+        else:
+            diagnostics.error(f"more than the {len(names)} sections that belong here", line.source)
+    if len(sections) < len(names):
+        diagnostics.error(
+            f"{len(sections)} of {len(names)} sections found", SourceRef(file, 1, 1), f"'{_SEPARATOR}' parts sections"
+        )
+    return [
+        _parse_lines(section, name, dialect_of(ros), file, diagnostics)
+        for section, name in zip(sections, names, strict=False)
+    ]
+
+
+def service_names(name: MessageName, ros: RosVersion) -> tuple[MessageName, ...]:
+    """The names of a service's request and response, as the version calls them."""
+    return _derived_names(name, ros, ("Request", "Response"))
+
+
+def action_names(name: MessageName, ros: RosVersion) -> tuple[MessageName, ...]:
+    """The names of an action's goal, result and feedback, as the version calls them."""
+    return _derived_names(name, ros, ("Goal", "Result", "Feedback"))
+
+
+def _derived_names(name: MessageName, ros: RosVersion, suffixes: Iterable[str]) -> tuple[MessageName, ...]:
+    joint = "" if ros is RosVersion.ROS1 else "_"
+    return tuple(MessageName(name.package, f"{name.name}{joint}{suffix}") for suffix in suffixes)
+
+
+def _parse_lines(
+    lines: Iterable[Piece], name: MessageName, dialect: Dialect, file: str, diagnostics: Diagnostics
+) -> MessageDefinition:
+    source = SourceRef(file, 1, 1)
+    for rule, word in ((dialect.package_name, name.package), (dialect.message_name, name.name)):
+        if not rule.accepts(word):
+            diagnostics.error(f"'{word}' is no {rule.kind} of ROS {dialect.ros}", source, rule.hint)
+    reader = _Reader(name, dialect, diagnostics)
+    for line in lines:
+        reader.read(line)
+    return MessageDefinition(name, dialect.ros, tuple(reader.fields), tuple(reader.constants), source)
+
+
+class _Reader:
+    """Reads the lines of one message, notes every fault, and keeps the declarations that have none."""
+
+    def __init__(self, name: MessageName, dialect: Dialect, diagnostics: Diagnostics) -> None:
+        self.fields: list[Field] = []
+        self.constants: list[Constant] = []
+        self._package = name.package
+        self._dialect = dialect
+        self._diagnostics = diagnostics
+        self._first_line: dict[str, int] = {}
+
+    def read(self, line: Piece) -> None:
+        """Take in one line."""
+        code, _ = line.partition("#")
+        if not code.text:
+            return
+        kind, rest = code.split_word()
+        if not rest.text:
+            self._diagnostics.error(f"'{kind.text}' has no name behind it", kind.source, "a field is 'type name'")
+        elif "=" in rest.text:
+            self._read_constant(kind, rest, line)
+        else:
+            self._read_field(kind, rest)
+
+    def _read_field(self, kind: Piece, rest: Piece) -> None:
+        name, default = rest.split_word()
+        if name.text.startswith("["):
+            joined = f"{kind.text}{name.text}"
+            self._diagnostics.error("a blank before '['", name.source, f"the type is one word: '{joined}'")
+            return
+        field_type = self._type(kind)
+        is_named = self._check_name(name, self._dialect.field_name)
+        value = self._default(default, name, field_type) if default.text else None
+        is_whole = value is not None or not default.text
+        if field_type is not None and is_named and is_whole:
+            self.fields.append(Field(name.text, field_type, kind.source, value))
+
+    def _default(self, default: Piece, name: Piece, field_type: FieldType | None) -> DefaultValue | None:
+        if not self._dialect.has_defaults:
+            self._diagnostics.error(
+                f"unexpected '{default.text}' behind field '{name.text}'",
+                default.source,
+                f"ROS {self._dialect.ros} has no default values; a constant is 'type NAME=value'",
+            )
+            return None
+        return None if field_type is None else read_default(default, field_type, self._dialect, self._diagnostics)
+
+    def _read_constant(self, kind: Piece, rest: Piece, line: Piece) -> None:
+        name, value = rest.partition("=")
+        constant_type = self._constant_type(kind)
+        is_named = self._check_name(name, self._dialect.constant_name)
+        if constant_type is None:
+            return
+        if isinstance(constant_type, StringType) and not self._dialect.has_comments_behind_strings:
+            value = line.part(value.start).strip()
+        scalar = read_value(value, constant_type, self._dialect, self._diagnostics)
+        if scalar is not None and is_named:
+            self.constants.append(Constant(name.text, constant_type, scalar, kind.source))
+
+    def _constant_type(self, kind: Piece) -> PrimitiveType | StringType | None:
+        if kind.text in self._dialect.strings:
+            return StringType(kind.text == "wstring")
+        if kind.text in self._dialect.primitives - self._dialect.opaque_primitives:
+            return PrimitiveType(kind.text)
+        self._diagnostics.error(
+            f"'{kind.text}' is no type of a constant", kind.source, "a constant is a number, a bool or a string"
+        )
+        return None
+
+    def _check_name(self, name: Piece, rule: NameRule) -> bool:
+        if not rule.accepts(name.text):
+            shown = f"'{name.text}' is no {rule.kind} of ROS {self._dialect.ros}" if name.text else f"no {rule.kind}"
+            # A default such as `s "a=b"` ends up here: the reference takes the line for a constant, too.
+            hint = "a line with '=' is a constant: 'type NAME=value'" if " " in name.text else rule.hint
+            self._diagnostics.error(shown, name.source, hint)
+            return False
+        if first := self._first_line.get(name.text):
+            self._diagnostics.error(f"'{name.text}' is declared twice", name.source, f"first in line {first}")
+            return False
+        self._first_line[name.text] = name.line
+        return True
+
+    def _type(self, kind: Piece) -> FieldType | None:
+        match = _TYPE.fullmatch(kind.text)
+        if match is None:
+            forms = "'T', 'T[]', 'T[3]' or 'T[<=3]'" if self._dialect.has_bounds else "'T', 'T[]' or 'T[3]'"
+            self._diagnostics.error(f"'{kind.text}' is no type", kind.source, f"a type is {forms}")
+            return None
+        is_array = match[2] is not None
+        element = self._element(kind.part(*match.span(1)), is_array)
+        if not is_array:
+            return element
+        size = kind.part(*match.span(2))
+        if not size.text:
+            return SequenceType(element) if element else None
+        return self._sized_array(element, size)
+
+    def _sized_array(self, element: ElementType | None, size: Piece) -> FieldType | None:
+        if size.text.startswith("<="):
+            bound = self._bound(size)
+            return SequenceType(element, bound) if element and bound is not None else None
+        length = self._size(size, self._dialect.smallest_array)
+        return ArrayType(element, length) if element and length is not None else None
+
+    def _bound(self, piece: Piece) -> int | None:
+        """The number behind `<=`, with which `piece` starts."""
+        if not self._dialect.has_bounds:
+            self._diagnostics.error(f"a bound '{piece.text}'", piece.source, "bounds exist in ROS 2 only")
+            return None
+        return self._size(piece.part(2), smallest=1)
+
+    def _size(self, piece: Piece, smallest: int) -> int | None:
+        if piece.text.isascii() and piece.text.isdigit() and smallest <= int(piece.text) <= LARGEST_SIZE:
+            return int(piece.text)
+        hint = f"a size is a whole number from {smallest} to {LARGEST_SIZE}"
+        self._diagnostics.error(f"'{piece.text}' is no size", piece.source, hint)
+        return None
+
+    def _element(self, piece: Piece, is_array: bool) -> ElementType | None:
+        word, dialect = piece.text, self._dialect
+        if word in dialect.primitives:
+            return PrimitiveType(word)
+        if word in dialect.strings:
+            return StringType(word == "wstring")
+        if word in dialect.shorthands and (dialect.has_array_shorthands or not is_array):
+            return MessageType(dialect.shorthands[word])
+        base, _, _ = word.partition("<=")
+        if base != word and base in ("string", "wstring"):
+            size = self._bound(piece.part(len(base)))
+            return None if size is None else StringType(base == "wstring", size)
+        return self._message_type(piece)
+
+    def _message_type(self, piece: Piece) -> MessageType | None:
+        parts = piece.text.split("/")
+        if len(parts) == 3 and parts[1] == "msg" and self._dialect.ros is RosVersion.ROS2:
+            del parts[1]
+        package, name = (self._package, parts[0]) if len(parts) == 1 else (parts[0], "/".join(parts[1:]))
+        is_package = len(parts) == 1 or self._dialect.package_name.accepts(package)
+        if is_package and self._dialect.message_name.accepts(name):
+            return MessageType(MessageName(package, name))
+        known = self._dialect.primitives | self._dialect.strings
+        hint = nearest(piece.text, known) if len(parts) == 1 else self._message_hint(is_package)
+        self._diagnostics.error(f"'{piece.text}' is no type of ROS {self._dialect.ros}", piece.source, hint)
+        return None
+
+    def _message_hint(self, is_package: bool) -> str:
+        rule = self._dialect.message_name if is_package else self._dialect.package_name
+        return f"a message's type is 'package/Type'; {rule.hint}"

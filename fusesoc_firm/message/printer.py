@@ -1,0 +1,57 @@
+"""Message to `.msg` text: one canonical, aligned spelling, which the parser reads back as the same message."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fusesoc_firm.message.model import (
+    DefaultValue,
+    MessageDefinition,
+    RosVersion,
+    Scalar,
+)
+
+
+def to_text(definition: MessageDefinition) -> str:
+    """The definition as `.msg` text: constants first, then fields in wire order; a comment names the message and version.
+
+    Every value that the parser can deliver is written so that it reads back (ROS 2 has no way to write a `#`).
+    """
+    ros = definition.ros
+    constants = [(str(c.type), c.name, f"= {_constant(c.value, ros)}") for c in definition.constants]
+    fields = [(str(f.type), f.name, _default(f.default)) for f in definition.fields]
+    blocks = [[f"# {definition.name} (ROS {ros})"], _aligned(constants), _aligned(fields)]
+    return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
+
+
+def _aligned(rows: Sequence[tuple[str, str, str]]) -> list[str]:
+    widths = [max((len(row[column]) for row in rows), default=0) for column in (0, 1)]
+    return [f"{kind:{widths[0]}} {name:{widths[1]}} {value}".rstrip() for kind, name, value in rows]
+
+
+def _constant(value: Scalar, ros: RosVersion) -> str:
+    if ros is RosVersion.ROS1:
+        return str(value)  # `True`; a string stands as it is up to the end of the line
+    return _scalar(value)
+
+
+def _default(value: DefaultValue | None) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, tuple):
+        return f"[{', '.join(_element(element) for element in value)}]"
+    return _scalar(value)
+
+
+def _element(value: Scalar) -> str:
+    # Within an array `\"` never closes a string, so one that ends in `\` stands without quotes.
+    return value if isinstance(value, str) and value.endswith("\\") else _scalar(value)
+
+
+def _scalar(value: Scalar) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        quoted = value.replace('"', '\\"')
+        return f'"{quoted}"'
+    return str(value)

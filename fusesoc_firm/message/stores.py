@@ -1,0 +1,60 @@
+"""The definitions that rosbags ships: those of every ROS distribution, so that common messages need no ROS installed."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+from fusesoc_firm.diagnostics import fail, nearest
+from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.parser import parse_name
+
+# The newest distributions with long-term support that FIRM's round trips are tested against.
+_DEFAULTS = {RosVersion.ROS1: "noetic", RosVersion.ROS2: "jazzy"}
+# rosbags parts a message's own text from those of its nested types by this line.
+_NEXT_DEFINITION = "=" * 80
+
+
+def distributions(ros: RosVersion) -> list[str]:
+    """The names of the distributions of a version, such as `jazzy`."""
+    return sorted(store.value.removeprefix(_prefix(ros)) for store in Stores if store.value.startswith(_prefix(ros)))
+
+
+def _prefix(ros: RosVersion) -> str:
+    return f"ros{int(ros)}_"
+
+
+class DistributionStore:
+    """The definitions of one distribution. Its texts come from rosbags' tables: names, types, bounds and constants are
+    the distribution's, but comments and default values are lost and ROS 1's `Header` is written in full."""
+
+    def __init__(self, ros: RosVersion, distribution: str | None = None) -> None:
+        """`distribution` is one of `distributions(ros)`; None takes the default. Raises `InputError` for another."""
+        chosen = _DEFAULTS[ros] if distribution is None else distribution
+        if chosen not in distributions(ros):
+            fail(f"'{chosen}' is no distribution of ROS {ros}", hint=nearest(chosen, distributions(ros)))
+        self._ros = ros
+        self.title = f"rosbags {_prefix(ros)}{chosen}"
+        self._name = f"{_prefix(ros)}{chosen}"
+
+    @cached_property
+    def _typestore(self) -> Typestore:
+        return get_typestore(Stores(self._name))
+
+    @cached_property
+    def names(self) -> frozenset[MessageName]:
+        """All messages of the distribution."""
+        names = (parse_name(name) for name in self._typestore.fielddefs)
+        # rosbags keeps ROS 1's primitives `time` and `duration` as messages of ROS 2.
+        return frozenset(name for name in names if self._ros is RosVersion.ROS2 or name.package != "builtin_interfaces")
+
+    def text(self, name: MessageName) -> str:
+        """The definition of one of `names` as `.msg` text."""
+        text, _ = self._typestore.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=int(self._ros))
+        return text.partition(_NEXT_DEFINITION)[0]
+
+    def file(self, name: MessageName) -> str:
+        """What stands for a file's name in errors."""
+        return f"<{self.title}>/{name}"
