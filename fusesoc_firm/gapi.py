@@ -52,18 +52,26 @@ def _generate_converters(request: Request) -> GeneratedCore:
 
 
 def _system_inputs(request: Request) -> list[Path]:
+    from fusesoc_firm.host import simulation
     from fusesoc_firm.system import generator
 
-    return generator.inputs(request)
+    return simulation.inputs(request) if _is_simulation(request) else generator.inputs(request)
 
 
 def _generate_system(request: Request) -> GeneratedCore:
+    from fusesoc_firm.host import simulation
     from fusesoc_firm.system import generator
 
-    return generator.generate(request)
+    return simulation.generate(request) if _is_simulation(request) else generator.generate(request)
+
+
+def _is_simulation(request: Request) -> bool:
+    return request.parameters["product"] == "simulation"
 
 
 _PATHS = Parameter("paths", "list", "folders with message definitions, relative to the core")
+
+_DISTRO = Parameter("distro", "str", "the ROS distribution whose standard messages are meant")
 
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
@@ -73,7 +81,7 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
             Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
             _PATHS,
-            Parameter("distro", "str", "the ROS distribution whose standard messages are meant"),
+            _DISTRO,
         ),
         _converter_inputs,
         _generate_converters,
@@ -87,6 +95,7 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
             _PATHS,
+            _DISTRO,
         ),
         _system_inputs,
         _generate_system,

@@ -16,6 +16,7 @@ import fcntl
 import hashlib
 import json
 import os
+import platform
 import shutil
 import sys
 import tempfile
@@ -119,6 +120,8 @@ def store_key(request: Mapping[str, object], inputs: Mapping[str, bytes | None])
         "code": package_digest(),
         "versions": {name: version(name) for name in _IMPORTED},
         "python": sys.version_info[:2],
+        # What a compiler made of an accelerator runs on one kind of machine only.
+        "machine": platform.machine(),
     }
     return _digest(json.dumps(parts, sort_keys=True).encode())
 

@@ -158,7 +158,7 @@ def _bits(low: int, piece: Slice) -> str:
 def _target(piece: Slice) -> str:
     """The port, or the part of it that the piece is."""
     port = piece.port
-    if port.width is None or piece.width == port.width and not _is_bit(piece):
+    if port.width is None or (piece.width == port.width and not _is_bit(piece)):
         return port.name
     return f"{port.name}{_bits(piece.low, piece)}"
 

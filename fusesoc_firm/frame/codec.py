@@ -45,9 +45,7 @@ def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
         raise CodecError(f"unknown encoding {checked.hex()} of {frame.message}")
     message: dict[str, Any] = {}
     for field in frame.fields:
-        values = (
-            struct.unpack_from(f"<{field.type.code}", payload, offset)[0] for offset in field.offsets
-        )
+        values = (struct.unpack_from(f"<{field.type.code}", payload, offset)[0] for offset in field.offsets)
         _scatter(message, field.path, values)
     return message
 

@@ -15,7 +15,16 @@ from fusesoc_firm.system.hls import KERNEL_TEMPLATE, SHIM_TEMPLATE, function_nam
 _COMPILER = "g++"
 # Results must not depend on the processor (no contraction to fused operations), nor the file on its build (no
 # build id, no symbols that name temporary files).
-_FLAGS = ("-std=c++17", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-s", "-Wl,--build-id=none", "-Wno-unknown-pragmas")
+_FLAGS = (
+    "-std=c++17",
+    "-O2",
+    "-ffp-contract=off",
+    "-fPIC",
+    "-shared",
+    "-s",
+    "-Wl,--build-id=none",
+    "-Wno-unknown-pragmas",
+)
 _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
 
 
@@ -37,7 +46,16 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary)
         (place / "kernel.cpp").write_text(shim, encoding="utf-8")
-        command = [_COMPILER, *_FLAGS, "-I", str((folder / first).resolve().parent), "kernel.cpp", *units, "-o", "kernel.so"]
+        command = [
+            _COMPILER,
+            *_FLAGS,
+            "-I",
+            str((folder / first).resolve().parent),
+            "kernel.cpp",
+            *units,
+            "-o",
+            "kernel.so",
+        ]
         try:
             result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
         except FileNotFoundError:

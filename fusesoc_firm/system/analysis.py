@@ -216,7 +216,9 @@ class _Analysis:
                 taken[outgoing.name, frame] += 1
                 if sink in driven:
                     first = driven[sink].name.source
-                    self.faults.error(f"'{outgoing.name}' takes one message, and has it from {first}", outgoing.name.source)
+                    self.faults.error(
+                        f"'{outgoing.name}' takes one message, and has it from {first}", outgoing.name.source
+                    )
                     continue
                 driven[sink] = outgoing
                 frames[source] = frame

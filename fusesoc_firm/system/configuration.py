@@ -146,9 +146,7 @@ class _SignalNames:
         labels = {f"u_{identifier(block)}" for block, _ in _blocks(system)}
         keys = [*ports, *forks]
         reserved = {*_TAKEN, system.entity, *entities, *labels}
-        self._names: Mapping[tuple[str, str], str] = dict(
-            zip(keys, distinct_identifiers(keys, reserved), strict=True)
-        )
+        self._names: Mapping[tuple[str, str], str] = dict(zip(keys, distinct_identifiers(keys, reserved), strict=True))
 
     def __call__(self, block: str, port: str) -> str:
         return self._names[block, port]
@@ -246,7 +244,9 @@ def _connection(names: _SignalNames, connection: Connection) -> Configuration:
     pairs: list[tuple[str, str]] = []
     for number, sink in enumerate(sinks):
         pairs += [(names.at(sink, port.name), names.at(source, port.name)) for port in fields]
-        valid = f"{names.at(source, 'fork_valid')}({number})" if is_forked else f"{names.at(source, 'segment_valid')}(0)"
+        valid = (
+            f"{names.at(source, 'fork_valid')}({number})" if is_forked else f"{names.at(source, 'segment_valid')}(0)"
+        )
         pairs.append((f"{names.at(sink, 'segment_valid')}(0)", valid))
         if sink.prefix:
             pairs.append((names.at(sink, "msg_valid"), valid))
@@ -272,4 +272,3 @@ def _fork(names: _SignalNames, source: End, count: int) -> Configuration:
         "source_valid": f"{names.at(source, 'segment_valid')}(0)",
         "source_ready": names.at(source, "msg_ready"),
     }
-
