@@ -28,8 +28,7 @@ def _prefix(ros: RosVersion) -> str:
 
 class DistributionStore:
     """The definitions of one distribution. Its texts come from rosbags' tables: names, types, bounds and constants are
-    the distribution's, but comments and default values are lost and ROS 1's `Header` is written in full.
-    """
+    the distribution's, but comments and default values are lost and ROS 1's `Header` is written in full."""
 
     def __init__(self, ros: RosVersion, distribution: str | None = None) -> None:
         """`distribution` is one of `distributions(ros)`; None takes the default. Raises `InputError` for another."""
