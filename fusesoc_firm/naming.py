@@ -45,7 +45,10 @@ _UNDERSCORES = re.compile(r"_{2,}")
 
 
 def identifier(*parts: str) -> str:
-    """One legal identifier of the parts joined with `_`: no `__`, no `_` or digit in front, no `_` behind, no keyword."""
+    """One legal identifier of the parts joined with `_`.
+
+    It has no `__`, no `_` at its ends and no digit in front, and is no keyword of VHDL or Verilog.
+    """
     joined = _UNDERSCORES.sub("_", _ILLEGAL.sub("_", "_".join(parts))).strip("_")
     if not joined or joined[0].isdigit():
         joined = f"n{joined}"

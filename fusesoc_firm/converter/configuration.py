@@ -23,10 +23,12 @@ WIDTHS = (8,)
 
 
 def subscriber_entity(frame: Frame) -> str:
+    """The entity, and file, that turns frames into messages."""
     return f"axis_to_{entity_name(frame.message.package, frame.message.name)}"
 
 
 def publisher_entity(frame: Frame) -> str:
+    """The entity, and file, that turns messages into frames."""
     return f"{entity_name(frame.message.package, frame.message.name)}_to_axis"
 
 

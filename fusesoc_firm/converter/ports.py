@@ -29,6 +29,7 @@ class FieldPort:
 
     @property
     def vhdl_type(self) -> str:
+        """The port's type."""
         return vhdl_type(self.width)
 
     @property

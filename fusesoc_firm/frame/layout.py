@@ -97,9 +97,9 @@ class _Walk:
 
     def variable(self, member: Field, path: tuple[Step, ...]) -> None:
         self.diagnostics.error(
-            f"field '{'.'.join([step.name for step in path] + [member.name])}' of type '{member.type}' has no fixed size",
+            f"field '{'.'.join([*(step.name for step in path), member.name])}' of type '{member.type}' has no fixed size",
             _known(member.source),
-            "converters are made for messages of fixed size: numbers, time, duration, fixed arrays and messages of these",
+            "converters are made for messages of fixed size: numbers, time, duration, fixed arrays, messages of these",
         )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import prod
+from typing import Any
 
 from fusesoc_firm.message.model import MessageName, RosVersion
 
@@ -60,10 +61,12 @@ class FrameField:
 
     @property
     def names(self) -> tuple[str, ...]:
+        """The path without its arrays."""
         return tuple(step.name for step in self.path)
 
     @property
     def is_array(self) -> bool:
+        """Whether an array lies anywhere on the path."""
         return any(step.count is not None for step in self.path)
 
     @property
@@ -98,3 +101,22 @@ class Frame:
     def frame_bytes(self) -> int:
         """Bytes of the whole frame, id and length included."""
         return ID_BYTES + LENGTH_BYTES + self.payload_bytes
+
+    def description(self) -> dict[str, Any]:
+        """The frame as plain data, for people and other programs."""
+        return {
+            "message": str(self.message),
+            "ros": int(self.ros),
+            "payload_bytes": self.payload_bytes,
+            "prefix": self.prefix.hex(),
+            "trailing_bytes": self.trailing_bytes,
+            "fields": [
+                {
+                    "path": ".".join(field.names),
+                    "type": field.type.name,
+                    "count": field.count if field.is_array else None,
+                    "runs": [{"offset": run.offset, "count": run.count} for run in field.runs],
+                }
+                for field in self.fields
+            ],
+        }

@@ -26,7 +26,7 @@ Respond = Callable[[str, dict[str, Any]], list[tuple[str, dict[str, Any]]]]
 
 @dataclass(frozen=True)
 class Response:
-    """A message that the system must send: its publisher, payload and value, and the stimulus (from 0) that causes it."""
+    """A message that the system must send; `cause` is the number, from 0, of the stimulus that it answers."""
 
     publisher: Converter
     payload: bytes
@@ -35,7 +35,7 @@ class Response:
 
 
 def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Converter]) -> list[Response]:
-    """What the model in `path` answers to all stimuli. Raises `InputError`, also for what goes wrong inside the model."""
+    """What the model in `path` answers to all stimuli. Raises `InputError`, also for a fault within the model."""
     respond = _load(path)
     known = {publisher.block: publisher for publisher in publishers}
     found: list[Response] = []

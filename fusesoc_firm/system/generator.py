@@ -58,6 +58,7 @@ def load_requested(request: Request) -> LoadedSystem:
 
 
 def specification_path(request: Request) -> Path:
+    """The specification that a generator call names."""
     return request.files_root / str(request.parameters["spec"])
 
 

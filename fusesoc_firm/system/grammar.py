@@ -60,79 +60,94 @@ def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
 
 
 def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics, what: str) -> S | None:
-    """The section that a node holds, or None if a required key is missing or the node is no mapping.
+    """The section that a node of `file` holds, or None, with the faults noted, if too much of it is wrong.
 
     `what` names the section in messages: "a block".
     """
-    if not isinstance(node, yaml.MappingNode):
-        faults.error(f"{what} must be a mapping of keys to values, not {_kind(node)}", file.source(node))
+    return _Reader(file, faults).section(section, node, what)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads the nodes of one file; whatever does not fit is noted, and read as None or left out."""
+
+    file: YamlText
+    faults: Diagnostics
+
+    def section(self, section: type[S], node: yaml.Node, what: str) -> S | None:
+        """A section with all keys that could be read; None without its required ones."""
+        if not isinstance(node, yaml.MappingNode):
+            self._error(f"{what} must be a mapping of keys to values, not {_kind(node)}", node)
+            return None
+        known = keys_of(section)
+        given = self._given(known, node, what)
+        for name, (_, entry) in known.items():
+            if entry.is_required and name not in given:
+                self._error(f"{what} needs the key '{name}': {entry.meaning}", node)
+        values = {known[name][0]: self._value(known[name][1], value, name) for name, value in given.items()}
+        found = {field: value for field, value in values.items() if value is not None}
+        is_whole = all(field in found for field, entry in known.values() if entry.is_required)
+        return section(source=self.file.source(node), **found) if is_whole else None
+
+    def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
+        """The nodes of the known keys that were given a value, by the key's own name."""
+        spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
+        given: dict[str, yaml.Node] = {}
+        for text, key_node, value in items(self.file, node, self.faults):
+            name = spellings.get(text)
+            if name is None:
+                self._error(f"{what} has no key '{text}'", key_node, nearest(text, known))
+            elif name in given:
+                self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
+            elif known[name][1].is_required or not is_null(value):
+                given[name] = value
+        return given
+
+    def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
+        """The value of a key in its form, or None if it does not fit."""
+        match entry.form:
+            case "section":
+                return self.section(_section_type(entry), node, f"'{name}'")
+            case "sections":
+                return self._sections(entry, node, name)
+            case "texts":
+                nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
+                texts = [self._text(item, name) for item in nodes]
+                return None if None in texts else tuple(texts)
+            case "integer":
+                return self._chosen(entry, self._integer(node, name), node, name)
+            case _:
+                return self._chosen(entry, self._text(node, name), node, name)
+
+    def _sections(self, entry: Key, node: yaml.Node, name: str) -> tuple[Section, ...] | None:
+        if not isinstance(node, yaml.SequenceNode):
+            self._error(f"'{name}' must be a list, one '- ' an item, not {_kind(node)}", node)
+            return None
+        found = [self.section(_section_type(entry), item, f"an item of '{name}'") for item in node.value]
+        return tuple(item for item in found if item is not None)
+
+    def _text(self, node: yaml.Node, name: str) -> Text | None:
+        if isinstance(node, yaml.ScalarNode) and node.value and not is_null(node):
+            return self.file.text(node)
+        self._error(f"'{name}' must be a word, not {_kind(node)}", node)
         return None
-    known = keys_of(section)
-    spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
-    found: dict[str, Any] = {}
-    for text, key_node, value in items(file, node, faults):
-        if text not in spellings:
-            faults.error(f"{what} has no key '{text}'", file.source(key_node), nearest(text, known))
-            continue
-        field, entry = known[spellings[text]]
-        if not (is_null(value) and not entry.is_required):
-            found[field] = _value(entry, value, file, faults, text)
-    missing = [name for name, (field, entry) in known.items() if entry.is_required and field not in found]
-    for name in missing:
-        faults.error(f"{what} needs the key '{name}': {known[name][1].meaning}", file.source(node))
-    invalid = [name for name, (field, entry) in known.items() if entry.is_required and found.get(field, 0) is None]
-    if missing or invalid:
+
+    def _integer(self, node: yaml.Node, name: str) -> int | None:
+        if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
+            return int(yaml.safe_load(node.value))
+        self._error(f"'{name}' must be an integer, not {_kind(node)}", node)
         return None
-    return section(source=file.source(node), **{field: value for field, value in found.items() if value is not None})
 
+    def _chosen(self, entry: Key, value: Any, node: yaml.Node, name: str) -> Any:
+        if value is None or not entry.choices or value in entry.choices:
+            return value
+        choices = [str(choice) for choice in entry.choices]
+        hint = nearest(str(value), choices) if isinstance(value, str) else f"legal here: {', '.join(choices)}"
+        self._error(f"'{name}' cannot be '{value}'", node, hint)
+        return None
 
-def _value(entry: Key, node: yaml.Node, file: YamlText, faults: Diagnostics, name: str) -> Any:
-    """The value of a key in its form, or None if it does not fit."""
-    match entry.form:
-        case "section":
-            return read(_section_type(entry), node, file, faults, f"'{name}'")
-        case "sections":
-            return _sections(entry, node, file, faults, name)
-        case "texts":
-            nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
-            texts = [_text(item, file, faults, name) for item in nodes]
-            return tuple(text for text in texts if text is not None)
-        case "integer":
-            return _chosen(entry, _integer(node, file, faults, name), node, file, faults, name)
-        case _:
-            return _chosen(entry, _text(node, file, faults, name), node, file, faults, name)
-
-
-def _sections(entry: Key, node: yaml.Node, file: YamlText, faults: Diagnostics, name: str) -> tuple[Section, ...]:
-    if not isinstance(node, yaml.SequenceNode):
-        faults.error(f"'{name}' must be a list, one '- ' an item, not {_kind(node)}", file.source(node))
-        return ()
-    singular = f"an item of '{name}'"
-    read_items = [read(_section_type(entry), item, file, faults, singular) for item in node.value]
-    return tuple(item for item in read_items if item is not None)
-
-
-def _text(node: yaml.Node, file: YamlText, faults: Diagnostics, name: str) -> Text | None:
-    if isinstance(node, yaml.ScalarNode) and node.value and not is_null(node):
-        return file.text(node)
-    faults.error(f"'{name}' must be a word, not {_kind(node)}", file.source(node))
-    return None
-
-
-def _integer(node: yaml.Node, file: YamlText, faults: Diagnostics, name: str) -> int | None:
-    if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
-        return int(yaml.safe_load(node.value))
-    faults.error(f"'{name}' must be an integer, not {_kind(node)}", file.source(node))
-    return None
-
-
-def _chosen(entry: Key, value: Any, node: yaml.Node, file: YamlText, faults: Diagnostics, name: str) -> Any:
-    if value is None or not entry.choices or value in entry.choices:
-        return value
-    choices = [str(choice) for choice in entry.choices]
-    hint = nearest(str(value), choices) if isinstance(value, str) else f"legal here: {', '.join(choices)}"
-    faults.error(f"'{name}' cannot be '{value}'", file.source(node), hint)
-    return None
+    def _error(self, message: str, node: yaml.Node, hint: str = "") -> None:
+        self.faults.error(message, self.file.source(node), hint)
 
 
 def _section_type(entry: Key) -> type[Section]:

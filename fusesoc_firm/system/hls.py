@@ -42,7 +42,10 @@ _AP_PORTS = ("ap_clk", "ap_rst", "ap_start", "ap_done", "ap_idle", "ap_ready")
 
 @dataclass(frozen=True)
 class Argument:
-    """A parameter of the C++ function: `port` is the kernel's, `signal` the accelerator's; `word` is its first of 32 bits."""
+    """A parameter of the C++ function.
+
+    `port` is the kernel's, `signal` the accelerator's; `word` is the first of the words of 32 bits that carry it.
+    """
 
     port: str
     signal: str
@@ -51,10 +54,12 @@ class Argument:
 
     @property
     def bits(self) -> int:
+        """Bits of the kernel's port."""
         return self.field.width or 1
 
     @property
     def words(self) -> int:
+        """Words of 32 bits that carry it."""
         return -(-self.bits // _WORD_BITS)
 
 
@@ -104,6 +109,7 @@ def _scalar_fields(accelerator: AcceleratorType, side: MessageSide) -> Iterator[
 
 
 def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
+    """The configuration of the wrapper that gives the kernel the message sides of an accelerator."""
     inputs, outputs = arguments(accelerator)
     ports = accelerator_ports(accelerator)
     names = [f"{prefix}{port.name}" for prefix, port in ports]

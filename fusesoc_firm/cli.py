@@ -1,0 +1,213 @@
+"""The door for people: the command `firm`."""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from fusesoc_firm import __version__
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.library_path import library_root
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.library import MessageLibrary
+    from fusesoc_firm.message.model import MessageDefinition, MessageName
+
+STAGES = ("tree", "message", "frame", "config", "vhdl")
+
+Handler = Callable[[argparse.Namespace], None]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `firm`; the exit status is 1 for faults in the input, 2 for a wrong command line."""
+    arguments = _parser().parse_args(argv)
+    try:
+        arguments.handler(arguments)
+        sys.stdout.flush()
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # Whoever read the output (`| head`) has seen enough. Nothing may be flushed into the closed pipe at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="firm", description="ROS messages and robot systems as FPGA hardware.")
+    parser.add_argument("--version", action="version", version=f"firm {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _command(
+        commands,
+        "path",
+        "print the folder of the FuseSoC library",
+        'fusesoc library add firm "$(firm path)"',
+        _print_path,
+    )
+    _add_message(commands)
+    _add_system(commands)
+    return parser
+
+
+def _command(
+    commands: Any, name: str, text: str, example: str, handler: Handler | None = None
+) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=text,
+        description=f"{text[0].upper()}{text[1:]}.",
+        epilog=f"example: {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    if handler:
+        parser.set_defaults(handler=handler)
+    return parser
+
+
+def _add_message(commands: Any) -> None:
+    message = _command(commands, "message", "look at message definitions", "firm message show geometry_msgs/Pose")
+    actions = message.add_subparsers(title="actions", metavar="ACTION", required=True)
+    listing = _command(actions, "list", "list the known messages", "firm message list 'sensor_msgs/*'", _list_messages)
+    listing.add_argument("pattern", nargs="?", default="*", help="only names like this one, with * and ?")
+    show = _command(
+        actions,
+        "show",
+        "print a message in any stage of its way to hardware",
+        "firm message show geometry_msgs/Quaternion --ros 1 --stage vhdl",
+        _show_message,
+    )
+    show.add_argument("type", metavar="TYPE", help="the message's type, such as geometry_msgs/Quaternion")
+    show.add_argument("--stage", choices=STAGES, default="tree", help="what to print (default: tree)")
+    show.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
+    for parser in (listing, show):
+        _add_definitions(parser)
+
+
+def _add_system(commands: Any) -> None:
+    system = _command(commands, "system", "look at system specifications", "firm system check robot.yaml")
+    actions = system.add_subparsers(title="actions", metavar="ACTION", required=True)
+    check = _command(
+        actions, "check", "report all faults of a specification", "firm system check robot.yaml", _check_system
+    )
+    show = _command(
+        actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
+    )
+    for parser in (check, show):
+        parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+        _add_sources(parser)
+
+
+def _add_definitions(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--ros", type=int, choices=(1, 2), default=2, help="the ROS version (default: 2)")
+    _add_sources(parser)
+
+
+def _add_sources(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--path",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="a folder with message definitions; may be given more than once",
+    )
+    parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
+
+
+def _print_path(_: argparse.Namespace) -> None:
+    print(library_root())
+
+
+def _library(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
+    from fusesoc_firm.message.library import MessageLibrary
+    from fusesoc_firm.message.model import RosVersion
+
+    return MessageLibrary(RosVersion(ros), arguments.path, environment=os.environ, store=arguments.distro)
+
+
+def _list_messages(arguments: argparse.Namespace) -> None:
+    library = _library(arguments, arguments.ros)
+    names = [name for name in library.names() if fnmatch.fnmatchcase(str(name), arguments.pattern)]
+    width = max((len(str(name)) for name in names), default=0)
+    for name in names:
+        print(f"{name!s:{width}}  {library.origin(name)}")
+
+
+def _show_message(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.message.parser import parse_name
+
+    name = parse_name(arguments.type)
+    definitions = _library(arguments, arguments.ros).closure(name)
+    print(_stage(arguments.stage, name, definitions, arguments.width).rstrip("\n"))
+
+
+def _stage(stage: str, name: MessageName, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
+    """The text of a message in one of `STAGES`."""
+    from fusesoc_firm.frame import tree
+    from fusesoc_firm.frame.layout import frame_of
+    from fusesoc_firm.message.printer import to_text
+
+    if stage == "message":
+        return to_text(definitions[name])
+    if stage == "tree":
+        try:
+            frame = frame_of(name, definitions)
+        except InputError:
+            return tree.text(tree.rows(name, definitions, None))
+        return tree.text(tree.rows(name, definitions, frame))
+    frame = frame_of(name, definitions)
+    return _yaml(frame.description()) if stage == "frame" else _converters(stage, frame, width)
+
+
+def _converters(stage: str, frame: Any, width: int) -> str:
+    """Configuration or VHDL of both converters."""
+    from fusesoc_firm.converter import configuration as converter
+    from fusesoc_firm.render import render
+
+    made = {
+        converter.SUBSCRIBER_TEMPLATE: converter.subscriber_configuration(frame, width),
+        converter.PUBLISHER_TEMPLATE: converter.publisher_configuration(frame, width),
+    }
+    if stage == "config":
+        return "---\n".join(_yaml(configuration) for configuration in made.values())
+    return "\n".join(render(template, configuration) for template, configuration in made.items())
+
+
+def _check_system(arguments: argparse.Namespace) -> None:
+    system = _load(arguments)
+    counts = [
+        (len(system.subscribers), "subscriber"),
+        (len(system.accelerators), "accelerator"),
+        (len(system.publishers), "publisher"),
+    ]
+    words = ", ".join(f"{count} {word}{'' if count == 1 else 's'}" for count, word in counts)
+    print(f"{arguments.spec}: {system.name} is right: {words}")
+
+
+def _show_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.show import derived_description
+
+    print(_yaml(derived_description(_load(arguments))), end="")
+
+
+def _load(arguments: argparse.Namespace) -> Any:
+    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.system.generator import load_system
+
+    return load_system(arguments.spec, {ros: _library(arguments, ros) for ros in RosVersion}).system
+
+
+def _yaml(data: dict[str, Any]) -> str:
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
