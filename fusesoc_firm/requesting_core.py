@@ -11,15 +11,15 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.diagnostics import SourceRef
+from fusesoc_firm.diagnostics import InputError, SourceRef
+from fusesoc_firm.yaml_text import YamlText, read_yaml
 
 
 @dataclass(frozen=True)
 class RequestingCore:
     """The entry under `generate` that asks for a core; `key` and `value` are None where it was not found."""
 
-    file: str = ""
-    lines: tuple[str, ...] = ()
+    text: YamlText | None = None
     entry: tuple[yaml.Node, yaml.Node] | None = None
 
     def instance(self) -> SourceRef | None:
@@ -40,23 +40,19 @@ class RequestingCore:
         parameters = _item(self.entry[1], "parameters") if self.entry else None
         return _item(parameters[1], name) if parameters else None
 
-    def _reference(self, node: yaml.Node) -> SourceRef:
-        start, end = node.start_mark, node.end_mark
-        text = self.lines[start.line]
-        last = end.column if end.line == start.line else len(text)
-        return SourceRef(self.file, start.line + 1, start.column + 1, text, max(1, last - start.column))
+    def _reference(self, node: yaml.Node) -> SourceRef | None:
+        return self.text.source(node) if self.text else None
 
 
 def find_requesting_core(folder: Path, new_core: str) -> RequestingCore:
     """Find the core in `folder` whose generator instance makes the core of this name (`<core>-<instance>`)."""
     for path in sorted(folder.glob("*.core")):
         try:
-            text = path.read_text(encoding="utf-8")
-            root = yaml.compose(text, Loader=yaml.SafeLoader)
-        except (OSError, UnicodeDecodeError, yaml.YAMLError):
+            text = read_yaml(path)
+        except InputError:
             continue
-        if entry := _entry(root, new_core):
-            return RequestingCore(str(path), tuple(text.splitlines()), entry)
+        if entry := _entry(text.root, new_core):
+            return RequestingCore(text, entry)
     return RequestingCore()
 
 

@@ -15,7 +15,7 @@ _MESSAGE = _WORDS | {"message"}
 _FRAME = _MESSAGE | {"frame"}
 # What every stage that makes files may use: it knows no stage.
 _WRITING = {"generation", "render"}
-_CONVERTER = _FRAME | _WRITING | {"converter"}
+_CONVERTER = _FRAME | _WRITING | {"converter", "yaml_text"}
 _SYSTEM = _CONVERTER | {"system"}
 
 # Each room, and the rooms that it may import from beside itself.
@@ -32,8 +32,9 @@ ALLOWED: dict[str, set[str]] = {
     "render": set(),
     "store": set(),
     "library_path": set(),
+    "yaml_text": {"diagnostics"},
     "generation": set(),
-    "requesting_core": {"diagnostics"},
+    "requesting_core": {"diagnostics", "yaml_text"},
     "parameters": {"diagnostics", "generation", "requesting_core"},
 }
 # The doors join the stages; __init__ holds the version.

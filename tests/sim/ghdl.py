@@ -61,7 +61,7 @@ class Library:
         options: Sequence[str] = (),
         timeout: float = 120,
     ) -> RunResult:
-        """Simulate `entity`; its files are relative to `directory` (default: the library's). `timeout` is in seconds."""
+        """Simulate `entity`; its files are relative to `directory` (default: the library's); `timeout` in seconds."""
         command = ["ghdl", "-r", *self._options(), entity, *_generic_options(generics), *options]
         process = subprocess.run(
             command,

@@ -150,5 +150,5 @@ def test_illegal_generics_are_named(library: Library, entity: str, generics: dic
 def test_a_fault_in_a_source_is_reported(tmp_path: Path) -> None:
     source = tmp_path / "broken.vhd"
     source.write_text("entity broken is\n", encoding="ascii")
-    with pytest.raises(GhdlError, match="broken.vhd:2"):
+    with pytest.raises(GhdlError, match=r"broken\.vhd:2"):
         Library("work", tmp_path).analyse([source])

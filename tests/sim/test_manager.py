@@ -73,7 +73,7 @@ def test_no_cycle_is_lost_without_stalls(library: Library, tmp_path: Path, chann
 
 
 def test_256_channels_work(library: Library, tmp_path: Path) -> None:
-    frames = [Frame(id, bytes([id, 255 - id])) for id in range(256)]
+    frames = [Frame(number, bytes([number, 255 - number])) for number in range(256)]
     _write_files(tmp_path, frames, 256, 256)
     generics = {"SUBSCRIBERS": 256, "PUBLISHERS": 256, "STALL_PERCENT": 20, "SEED": SEED}
     result = library.run(BENCH, generics, directory=tmp_path)
