@@ -153,10 +153,17 @@ class _Analysis:
         try:
             name = parse_name(message)
             library.get(name, message.source)
-            return frame_of(name, library.closure(name))
+            definitions = library.closure(name)
         except InputError as error:
             for fault in error.diagnostics:
                 self.faults.error(fault.message, fault.source or message.source, fault.hint)
+            return None
+        try:
+            return frame_of(name, definitions)
+        except InputError as error:
+            reasons = "; ".join(fault.message for fault in error.diagnostics)
+            hint = error.diagnostics[0].hint
+            self.faults.error(f"{name} cannot be converted: {reasons}", message.source, hint)
             return None
 
     # --- blocks ------------------------------------------------------------------------------------------------
@@ -192,7 +199,7 @@ class _Analysis:
         if missing:
             # What is wrong with a block that could not be read is noted already.
             if block.is_sound:
-                words = " and ".join(f"'{key}'" for key in missing)
+                words = ", ".join(f"'{key}'" for key in missing)
                 hint = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, hint)
             return
@@ -206,8 +213,9 @@ class _Analysis:
     def _check_count(self, mode: str) -> None:
         blocks = self.specification.blocks
         found = [block for block in blocks if block.type is None and block.mode == mode]
-        if not found and blocks and all(block.is_sound for block in blocks):
-            self.faults.error(f"the system has no {mode}; it needs at least one", blocks[0].source)
+        are_known = blocks and all(block.is_sound and (block.type or block.mode) for block in blocks)
+        if not found and are_known:
+            self.faults.error(f"the system has no {mode}; it needs at least one", blocks[0].name.source)
         elif len(found) > _MOST_CONVERTERS:
             self.faults.error(
                 f"the system has {len(found)} {mode}s; an id of one byte tells {_MOST_CONVERTERS} apart",
@@ -229,6 +237,7 @@ class _Analysis:
             or bool(lost)
             or any(block.name not in self.outputs for block in unsound),
             strays={side.frame for block in unsound for side in self.outputs.get(block.name, ())},
+            ambiguous={block.name for block in lost},
         )
 
     def converters(self, mode: str) -> tuple[Converter, ...]:

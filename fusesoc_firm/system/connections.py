@@ -24,7 +24,7 @@ class Wiring:
 
     Where the specification has faults: `has_more_blocks` tells that there are blocks whose names could not be read,
     `has_more_messages` that there are connections of messages that are not known; `strays` are messages of connections
-    that could not be read.
+    that could not be read. `ambiguous` are names of several blocks; the first is in the tables.
     """
 
     blocks: Mapping[str, Block]
@@ -34,6 +34,7 @@ class Wiring:
     has_more_blocks: bool = False
     has_more_messages: bool = False
     strays: set[Frame] = field(default_factory=set)
+    ambiguous: set[str] = field(default_factory=set)
     sinks: dict[End, list[End]] = field(default_factory=dict)
     frames: dict[End, Frame] = field(default_factory=dict)
     driven: dict[End, Outgoing] = field(default_factory=dict)
@@ -64,11 +65,9 @@ class Wiring:
         free = [pair for pair in pairs if self._sink(outgoing, pair) not in self.driven]
         if not free:
             first = self.driven[self._sink(outgoing, pairs[0])].name.source
-            self.faults.error(
-                f"'{outgoing.name}' has its message already{f', by {first}' if first else ''}",
-                outgoing.name.source,
-                "an input takes its messages from one block",
-            )
+            if outgoing.name not in self.ambiguous:
+                hint = f"an input takes its messages from one block; this one is named at {first}"
+                self.faults.error(f"'{outgoing.name}' gets this message already", outgoing.name.source, hint)
             return False
         source, sink = self._chosen(block, outgoing, free)
         self.driven[sink] = outgoing
