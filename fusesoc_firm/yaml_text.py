@@ -134,6 +134,15 @@ def is_null(node: yaml.Node) -> bool:
     return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"
 
 
+def kind(node: yaml.Node) -> str:
+    """What a node is, for messages: its word, "a list", "a mapping" or "nothing"."""
+    if is_null(node):
+        return "nothing"
+    if isinstance(node, yaml.MappingNode):
+        return "a mapping"
+    return "a list" if isinstance(node, yaml.SequenceNode) else f"'{node.value}'"
+
+
 def items(
     yaml_text: YamlText, node: yaml.MappingNode, faults: Diagnostics
 ) -> Iterator[tuple[Text, yaml.ScalarNode, yaml.Node]]:

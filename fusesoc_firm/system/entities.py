@@ -27,8 +27,8 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     for accelerator in system.accelerator_types:
         name = accelerator.accelerator.name
         if accelerator.accelerator.type == "VHDL" and identifier(name) != name:
-            hint = f"call the entity and the type '{identifier(name)}', for instance"
-            faults.error(f"no entity in VHDL can be called '{name}'", name.source, hint)
+            hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+            faults.error(f"no entity can be called '{name}'", name.source, hint)
         for entity in _entities(accelerator):
             if owner := owners.get(entity.lower()):
                 faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
-from fusesoc_firm.yaml_text import Text, YamlText, is_null, items
+from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind
 
 S = TypeVar("S", bound="Section")
 
@@ -81,7 +81,7 @@ class _Reader:
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
-            self._error(f"{what} must be a mapping of keys to values, not {_kind(node)}", node)
+            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node)
             return _empty(section, source)
         known = keys_of(section)
         given = self._given(known, node, what)
@@ -132,7 +132,7 @@ class _Reader:
 
     def _sections(self, entry: Key, node: yaml.Node, name: str) -> tuple[Section, ...] | None:
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{name}' must be a list, one '- ' an item, not {_kind(node)}", node, entry.meaning)
+            self._error(f"'{name}' must be a list, one '- ' an item, not {kind(node)}", node, entry.meaning)
             return None
         if not node.value and entry.is_required:
             self._error(f"'{name}' is an empty list", node, entry.meaning)
@@ -141,13 +141,13 @@ class _Reader:
     def _text(self, node: yaml.Node, entry: Key, name: str) -> Text | None:
         if isinstance(node, yaml.ScalarNode) and node.value and not is_null(node):
             return self.file.text(node)
-        self._error(f"'{name}' must be a word, not {_kind(node)}", node, entry.meaning)
+        self._error(f"'{name}' must be a word, not {kind(node)}", node, entry.meaning)
         return None
 
     def _integer(self, node: yaml.Node, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
             return int(yaml.safe_load(node.value))
-        self._error(f"'{name}' must be an integer, not {_kind(node)}", node)
+        self._error(f"'{name}' must be an integer, not {kind(node)}", node)
         return None
 
     def _chosen(self, entry: Key, value: Any, node: yaml.Node, name: str) -> Any:
@@ -192,11 +192,3 @@ def _names(hints: list[str], name: str) -> bool:
 def _section_type(entry: Key) -> type[Section]:
     assert entry.section is not None, "a section's key names its type"
     return entry.section
-
-
-def _kind(node: yaml.Node) -> str:
-    if is_null(node):
-        return "nothing"
-    if isinstance(node, yaml.MappingNode):
-        return "a mapping"
-    return "a list" if isinstance(node, yaml.SequenceNode) else f"'{node.value}'"

@@ -101,8 +101,8 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
     name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
     function = function_name(accelerator)
     if identifier(function) != function:
-        hint = f"call the file and the function '{identifier(function)}', for instance"
-        message = f"the function is called after its file, and '{function}' is no name in both C++ and VHDL"
+        hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+        message = f"the function is called after its file, and '{function}' cannot be its name"
         faults.error(message, sources[0].source, hint)
     if not accelerator.inputs or not accelerator.outputs:
         faults.error(f"'{name}' is of type HLS, which needs at least one input and one output", name.source)
