@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import tempfile
 from pathlib import Path
@@ -29,6 +30,8 @@ _FLAGS = (
     "-MMD",
     "-Wno-unknown-pragmas",
 )
+# A file in a rule of make; a blank in its name is escaped.
+_WORD = re.compile(r"(?:\\ |\S)+")
 _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
 
 
@@ -73,9 +76,9 @@ def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> 
     """Every included file must be a source: a change of one that is not would never be noticed."""
     sources = {(folder / source).resolve() for source in accelerator.accelerator.sources}
     included = {
-        (place / word).resolve()
+        (place / word.replace("\\ ", " ")).resolve()
         for rules in place.glob("*.d")
-        for word in rules.read_text(encoding="utf-8").replace("\\\n", " ").split()[1:]
+        for word in _WORD.findall(rules.read_text(encoding="utf-8").replace("\\\n", " "))[1:]
     }
     missing = sorted(str(path) for path in included - sources if not path.is_relative_to(place.resolve()))
     if missing:

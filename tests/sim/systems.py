@@ -44,20 +44,23 @@ class GeneratedSystem:
         self.work.analyse([self.folder / f"{self.entity}_tb.vhd"])
 
 
-def request(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request:
+def call(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request:
     """A generator call for the specification `spec`."""
     known: dict[str, Plain] = {"seed": 1, "stall_percent": 25, "paths": None, "distro": None, **parameters}
     known |= {"spec": spec.name, "stimuli": str(stimuli), "model": str(model), "product": "simulation"}
     return Request("far", "test:sys:system-simulation:0", spec.parent, known)
 
 
-def build(call: Request, folder: Path) -> GeneratedSystem:
-    """Generate, write and analyse everything. Raises `InputError` and `GhdlError`."""
+def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
+    """Generate, write and analyse everything; `cores` are those that the accelerators need.
+
+    Raises `InputError` and `GhdlError`.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    *kernels, bench = _write(simulation.generate(call), folder)
+    *kernels, bench = _write(simulation.generate(request), folder)
     # A kernel before the wrapper that instantiates it, the test bench last.
-    vhdl = [*kernels, *_write(generator.generate(call), folder), bench]
-    Library("firm", folder).analyse(core_files(*RUNTIME))
+    vhdl = [*kernels, *_write(generator.generate(request), folder), bench]
+    Library("firm", folder).analyse(core_files(*RUNTIME, *cores))
     Library("work", folder).analyse(vhdl)
     return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass
 class Waiting:
-    """Messages at the two inputs of `joined`."""
+    """Messages that wait at the two inputs of `joined`."""
 
     points: deque[dict[str, float]] = field(default_factory=deque)
     vectors: deque[dict[str, float]] = field(default_factory=deque)

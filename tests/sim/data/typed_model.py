@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Any
 
 INPUTS: dict[str, deque[int]] = {"minuend": deque(), "subtrahend": deque()}
 
@@ -16,7 +17,7 @@ def negated(name: str, value: float) -> float:
     return ~value % 2**bits if bits else ~value
 
 
-def respond(subscriber: str, message: dict) -> list[tuple[str, dict]]:
+def respond(subscriber: str, message: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     if subscriber == "sub":
         other = {name: negated(name, value) for name, value in message.items()}
         return [("negated", other), ("copied", message), ("restored", message)]
