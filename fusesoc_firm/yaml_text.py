@@ -116,7 +116,9 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
         hint = f"{error.context}, which begins at {file}:{context.line + 1}:{context.column + 1}"
     elif error.context and is_late:
         hint = error.context
-    line, column = (mark.line, mark.column) if mark is not None and mark.line < len(lines) else (len(lines) - 1, 0)
+    line, column = len(lines) - 1, max(0, len(lines[-1]) - 1)
+    if mark is not None and mark.line < len(lines):
+        line, column = mark.line, mark.column
     faults.error(f"this is not YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
 
 

@@ -10,10 +10,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
-from rosbags.rosbag1 import ReaderError as Rosbag1Error
-from rosbags.rosbag2 import ReaderError as Rosbag2Error
 from rosbags.typesys import Stores, get_typestore
 
 from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
@@ -23,35 +21,47 @@ from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived import Converter
 
 Recorded = tuple[Converter, bytes, dict[str, Any]]
+Stream = tuple[str, str]
+"""Topic and type."""
 
 
 def read_bag(path: Path, subscribers: Sequence[Converter]) -> Iterator[Recorded]:
     """Subscriber, payload and decoded message of all messages, by time. Raises `InputError`."""
+    ros, connections, messages = _read(path)
+    routes = _routes(connections, ros, subscribers, path)
+    for connection, payload in messages:
+        if subscriber := routes.get(_stream(connection)):
+            try:
+                message = decode(subscriber.frame, payload)
+            except CodecError as error:
+                fail(f"{path}, topic {connection.topic}: {error}")
+            yield subscriber, payload, message
+
+
+def _read(path: Path) -> tuple[RosVersion, list[Connection], list[tuple[Connection, bytes]]]:
+    """All that a bag holds, messages by time."""
     store = get_typestore(Stores.LATEST)
     try:
         with AnyReader([path], default_typestore=store) as reader:
-            ros = RosVersion.ROS2 if reader.is2 else RosVersion.ROS1
-            routes = _routes(reader.connections, ros, subscribers, path)
-            for connection, _, data in reader.messages(connections=list(routes)):
-                subscriber, payload = routes[connection], bytes(data)
-                yield subscriber, payload, _decoded(subscriber, payload, f"{path}, topic {connection.topic}")
-    except (AnyReaderError, Rosbag1Error, Rosbag2Error) as error:
-        fail(f"{path} is no bag that can be read: {error}", hint="stimuli are YAML (.yaml, .yml) or a bag")
+            messages = [(connection, bytes(payload)) for connection, _, payload in reader.messages()]
+            # A closed reader forgets its connections.
+            return RosVersion.ROS2 if reader.is2 else RosVersion.ROS1, list(reader.connections), messages
+    except Exception as error:  # noqa: BLE001 - a damaged file makes rosbags and what it uses raise anything
+        hint = "stimuli are YAML (.yaml, .yml), a bag of ROS 1 (.bag) or the folder of a bag of ROS 2"
+        fail(f"{path} is no bag that can be read: {error}", hint=hint)
 
 
-def _decoded(subscriber: Converter, payload: bytes, where: str) -> dict[str, Any]:
-    try:
-        return decode(subscriber.frame, payload)
-    except CodecError as error:
-        fail(f"{where}: {error}")
+def _stream(connection: Connection) -> Stream:
+    # rosbags' connections of ROS 2 cannot be keys themselves.
+    return connection.topic, connection.msgtype
 
 
 def _routes(
     connections: Sequence[Connection], ros: RosVersion, subscribers: Sequence[Converter], path: Path
-) -> dict[Connection, Converter]:
-    """The subscriber of each connection that has one. Raises `InputError` with every topic that does not fit."""
+) -> dict[Stream, Converter]:
+    """The subscriber of each topic that has one. Raises `InputError` with every topic that does not fit."""
     faults = Diagnostics()
-    routes = {}
+    routes: dict[Stream, Converter] = {}
     for connection in connections:
         try:
             message = parse_name(connection.msgtype)
@@ -59,17 +69,17 @@ def _routes(
             continue  # no message that a specification can name
         fitting = [item for item in subscribers if item.frame.message == message]
         speaking = [item for item in fitting if item.frame.ros == ros]
+        named = [item for item in speaking if item.block == connection.topic.strip("/").replace("/", "_")]
+        chosen = named or speaking
         if fitting and not speaking:
             block, spoken = fitting[0].block, int(fitting[0].frame.ros)
             faults.error(f"topic {connection.topic} of {path} is of ROS {int(ros)}, but '{block}' speaks ROS {spoken}")
-            continue
-        named = [item for item in speaking if item.block == connection.topic.strip("/").replace("/", "_")]
-        chosen = named or speaking
-        if len(chosen) > 1:
+        elif len(chosen) > 1:
             names = ", ".join(item.block for item in chosen)
-            hint = "name the topic like one of them"
-            faults.error(f"topic {connection.topic} of {path} could go to {names}", hint=hint)
+            faults.error(
+                f"topic {connection.topic} of {path} could go to {names}", hint="name the topic like one of them"
+            )
         elif chosen:
-            routes[connection] = chosen[0]
+            routes[_stream(connection)] = chosen[0]
     faults.raise_if_any()
     return routes

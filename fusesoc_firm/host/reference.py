@@ -64,7 +64,7 @@ class _Model:
             # A generator runs the user's code only here.
             items = list(answer) if isinstance(answer, Iterable) and not isinstance(answer, str | Mapping) else None
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
-            _fail_in_model(self.path, error, f" for {when}")
+            _fail_in_model(self.path, error, f" for {when}", self._line())
         if items is None:
             self._fail(f"for {when}, 'respond' returned {answer!r}, which is no list", _ANSWER)
         return items
@@ -86,9 +86,12 @@ class _Model:
 
     def _fail(self, message: str, hint: str = "") -> NoReturn:
         """Report a fault of what the function returned where the function stands."""
+        fail(message, _place(self.path, self._line()), hint)
+
+    def _line(self) -> int:
+        """The function's line; 1 if it is none of the file's own."""
         code = getattr(self.respond, "__code__", None)
-        is_here = code is not None and code.co_filename == str(self.path)
-        fail(message, _place(self.path, code.co_firstlineno if code is not None and is_here else 1), hint)
+        return code.co_firstlineno if code is not None and code.co_filename == str(self.path) else 1
 
 
 def _load(path: Path) -> Respond:
@@ -112,8 +115,8 @@ def _load(path: Path) -> Respond:
     return respond  # type: ignore[no-any-return]
 
 
-def _fail_in_model(path: Path, error: BaseException, when: str) -> NoReturn:
-    """Report an exception of the model at the model's own line."""
+def _fail_in_model(path: Path, error: BaseException, when: str, otherwise: int = 1) -> NoReturn:
+    """Report an exception at the model's own line that led to it, at the line `otherwise` if there is none."""
     text = f": {error}" if str(error) else ""
     message = f"the model raised {type(error).__name__}{when}{text}"
     if isinstance(error, SyntaxError) and error.filename == str(path):
@@ -124,7 +127,7 @@ def _fail_in_model(path: Path, error: BaseException, when: str) -> NoReturn:
         )
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
     if not frames:
-        fail(message, SourceRef(str(path), 1, 1))
+        fail(message, _place(path, otherwise))
     fail(message, _place(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1))
 
 
