@@ -1,6 +1,6 @@
 """Bad specifications and what a user is told: NAME.yaml and, word for word, NAME.expected.
 
-After a change of wording, `REFRESH=1 pytest tests/errors/test_spec_errors.py` writes the expected files anew, for review.
+After a change of wording, `REFRESH=1 pytest tests/errors/test_spec_errors.py` writes the expected files anew.
 """
 
 from __future__ import annotations

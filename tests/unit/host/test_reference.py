@@ -60,8 +60,8 @@ def test_answers_come_in_order_with_their_cause(tmp_path: Path) -> None:
         "class Model:\n    def __call__(self, block, m):\n        return [('left', m)]\n\nrespond = Model()\n",
         # With text annotations, a dataclass looks its module up.
         (
-            "from __future__ import annotations\nfrom dataclasses import dataclass\n\n@dataclass\nclass A:\n    n: int = 0\n"
-            "\ndef respond(block, m):\n    return [('left', m)]\n"
+            "from __future__ import annotations\nfrom dataclasses import dataclass\n\n@dataclass\nclass A:\n"
+            "    n: int = 0\n\ndef respond(block, m):\n    return [('left', m)]\n"
         ),
     ],
 )
