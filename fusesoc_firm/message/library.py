@@ -129,7 +129,7 @@ class MessageLibrary:
         """Add `name`, which the messages `above` hold, one within the other, and all that it holds."""
         if name in above:
             cycle = " -> ".join(str(step) for step in (*above[above.index(name) :], name))
-            diagnostics.error("a message within itself", source, cycle)
+            diagnostics.error(f"message '{name}' contains itself", source, cycle)
             return
         if name in closure:
             return

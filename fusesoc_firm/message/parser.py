@@ -179,7 +179,7 @@ class _Reader:
         if not rule.accepts(name.text):
             # A default such as `s "a=b"` ends up here: the reference takes the line for a constant, too.
             is_default = len(name.text.split()) > 1
-            hint = "a line with '=' is a constant: 'type NAME=value'" if is_default else rule.hint
+            hint = "a line with '=' is a constant, even if the '=' is in quotes" if is_default else rule.hint
             self._diagnostics.error(rule.fault(name.text, self._dialect.ros), name.source, hint)
             return False
         if first := self._first_line.get(name.text):
