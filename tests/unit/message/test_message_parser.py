@@ -246,7 +246,7 @@ def test_values_out_of_range(line: str, ros: RosVersion) -> None:
         ("int32[2] x [1, 2]", (1, 2)),
         ("int32[<=3] x [1]", (1,)),
         ("bool[] x [true, 0]", (True, False)),
-        ('string[] x ["a, b", \'c\', d e]', ("a, b", "c", "d e")),
+        ("string[] x [\"a, b\", 'c', d e]", ("a, b", "c", "d e")),
         ('string[] x ["a \\"b\\""]', ('a "b"',)),
     ],
 )
@@ -266,6 +266,7 @@ def test_defaults(line: str, default: Scalar | tuple[Scalar, ...]) -> None:
         ("uint8[] x [1, 256]", "1:15 '256' is not a value of uint8"),
         ("int32[] x [1,]", "1:14 element 2 of the array is empty or not closed"),
         ('string[] x ["a" "b"]', "1:13 element 1 of the array is empty or not closed"),
+        ('string[] x ["a\\", "b"]', "1:13 element 1 of the array is empty or not closed"),
         ("string[] x ['a', 'b]", "1:18 element 2 of the array is empty or not closed"),
         ("string<=2[] x ['abc']", "1:16 ''abc'' is not a value of string<=2"),
         ("Point x 1", "1:9 a field of type my_msgs/Point has no default value"),
