@@ -27,6 +27,10 @@ class NameRule:
         """Whether all of `name` is legal."""
         return self.pattern.fullmatch(name) is not None
 
+    def fault(self, name: str, ros: RosVersion) -> str:
+        """What is wrong with a name that is not accepted."""
+        return f"'{name}' is not a legal {self.kind} in ROS {ros}" if name else f"the {self.kind} is missing"
+
     @property
     def hint(self) -> str:
         """What would be legal."""
@@ -63,6 +67,11 @@ class Dialect:
     def primitives(self) -> frozenset[str]:
         """The words of every type that is neither a string nor a message."""
         return frozenset({"bool", "float32", "float64"}) | frozenset(self.integer_ranges) | self.opaque_primitives
+
+    @property
+    def builtin_types(self) -> frozenset[str]:
+        """The words of every type that is not a message."""
+        return self.primitives | self.strings
 
 
 def _integer_ranges(byte: tuple[int, int]) -> dict[str, tuple[int, int]]:
