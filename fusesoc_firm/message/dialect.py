@@ -1,4 +1,4 @@
-"""What the two generations of ROS allow in a `.msg` file: one table each, so that the parser asks and never tells versions apart.
+"""What the two generations of ROS allow in a `.msg` file: one table each, so that the parser never tells them apart.
 
 ROS 1 follows genmsg 0.6.0, ROS 2 follows rosidl_adapter 4.9.5. docs/messages.md lists the few places where FIRM
 takes more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
@@ -54,7 +54,7 @@ class Dialect:
     shorthands: Mapping[str, MessageName]
     has_array_shorthands: bool
     booleans: Mapping[str, bool]
-    # `<=` behind a string or within the brackets of an array, default values, `0x10`, quotes round strings: all ROS 2's.
+    # `<=` behind a string or in the brackets of an array, default values, `0x10`, quotes round strings: all ROS 2's.
     has_bounds: bool
     has_defaults: bool
     has_integer_prefixes: bool

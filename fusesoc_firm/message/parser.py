@@ -2,7 +2,7 @@ r"""`.msg` text to Message: our own parser, because errors need line and column 
 
     line        = [ declaration ] [ "#" comment ]
     declaration = type name [ default ]             a field; defaults: ROS 2
-                | primitive name "=" value          a constant; ROS 1: the value of a string takes the rest, "#" included
+                | primitive name "=" value          a constant; in ROS 1 a string takes the rest, "#" included
     type        = element [ "[" [ [ "<=" ] size ] "]" ]
     element     = primitive | string [ "<=" size ] | [ package "/" [ "msg/" ] ] message
     default     = scalar | "[" [ scalar { "," scalar } ] "]"

@@ -1,4 +1,4 @@
-"""The definitions that rosbags ships: those of every ROS distribution, so that common messages need no ROS installed."""
+"""The definitions that rosbags ships: those of every ROS distribution, so that common messages need no ROS."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ def _prefix(ros: RosVersion) -> str:
 
 
 class DistributionStore:
-    """The definitions of one distribution. Its texts come from rosbags' tables: names, types, bounds and constants are
-    the distribution's, but comments and default values are lost and ROS 1's `Header` is written in full."""
+    """The definitions of one distribution.
+
+    Its texts come from rosbags' tables: names, types, bounds and constants are the distribution's, but comments and
+    default values are lost, and ROS 1's `Header` is written in full.
+    """
 
     def __init__(self, ros: RosVersion, distribution: str | None = None) -> None:
         """`distribution` is one of `distributions(ros)`; None takes the default. Raises `InputError` for another."""

@@ -20,8 +20,8 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.message.piece import Piece
 
 _QUOTES = ('"', "'")
-# An element of an array is quoted, with `\"` for the quote itself, or takes all up to the comma. Possessive, or the quote
-# of `\"` could also close.
+# An element of an array is quoted, with `\"` for the quote itself, or takes all up to the comma. Possessive, or the
+# quote of `\"` could also close.
 _ELEMENT = re.compile(r"""\s*("(?:\\"|[^"])*+"|'(?:\\'|[^'])*+'|[^\s,"'](?:[^,]*[^\s,])?)\s*(?:,|$)""")
 
 

@@ -92,7 +92,7 @@ def test_a_relative_folder_knows_its_package(tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(tmp_path / "my_msgs")
     library = MessageLibrary(ROS2, [Path("msg")])
     assert own_names(library) == ["my_msgs/A"]
-    assert library.origin(MessageName("my_msgs", "A")) == os.path.join("msg", "A.msg")
+    assert library.origin(MessageName("my_msgs", "A")) == str(Path("msg", "A.msg"))
 
 
 def test_a_workspace(tmp_path: Path) -> None:

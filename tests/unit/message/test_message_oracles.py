@@ -92,7 +92,7 @@ def content_of_rosbags(entry: Any, ros: RosVersion) -> Content:
 @pytest.mark.parametrize(
     ("ros", "distribution"),
     [(ros, name) for ros in RosVersion for name in distributions(ros)],
-    ids=lambda value: str(value),
+    ids=str,
 )
 def test_every_message_of_a_distribution_keeps_all_that_rosbags_knows(ros: RosVersion, distribution: str) -> None:
     table = get_typestore(Stores(f"ros{int(ros)}_{distribution}")).fielddefs
@@ -246,7 +246,7 @@ def test_corpus_against_the_reference(ros: RosVersion, reference: Reference) -> 
     different, taken = [], 0
     for name, text in corpus(ros):
         mine = ours(text, name, ros)
-        # The feedback messages of actions exist in ROS 2, but rosidl_adapter refuses their names in a file of their own.
+        # The feedback messages of actions exist in ROS 2, but rosidl_adapter refuses a file of such a name.
         asked = MessageName(name.package, name.name.removesuffix("_FeedbackMessage"))
         different += [str(name)] if mine != reference(text, asked) else []
         taken += mine is not None

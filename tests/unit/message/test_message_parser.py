@@ -307,7 +307,7 @@ def test_a_field_points_at_its_type() -> None:
     [("uint8 x\n\nint8 x", "3:6"), ("uint8 A=1\nuint8 A=1", "2:7")],
 )
 def test_duplicate_names(text: str, place: str, ros: RosVersion) -> None:
-    name = text.split()[-1].split("=")[0]
+    name = text.rsplit(maxsplit=1)[-1].partition("=")[0]
     assert faults(text, ros) == [f"{place} '{name}' is declared twice"]
 
 
