@@ -132,7 +132,7 @@ def _length_check(frame: Frame) -> Configuration:
         "has_trailing": frame.trailing_bytes > 0,
         "trailing_bytes": frame.trailing_bytes,
         "length_low": low[0],
-        "length_low_hex": f"{low[0]:02x}",
+        "low_bytes": [f"{(low[0] + more) % 256:02x}" for more in range(frame.trailing_bytes + 1)],
         "length_carries": carries,
         "length_checks": [
             {"position": index, "value": f"{low[index]:02x}", "carried": f"{high[index]:02x}", "carries": carries}
