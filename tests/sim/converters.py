@@ -222,9 +222,8 @@ def _troubled_frame(pair: Pair, source: random.Random) -> Sent:
         case 2:  # a length that lies, close by or far off
             lie = max(0, len(payload) + source.choice((-256, -4, -3, -2, -1, 1, 2, 3, 4, 256, 2**24)))
             return Sent(lie.to_bytes(LENGTH_BYTES, "little") + payload)
-        case 3:  # one bit of length or encoding turned
-            bit = source.randrange(8 * min(len(body), LENGTH_BYTES + 2))
-            body[bit // 8] ^= 1 << bit % 8
+        case 3:  # a bit of the length turned
+            body[source.randrange(LENGTH_BYTES)] ^= 1 << source.randrange(8)
             return Sent(bytes(body))
         case 4:  # a true length, but not this message's
             return pair.sent(source.randbytes(source.randrange(2 * len(payload) + 8)))
@@ -235,6 +234,9 @@ def _troubled_frame(pair: Pair, source: random.Random) -> Sent:
         case 7:  # another length than the announced one, both legal in ROS 2
             announced = len(payload) + source.randrange(4)
             return Sent(announced.to_bytes(LENGTH_BYTES, "little") + payload + source.randbytes(source.randrange(4)))
+        case 8 if pair.oracle.ros is RosVersion.ROS2:  # another encoding
+            body[LENGTH_BYTES + source.randrange(2)] ^= 1 << source.randrange(8)
+            return Sent(bytes(body))
     return Sent(bytes(body))
 
 
