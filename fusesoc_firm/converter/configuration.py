@@ -141,7 +141,12 @@ def _length_check(frame: Frame) -> Configuration:
             for byte, joint in zip(carried_bytes, _joints(len(carried_bytes), " or", ""), strict=True)
         ],
         "length_checks": [
-            {"position": index, "value": f"{low[index]:02x}", "carried": f"{high[index]:02x}", "carries": carries}
+            {
+                "position": index,
+                "value": f"{low[index]:02x}",
+                "carried": f"{high[index]:02x}",
+                "carries": low[index] != high[index],
+            }
             for index in range(1, LENGTH_BYTES)
         ],
     }
