@@ -128,14 +128,25 @@ def _length_check(frame: Frame) -> Configuration:
     low = frame.payload_bytes.to_bytes(LENGTH_BYTES, "little")
     high = (frame.payload_bytes + frame.trailing_bytes).to_bytes(LENGTH_BYTES, "little")
     carries = low[1:] != high[1:]
+    low_bytes = [(low[0] + more) % 256 for more in range(frame.trailing_bytes + 1)]
+    carried_bytes = [byte for byte in low_bytes if byte < low[0]]
     return {
         "has_trailing": frame.trailing_bytes > 0,
         "trailing_bytes": frame.trailing_bytes,
         "length_low": low[0],
-        "length_low_hex": f"{low[0]:02x}",
+        "low_bytes": [f"{byte:02x}" for byte in low_bytes],
         "length_carries": carries,
+        "carried_bytes": [
+            {"value": f"{byte:02x}", "joint": joint}
+            for byte, joint in zip(carried_bytes, _joints(len(carried_bytes), " or", ""), strict=True)
+        ],
         "length_checks": [
-            {"position": index, "value": f"{low[index]:02x}", "carried": f"{high[index]:02x}", "carries": carries}
+            {
+                "position": index,
+                "value": f"{low[index]:02x}",
+                "carried": f"{high[index]:02x}",
+                "carries": low[index] != high[index],
+            }
             for index in range(1, LENGTH_BYTES)
         ],
     }

@@ -36,7 +36,6 @@ _SHARED = {
     "Joined": "Inner a\nuint16 a_b\nuint16 a_b_2\nuint16 a_b_c\n",
     "Long": "uint8[300] data\nfloat32 last\n",
     "Large": "float64[140] data\nbool flag\nuint16 tail\n",
-    "Largest": "uint8[3000] data\n",
 }
 
 _ROS1 = {
