@@ -14,6 +14,8 @@ SEED ?=
 WAVES ?=
 # Further options for the simulator.
 SIM_OPTIONS ?=
+# Programs that a target needs beside those of all.
+TOOLS :=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
@@ -26,9 +28,13 @@ help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
+# Without what make and Edalize say about folders, the result is the last line.
 sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIONS='...'
-	@$(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)")
+	@MAKEFLAGS=--no-print-directory PYTHONUNBUFFERED=1 \
+	  $(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)") 2>&1 | \
+	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
+test: TOOLS = iverilog
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -39,7 +45,7 @@ lint: setup ## Check style and types
 setup: tools $(VENV)/.installed ## Install what the other targets need: programs by apt, Python packages into .venv
 
 tools:
-	@./.ci/install-tools >/dev/null
+	@./.ci/install-tools $(TOOLS) >/dev/null
 
 # Installed anew when the dependencies change. FUSESOC_IGNORE: no folder of ours but the library is to be searched for
 # cores, even if somebody adds the whole checkout.

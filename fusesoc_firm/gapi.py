@@ -23,7 +23,8 @@ from fusesoc_firm.render import write_if_changed
 from fusesoc_firm.requesting_core import find_requesting_core
 from fusesoc_firm.store import Store, default_root, store_key
 
-_LARGEST_SEED = 2**31 - 1
+# The largest that `math_real.uniform` takes, which draws the stalls.
+_LARGEST_SEED = 2147483562
 
 
 @dataclass(frozen=True)

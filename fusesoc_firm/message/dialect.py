@@ -1,4 +1,4 @@
-"""What the two generations of ROS allow in a `.msg` file: one table each, so that the parser asks and never tells versions apart.
+"""What the two generations of ROS allow in a `.msg` file: one table each, so that the parser never tells them apart.
 
 ROS 1 follows genmsg 0.6.0, ROS 2 follows rosidl_adapter 4.9.5. docs/messages.md lists the few places where FIRM
 takes more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
@@ -27,6 +27,10 @@ class NameRule:
         """Whether all of `name` is legal."""
         return self.pattern.fullmatch(name) is not None
 
+    def fault(self, name: str, ros: RosVersion) -> str:
+        """What is wrong with a name that is not accepted."""
+        return f"'{name}' is not a legal {self.kind} in ROS {ros}" if name else f"the {self.kind} is missing"
+
     @property
     def hint(self) -> str:
         """What would be legal."""
@@ -50,7 +54,7 @@ class Dialect:
     shorthands: Mapping[str, MessageName]
     has_array_shorthands: bool
     booleans: Mapping[str, bool]
-    # `<=` behind a string or within the brackets of an array, default values, `0x10`, quotes round strings: all ROS 2's.
+    # `<=` behind a string or in the brackets of an array, default values, `0x10`, quotes round strings: all ROS 2's.
     has_bounds: bool
     has_defaults: bool
     has_integer_prefixes: bool
@@ -63,6 +67,11 @@ class Dialect:
     def primitives(self) -> frozenset[str]:
         """The words of every type that is neither a string nor a message."""
         return frozenset({"bool", "float32", "float64"}) | frozenset(self.integer_ranges) | self.opaque_primitives
+
+    @property
+    def builtin_types(self) -> frozenset[str]:
+        """The words of every type that is not a message."""
+        return self.primitives | self.strings
 
 
 def _integer_ranges(byte: tuple[int, int]) -> dict[str, tuple[int, int]]:

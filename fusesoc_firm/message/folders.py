@@ -1,11 +1,11 @@
-"""Where `.msg` files lie: in a package, in a workspace of packages, in a flat folder of packages, in an installed ROS."""
+"""Where `.msg` files lie: in a package, a workspace of packages, a flat folder of packages, or an installed ROS."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 from fusesoc_firm.message.model import MessageName, RosVersion
 
@@ -44,7 +44,7 @@ def _entries(variable: str) -> list[Path]:
 
 
 def _walk(folder: Path) -> Iterator[Path]:
-    """The `.msg` files in a fixed order. Links are followed, since workspaces are often made of them, but not in circles."""
+    """The `.msg` files in a fixed order. Links are followed, as workspaces are made of them, but not in circles."""
     seen: set[str] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
         real = os.path.realpath(parent)
@@ -60,7 +60,8 @@ def _package_name(parent: Path, folder: Path) -> str:
     """The package of the files in `parent`; the search for `package.xml` ends at the folder that the user named."""
     # A user may name the `msg` folder itself; its package is then still the folder above.
     top = folder.resolve().parent if folder.resolve().name == "msg" else folder.resolve()
-    start = Path(os.path.abspath(parent))
+    # Links stay (a linked package is named by where it is linked), but `..` goes, or `top` would not be met.
+    start = Path(os.path.abspath(parent))  # noqa: PTH100
     for candidate in (start, *start.parents):
         if name := _declared_name(candidate / "package.xml"):
             return name
@@ -72,6 +73,6 @@ def _package_name(parent: Path, folder: Path) -> str:
 def _declared_name(manifest: Path) -> str:
     """The `<name>` in a `package.xml`; empty if there is none, as in rosbuild's `manifest.xml` days."""
     try:
-        return (ElementTree.parse(manifest).findtext("name") or "").strip()
-    except (OSError, ElementTree.ParseError):
+        return (ET.parse(manifest).findtext("name") or "").strip()
+    except (OSError, ET.ParseError):
         return ""

@@ -115,7 +115,7 @@ class MessageLibrary:
         except UnicodeDecodeError as fault:
             line_start = data.rfind(b"\n", 0, fault.start) + 1
             place = SourceRef(str(first), data.count(b"\n", 0, fault.start) + 1, fault.start - line_start + 1)
-            faults.error(f"byte 0x{data[fault.start]:02x} is no UTF-8", place)
+            faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", place)
             return str(first), ""
 
     def _collect(
@@ -129,7 +129,7 @@ class MessageLibrary:
         """Add `name`, which the messages `above` hold, one within the other, and all that it holds."""
         if name in above:
             cycle = " -> ".join(str(step) for step in (*above[above.index(name) :], name))
-            diagnostics.error("a message within itself", source, cycle)
+            diagnostics.error(f"message '{name}' contains itself", source, cycle)
             return
         if name in closure:
             return
@@ -151,8 +151,8 @@ class MessageLibrary:
         same_type = [known for known in self.names() if known.name == name.name]
         if same_type:
             return str(same_type[0])
-        dialect = dialect_of(self.ros)
-        primitives = difflib.get_close_matches(name.name, sorted(dialect.primitives | dialect.strings), n=1, cutoff=0.8)
+        builtin_types = dialect_of(self.ros).builtin_types
+        primitives = difflib.get_close_matches(name.name, sorted(builtin_types), n=1, cutoff=0.8)
         names = [str(known) for known in self.names()]
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
 
@@ -161,7 +161,7 @@ def _check_folders(empty: Iterable[Path]) -> None:
     """Raise `InputError` that names every one of the user's folders that gave nothing."""
     diagnostics = Diagnostics()
     for path in empty:
-        reason = "holds no .msg file" if path.is_dir() else "is no folder"
+        reason = "holds no .msg file" if path.is_dir() else "is not a folder"
         diagnostics.error(f"message path '{path}' {reason}", hint="give a package, a workspace or a folder of packages")
     diagnostics.raise_if_any()
 

@@ -2,7 +2,7 @@ r"""`.msg` text to Message: our own parser, because errors need line and column 
 
     line        = [ declaration ] [ "#" comment ]
     declaration = type name [ default ]             a field; defaults: ROS 2
-                | primitive name "=" value          a constant; ROS 1: the value of a string takes the rest, "#" included
+                | primitive name "=" value          a constant; in ROS 1 a string takes the rest, "#" included
     type        = element [ "[" [ [ "<=" ] size ] "]" ]
     element     = primitive | string [ "<=" size ] | [ package "/" [ "msg/" ] ] message
     default     = scalar | "[" [ scalar { "," scalar } ] "]"
@@ -45,7 +45,7 @@ def parse_name(text: str) -> MessageName:
     """`pkg/Type` or `pkg/msg/Type` to a name; raises `InputError` for anything else."""
     match = _NAME.fullmatch(text.strip())
     if match is None:
-        fail(f"'{text}' is no message name", hint="write 'package/Type', like 'geometry_msgs/Quaternion'")
+        fail(f"'{text}' is not a message name", hint="write 'package/Type', like 'geometry_msgs/Quaternion'")
     return MessageName(*match.groups())
 
 
@@ -99,7 +99,7 @@ def _parse_lines(
     source = SourceRef(file, 1, 1)
     for rule, word in ((dialect.package_name, name.package), (dialect.message_name, name.name)):
         if not rule.accepts(word):
-            diagnostics.error(f"'{word}' is no {rule.kind} of ROS {dialect.ros}", source, rule.hint)
+            diagnostics.error(rule.fault(word, dialect.ros), source, rule.hint)
     reader = _Reader(name, dialect, diagnostics)
     for line in lines:
         reader.read(line)
@@ -171,16 +171,16 @@ class _Reader:
         if kind.text in self._dialect.primitives - self._dialect.opaque_primitives:
             return PrimitiveType(kind.text)
         self._diagnostics.error(
-            f"'{kind.text}' is no type of a constant", kind.source, "a constant is a number, a bool or a string"
+            f"'{kind.text}' is not a type for constants", kind.source, "a constant is a number, a bool or a string"
         )
         return None
 
     def _check_name(self, name: Piece, rule: NameRule) -> bool:
         if not rule.accepts(name.text):
-            shown = f"'{name.text}' is no {rule.kind} of ROS {self._dialect.ros}" if name.text else f"no {rule.kind}"
             # A default such as `s "a=b"` ends up here: the reference takes the line for a constant, too.
-            hint = "a line with '=' is a constant: 'type NAME=value'" if " " in name.text else rule.hint
-            self._diagnostics.error(shown, name.source, hint)
+            is_default = len(name.text.split()) > 1
+            hint = "a line with '=' is a constant, even if the '=' is in quotes" if is_default else rule.hint
+            self._diagnostics.error(rule.fault(name.text, self._dialect.ros), name.source, hint)
             return False
         if first := self._first_line.get(name.text):
             self._diagnostics.error(f"'{name.text}' is declared twice", name.source, f"first in line {first}")
@@ -192,7 +192,7 @@ class _Reader:
         match = _TYPE.fullmatch(kind.text)
         if match is None:
             forms = "'T', 'T[]', 'T[3]' or 'T[<=3]'" if self._dialect.has_bounds else "'T', 'T[]' or 'T[3]'"
-            self._diagnostics.error(f"'{kind.text}' is no type", kind.source, f"a type is {forms}")
+            self._diagnostics.error(f"'{kind.text}' is not a type", kind.source, f"a type is {forms}")
             return None
         is_array = match[2] is not None
         element = self._element(kind.part(*match.span(1)), is_array)
@@ -213,15 +213,18 @@ class _Reader:
     def _bound(self, piece: Piece) -> int | None:
         """The number behind `<=`, with which `piece` starts."""
         if not self._dialect.has_bounds:
-            self._diagnostics.error(f"a bound '{piece.text}'", piece.source, "bounds exist in ROS 2 only")
+            self._diagnostics.error(f"ROS {self._dialect.ros} has no bounds like '{piece.text}'", piece.source)
             return None
         return self._size(piece.part(2), smallest=1)
 
     def _size(self, piece: Piece, smallest: int) -> int | None:
-        if piece.text.isascii() and piece.text.isdigit() and smallest <= int(piece.text) <= LARGEST_SIZE:
-            return int(piece.text)
+        digits = piece.text.lstrip("0") or "0"
+        # Python refuses to read a number of thousands of digits, so their count is looked at first.
+        is_short = piece.text.isascii() and piece.text.isdigit() and len(digits) <= len(str(LARGEST_SIZE))
+        if is_short and smallest <= int(digits) <= LARGEST_SIZE:
+            return int(digits)
         hint = f"a size is a whole number from {smallest} to {LARGEST_SIZE}"
-        self._diagnostics.error(f"'{piece.text}' is no size", piece.source, hint)
+        self._diagnostics.error(f"'{piece.text}' is not a size", piece.source, hint)
         return None
 
     def _element(self, piece: Piece, is_array: bool) -> ElementType | None:
@@ -246,9 +249,8 @@ class _Reader:
         is_package = len(parts) == 1 or self._dialect.package_name.accepts(package)
         if is_package and self._dialect.message_name.accepts(name):
             return MessageType(MessageName(package, name))
-        known = self._dialect.primitives | self._dialect.strings
-        hint = nearest(piece.text, known) if len(parts) == 1 else self._message_hint(is_package)
-        self._diagnostics.error(f"'{piece.text}' is no type of ROS {self._dialect.ros}", piece.source, hint)
+        hint = nearest(piece.text, self._dialect.builtin_types) if len(parts) == 1 else self._message_hint(is_package)
+        self._diagnostics.error(f"unknown type '{piece.text}'", piece.source, hint)
         return None
 
     def _message_hint(self, is_package: bool) -> str:

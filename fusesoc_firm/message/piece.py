@@ -40,7 +40,7 @@ class Piece:
         return Piece(self.file, self.line, self.line_text, self.start + start, stop)
 
     def strip(self) -> Piece:
-        """This piece without the blanks at its ends."""
+        """The piece without the blanks at its ends."""
         start = len(self.text) - len(self.text.lstrip())
         return self.part(start, max(start, len(self.text.rstrip())))
 

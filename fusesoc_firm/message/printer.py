@@ -13,7 +13,7 @@ from fusesoc_firm.message.model import (
 
 
 def to_text(definition: MessageDefinition) -> str:
-    """The definition as `.msg` text: constants first, then fields in wire order; a comment names the message and version.
+    """The definition as `.msg` text: constants, then fields in wire order; a comment names the message and version.
 
     Every value that the parser can deliver is written so that it reads back (ROS 2 has no way to write a `#`).
     """

@@ -1,4 +1,4 @@
-"""The definitions that rosbags ships: those of every ROS distribution, so that common messages need no ROS installed."""
+"""The definitions that rosbags ships: those of every ROS distribution, so that common messages need no ROS."""
 
 from __future__ import annotations
 
@@ -27,14 +27,17 @@ def _prefix(ros: RosVersion) -> str:
 
 
 class DistributionStore:
-    """The definitions of one distribution. Its texts come from rosbags' tables: names, types, bounds and constants are
-    the distribution's, but comments and default values are lost and ROS 1's `Header` is written in full."""
+    """The definitions of one distribution.
+
+    Its texts come from rosbags' tables: names, types, bounds and constants are the distribution's, but comments and
+    default values are lost, and ROS 1's `Header` is written in full.
+    """
 
     def __init__(self, ros: RosVersion, distribution: str | None = None) -> None:
         """`distribution` is one of `distributions(ros)`; None takes the default. Raises `InputError` for another."""
         chosen = _DEFAULTS[ros] if distribution is None else distribution
         if chosen not in distributions(ros):
-            fail(f"'{chosen}' is no distribution of ROS {ros}", hint=nearest(chosen, distributions(ros)))
+            fail(f"'{chosen}' is not a distribution of ROS {ros}", hint=nearest(chosen, distributions(ros)))
         self._ros = ros
         self.title = f"rosbags {_prefix(ros)}{chosen}"
         self._name = f"{_prefix(ros)}{chosen}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
 
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.dialect import Dialect
@@ -21,8 +20,9 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.message.piece import Piece
 
 _QUOTES = ('"', "'")
-# An element is quoted, with `\"` for the quote itself, or takes all up to the comma. Possessive, or `\"` could also close.
-_ELEMENT = re.compile(r"""\s*("(?:\\"|[^"])*+"|'(?:\\'|[^'])*+'|[^,]*?)\s*(?:,|$)""")
+# An element of an array is quoted, with `\"` for the quote itself, or takes all up to the comma. Possessive, or the
+# quote of `\"` could also close.
+_ELEMENT = re.compile(r"""\s*("(?:\\"|[^"])*+"|'(?:\\'|[^'])*+'|[^\s,"'](?:[^,]*[^\s,])?)\s*(?:,|$)""")
 
 
 def read_value(
@@ -32,7 +32,8 @@ def read_value(
     try:
         return _scalar(piece.text, kind, dialect)
     except ValueError as fault:
-        diagnostics.error(f"'{piece.text}' is no value of {kind}", piece.source, str(fault))
+        shown = f"'{piece.text}' is not a value of {kind}" if piece.text else f"a value of {kind} is missing"
+        diagnostics.error(shown, piece.source, str(fault))
         return None
 
 
@@ -55,11 +56,12 @@ def _array(
     diagnostics: Diagnostics,
 ) -> tuple[Scalar, ...] | None:
     if len(piece.text) < 2 or piece.text[0] != "[" or piece.text[-1] != "]":
-        diagnostics.error(f"'{piece.text}' is no value of {kind}", piece.source, "an array is written '[a, b, c]'")
+        diagnostics.error(f"'{piece.text}' is not a value of {kind}", piece.source, "an array is written '[a, b, c]'")
         return None
-    values = [
-        read_value(part, element, dialect, diagnostics) for part in _elements(piece.part(1, -1 + len(piece.text)))
-    ]
+    elements = _elements(piece.part(1, len(piece.text) - 1), diagnostics)
+    if elements is None:
+        return None
+    values = [read_value(part, element, dialect, diagnostics) for part in elements]
     if hint := _count_fault(kind, len(values)):
         diagnostics.error(f"a default of {len(values)} elements does not fit {kind}", piece.source, hint)
         return None
@@ -67,18 +69,22 @@ def _array(
     return known if len(known) == len(values) else None
 
 
-def _elements(inner: Piece) -> Iterator[Piece]:
-    if not inner.text.strip():
-        return
+def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
+    """The elements between the brackets; None if a fault was noted."""
+    elements: list[Piece] = []
     position = 0
-    # The text is met with a comma behind it, so that the last element ends like all others and `[1,]` has an empty one.
-    while position <= len(inner.text):
+    while inner.text.strip():
         match = _ELEMENT.match(inner.text, position)
-        if match is None:  # an unclosed quote, or text behind a closing one
-            yield inner.part(position).strip()
-            return
-        yield inner.part(*match.span(1))
-        position = match.end() + (not match.group().endswith(","))
+        if match is None:
+            rest = inner.part(position).strip()
+            hint = "elements are parted by ','; a string that starts with a quote ends with it"
+            diagnostics.error(f"element {len(elements) + 1} of the array is empty or not closed", rest.source, hint)
+            return None
+        elements.append(inner.part(*match.span(1)))
+        position = match.end()
+        if not match.group().endswith(","):
+            break
+    return elements
 
 
 def _count_fault(kind: ArrayType | SequenceType, count: int) -> str:

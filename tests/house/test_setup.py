@@ -101,15 +101,15 @@ def test_make_without_a_target_lists_them() -> None:
 
 
 @pytest.mark.parametrize(
-    ("variables", "ending"),
+    ("variables", "arguments"),
     [
         ([], "robot:sys:quat2euler"),
         (["SEED=7"], 'robot:sys:quat2euler --sim_options="-gSEED=7"'),
         (["SYSTEM=a:b:c", "SEED=7", "WAVES=1"], 'a:b:c --sim_options="-gSEED=7 --wave=waves.ghw"'),
     ],
 )
-def test_make_sim_passes_its_variables_on(variables: list[str], ending: str) -> None:
+def test_make_sim_passes_its_variables_on(variables: list[str], arguments: str) -> None:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     command = ["make", "--dry-run", "sim", *variables]
     done = subprocess.run(command, cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
-    assert done.stdout.splitlines()[-1].strip() == f".venv/bin/fusesoc run --target=sim {ending}"
+    assert f" .venv/bin/fusesoc run --target=sim {arguments} 2>&1 | " in " ".join(done.stdout.split())

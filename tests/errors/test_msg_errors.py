@@ -1,0 +1,35 @@
+"""Every bad `.msg` file beside its exact message: `<name>.msg` and `<name>.expected`, a folder for each version.
+
+`UPDATE_EXPECTED=1` writes the messages anew; read them before you commit them.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MessageName, RosVersion
+
+HERE = Path(__file__).parent / "msg"
+FILES = sorted(HERE.glob("ros[12]/*.msg"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parent.name}/{path.stem}")
+def test_message_error(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(HERE)  # so that the messages show relative paths
+    folder = path.parent.name
+    library = MessageLibrary(RosVersion(int(folder[-1])), [Path(folder)])
+    with pytest.raises(InputError) as caught:
+        library.closure(MessageName(folder, path.stem))
+    expected = path.with_suffix(".expected")
+    if os.environ.get("UPDATE_EXPECTED"):
+        expected.write_text(f"{caught.value}\n", encoding="utf-8")
+    assert f"{caught.value}\n" == expected.read_text(encoding="utf-8")
+
+
+def test_every_expected_message_has_its_file() -> None:
+    assert {path.stem for path in HERE.glob("ros[12]/*.expected")} == {path.stem for path in FILES}

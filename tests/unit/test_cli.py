@@ -1,0 +1,167 @@
+"""The command `firm`, as a person calls it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fusesoc_firm.cli import STAGES, main
+from fusesoc_firm.library_path import library_root
+
+ROOT = Path(__file__).resolve().parents[2]
+SPEC = ROOT / "specs" / "quat2euler" / "quat2euler.yaml"
+
+Captured = pytest.CaptureFixture[str]
+
+
+def out(capsys: Captured, *arguments: str) -> str:
+    assert main(arguments) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    return captured.out
+
+
+def error(capsys: Captured, *arguments: str) -> str:
+    assert main(arguments) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "Traceback" not in captured.err
+    return captured.err
+
+
+def test_path_is_the_library(capsys: Captured) -> None:
+    assert Path(out(capsys, "path").strip()) == library_root()
+    assert (library_root() / "generators" / "generators.core").is_file()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [[], ["path"], ["message"], ["message", "list"], ["message", "show"], ["system"], ["system", "check"]],
+    ids=" ".join,
+)
+def test_every_command_has_help_with_an_example(command: list[str], capsys: Captured) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        main([*command, "--help"])
+    text = capsys.readouterr().out
+    assert text.startswith("usage: firm")
+    assert not command or "example: " in text
+
+
+@pytest.mark.parametrize("arguments", [[], ["massage"], ["message", "show"], ["message", "show", "a/B", "--ros", "3"]])
+def test_a_wrong_command_line_ends_with_2(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(arguments)
+
+
+def test_the_tree_tells_type_bits_and_offset(capsys: Captured) -> None:
+    lines = out(capsys, "message", "show", "geometry_msgs/Pose").splitlines()
+    assert lines[0].split() == ["field", "type", "bits", "offset"]
+    assert lines[1].split() == ["geometry_msgs/Pose", "ROS", "2", "480", "0"]
+    assert lines[2].split() == ["position", "geometry_msgs/Point", "192", "4"]
+    assert lines[-1].split() == ["w", "float64", "64", "52"]
+
+
+def test_the_tree_of_a_message_of_variable_size_has_no_offsets(capsys: Captured) -> None:
+    lines = out(capsys, "message", "show", "sensor_msgs/Image", "--ros", "1").splitlines()
+    assert lines[1].split() == ["sensor_msgs/Image", "ROS", "1"]
+    assert ["data", "uint8[]"] in [line.split() for line in lines]
+
+
+def test_a_message_in_the_version_that_is_asked_for(capsys: Captured) -> None:
+    assert "0020" in out(capsys, "message", "show", "geometry_msgs/Quaternion", "--ros", "1", "--stage", "vhdl")
+    assert "0024" in out(capsys, "message", "show", "geometry_msgs/Quaternion", "--ros", "2", "--stage", "vhdl")
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_stage_is_printed(stage: str, capsys: Captured) -> None:
+    text = out(capsys, "message", "show", "geometry_msgs/Point", "--stage", stage)
+    beginning = {
+        "tree": "field",
+        "message": "# geometry_msgs/Point (ROS 2)",
+        "frame": "message: geometry_msgs/Point",
+        "config": "entity: axis_to_geometry_msgs_point",
+        "vhdl": "-- axis_to_geometry_msgs_point: ",
+    }
+    assert text.startswith(beginning[stage])
+    if stage in ("frame", "config"):
+        assert all(isinstance(document, dict) for document in yaml.safe_load_all(text))
+
+
+def test_both_converters_are_printed(capsys: Captured) -> None:
+    text = out(capsys, "message", "show", "geometry_msgs/Point", "--stage", "vhdl")
+    assert text.count("\nend entity") == 2
+    assert "entity geometry_msgs_point_to_axis is" in text
+
+
+def test_messages_of_a_folder(tmp_path: Path, capsys: Captured) -> None:
+    folder = tmp_path / "my_msgs" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Speed.msg").write_text("float32 metres_per_second\n")
+    listed = out(capsys, "message", "list", "my_msgs/*", "--path", str(tmp_path))
+    assert listed.split() == ["my_msgs/Speed", str(folder / "Speed.msg")]
+    assert "metres_per_second" in out(capsys, "message", "show", "my_msgs/Speed", "--path", str(tmp_path))
+
+
+def test_a_fault_in_a_message_is_shown_in_its_file(tmp_path: Path, capsys: Captured) -> None:
+    (tmp_path / "my_msgs").mkdir()
+    (tmp_path / "my_msgs" / "Speed.msg").write_text("flaot32 speed\n")
+    text = error(capsys, "message", "show", "my_msgs/Speed", "--path", str(tmp_path))
+    assert text.startswith(f"{tmp_path}/my_msgs/Speed.msg:1:1: error: ")
+    assert "float32" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["message", "show", "geometry_msgs/Quaterion"], "did you mean 'geometry_msgs/Quaternion'?"),
+        (["message", "show", "Quaternion"], "Quaternion"),
+        (
+            ["message", "show", "sensor_msgs/Image", "--stage", "vhdl"],
+            "field 'data' of type 'uint8[]' has no fixed size",
+        ),
+        (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9 bits"),
+        (["message", "list", "--path", "no/such/folder"], "no/such/folder"),
+        (["message", "list", "--distro", "jazy"], "did you mean 'jazzy'?"),
+        (["system", "check", "no_such.yaml"], "cannot read no_such.yaml"),
+    ],
+)
+def test_faults_are_told_without_a_traceback(arguments: list[str], message: str, capsys: Captured) -> None:
+    assert message in error(capsys, *arguments)
+
+
+def test_a_right_specification(capsys: Captured) -> None:
+    text = out(capsys, "system", "check", str(SPEC))
+    assert text == f"{SPEC}: quat2euler is right: 1 subscriber, 1 accelerator, 1 publisher\n"
+
+
+def test_the_derived_system_has_the_content_of_the_dissertations_listings(capsys: Captured) -> None:
+    derived = yaml.safe_load(out(capsys, "system", "show", str(SPEC)))
+    converters = derived["Converters"]
+    # Listing 6.7.
+    assert [item["nameMW"] for item in converters["AXIS_to_msg"]] == ["geometry_msgs/Quaternion"]
+    assert [item["nameMW"] for item in converters["msg_to_AXIS"]] == ["geometry_msgs/Point"]
+    # Listing 6.9.
+    for field in "xyzw":
+        connection = {
+            "from": f"QuaternionToEuler_sub/{field}",
+            "to": f"QuaternionToEulerConverter/in_{field}",
+        }
+        assert connection in derived["Connections"]
+    assert len(derived["Connections"]) == len("xyzw") + len("xyz") + 2 * len(("segment_valid", "msg_ready"))
+
+
+def test_a_reader_that_leaves_early_is_no_fault() -> None:
+    command = [sys.executable, "-m", "fusesoc_firm.cli", "message", "list"]
+    with subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == b""
