@@ -48,7 +48,7 @@ def _read(path: Path) -> tuple[RosVersion, list[Connection], list[tuple[Connecti
             return RosVersion.ROS2 if reader.is2 else RosVersion.ROS1, list(reader.connections), messages
     except Exception as error:  # noqa: BLE001 - a damaged file makes rosbags and what it uses raise anything
         hint = "stimuli are YAML (.yaml, .yml), a bag of ROS 1 (.bag) or the folder of a bag of ROS 2"
-        fail(f"{path} is no bag that can be read: {error}", hint=hint)
+        fail(f"{path} is not a bag that can be read: {error}", hint=hint)
 
 
 def _stream(connection: Connection) -> Stream:

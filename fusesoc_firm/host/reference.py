@@ -66,7 +66,7 @@ class _Model:
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
             _fail_in_model(self.path, error, f" for {when}", self._line())
         if items is None:
-            self._fail(f"for {when}, 'respond' returned {answer!r}, which is no list", _ANSWER)
+            self._fail(f"for {when}, 'respond' returned {answer!r}, which is not a list", _ANSWER)
         return items
 
     def response(self, item: object, cause: int, when: str, known: Mapping[str, Converter]) -> Response:
@@ -75,9 +75,13 @@ class _Model:
             self._fail(f"for {when}, 'respond' returned {item!r} in its list", _ANSWER)
         block, message = item
         if not isinstance(block, str) or block not in known:
-            self._fail(f"for {when}, 'respond' answered with {block!r}, no publisher", nearest(str(block), known))
+            self._fail(
+                f"for {when}, 'respond' answered with {block!r}, which is not a publisher", nearest(str(block), known)
+            )
         if not isinstance(message, Mapping):
-            self._fail(f"for {when}, 'respond' gave {message!r} to '{block}', which is no mapping of fields", _ANSWER)
+            self._fail(
+                f"for {when}, 'respond' gave {message!r} to '{block}', which is not a mapping of fields", _ANSWER
+            )
         publisher = known[block]
         try:
             return Response(publisher, encode(publisher.frame, message), dict(message), cause)
@@ -122,7 +126,7 @@ def _fail_in_model(path: Path, error: BaseException, when: str, otherwise: int =
     if isinstance(error, SyntaxError) and error.filename == str(path):
         line, column = error.lineno or 1, error.offset or 1
         fail(
-            f"the model is no Python: {error.msg}",
+            f"the model is not Python: {error.msg}",
             SourceRef(str(path), line, column, (error.text or "").rstrip("\n")),
         )
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]

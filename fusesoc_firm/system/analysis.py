@@ -136,7 +136,7 @@ class _Analysis:
                 self.faults.error(f"there is no source file '{source}'", source.source, hint)
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
                 hint = f"legal here: {', '.join(legal)}"
-                self.faults.error(f"'{source}' is no source of type {accelerator.type}", source.source, hint)
+                self.faults.error(f"'{source}' is not a source of type {accelerator.type}", source.source, hint)
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
         """The message sides of an interface, numbered if there are several; None if a message is wrong."""

@@ -84,7 +84,7 @@ def test_a_damaged_bag(tmp_path: Path, kind: str, kept: float) -> None:
     file = path if kind == "ros1" else next(path.glob("*.mcap" if kind == "mcap" else "*.db3"))
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * kept)])
-    with pytest.raises(InputError, match="is no bag that can be read"):
+    with pytest.raises(InputError, match="is not a bag that can be read"):
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", version(kind))])
 
 
@@ -119,10 +119,10 @@ def test_a_bag_without_a_message_for_anybody(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("name", ["notes.txt", "broken.bag", "broken.mcap", "broken.db3"])
 def test_what_is_no_bag(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"This is no bag, whatever it is called.\n" * 10)
-    with pytest.raises(InputError, match=r"is no bag that can be read: .*\n +=? .*YAML"):
+    with pytest.raises(InputError, match=r"is not a bag that can be read: .*\n +=? .*YAML"):
         read_stimuli(tmp_path / name, [subscriber("p", "geometry_msgs/Point", RosVersion.ROS1)])
 
 
 def test_a_folder_that_is_no_bag(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is no bag that can be read"):
+    with pytest.raises(InputError, match="is not a bag that can be read"):
         read_stimuli(tmp_path, [subscriber("p", "geometry_msgs/Point", RosVersion.ROS1)])

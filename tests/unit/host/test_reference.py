@@ -115,7 +115,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "def respond(block, m)\n    return []\n",
             (
-                "model.py:1:22: error: the model is no Python: expected ':'\n"
+                "model.py:1:22: error: the model is not Python: expected ':'\n"
                 "    1 | def respond(block, m)\n      |                      ^"
             ),
         ),
@@ -129,7 +129,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "x = 1\ndef respond(block, m):\n    pass\n",
             (
-                "model.py:2:1: error: for message 0 to 'sub', 'respond' returned None, which is no list\n"
+                "model.py:2:1: error: for message 0 to 'sub', 'respond' returned None, which is not a list\n"
                 "    2 | def respond(block, m):\n      | ^\n"
                 "      = it returns a list of (publisher, message), the message a mapping of fields"
             ),
@@ -145,17 +145,17 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "def respond(block, m):\n    return [('lift', m)]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with 'lift', no publisher\n"
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with 'lift', which is not a publisher\n"
                 "    1 | def respond(block, m):\n      | ^\n      = did you mean 'left'?"
             ),
         ),
         (
             "def respond(block, m):\n    return [([], m)]\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with [], no publisher",
+            "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with [], which is not a publisher",
         ),
         (
             "def respond(block, m):\n    return [('left', 5)]\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' gave 5 to 'left', which is no mapping of fields",
+            "model.py:1:1: error: for message 0 to 'sub', 'respond' gave 5 to 'left', which is not a mapping of fields",
         ),
         (
             "def respond(block, m):\n    return [('left', {'x': 'one', 'y': 0, 'z': 0})]\n",

@@ -218,5 +218,5 @@ def test_a_distribution_is_meant_for_its_own_version(tmp_path: Path, distro: str
 
 def test_an_unknown_distribution(tmp_path: Path) -> None:
     request = Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": "melodious"})
-    with pytest.raises(InputError, match="'melodious' is no distribution"):
+    with pytest.raises(InputError, match="'melodious' is not a distribution"):
         load_requested(request)
