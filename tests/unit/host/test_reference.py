@@ -145,7 +145,8 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "def respond(block, m):\n    return [('lift', m)]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with 'lift', which is not a publisher\n"
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with 'lift', "
+                "which is not a publisher\n"
                 "    1 | def respond(block, m):\n      | ^\n      = did you mean 'left'?"
             ),
         ),
