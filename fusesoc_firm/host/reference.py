@@ -76,7 +76,7 @@ class _Model:
         block, message = item
         if not isinstance(block, str) or block not in known:
             self._fail(
-                f"for {when}, 'respond' answered with {block!r}, which is not a publisher", nearest(str(block), known)
+                f"for {when}, 'respond' gave a message to {block!r}, not a publisher", nearest(str(block), known)
             )
         if not isinstance(message, Mapping):
             self._fail(

@@ -145,14 +145,13 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "def respond(block, m):\n    return [('lift', m)]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with 'lift', "
-                "which is not a publisher\n"
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' gave a message to 'lift', not a publisher\n"
                 "    1 | def respond(block, m):\n      | ^\n      = did you mean 'left'?"
             ),
         ),
         (
             "def respond(block, m):\n    return [([], m)]\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' answered with [], which is not a publisher",
+            "model.py:1:1: error: for message 0 to 'sub', 'respond' gave a message to [], not a publisher",
         ),
         (
             "def respond(block, m):\n    return [('left', 5)]\n",
