@@ -7,10 +7,11 @@ the same arguments and files give the same definitions.
 from __future__ import annotations
 
 import difflib
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.message.dialect import dialect_of
 from fusesoc_firm.message.folders import environment_folders, message_files
 from fusesoc_firm.message.model import (
@@ -23,7 +24,7 @@ from fusesoc_firm.message.model import (
     SequenceType,
 )
 from fusesoc_firm.message.parser import parse_message
-from fusesoc_firm.message.stores import DistributionStore
+from fusesoc_firm.message.stores import DistributionStore, distributions
 
 
 class MessageLibrary:
@@ -155,6 +156,21 @@ class MessageLibrary:
         primitives = difflib.get_close_matches(name.name, sorted(builtin_types), n=1, cutoff=0.8)
         names = [str(known) for known in self.names()]
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
+
+
+def libraries(
+    paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None
+) -> dict[RosVersion, MessageLibrary]:
+    """A library of each version, for those who speak both.
+
+    `store` is a distribution of one of them; the other keeps its default. Raises `InputError` as `MessageLibrary` does.
+    """
+    known = {ros: distributions(ros) for ros in RosVersion}
+    if store is not None and not any(store in names for names in known.values()):
+        fail(f"'{store}' is not a distribution of ROS", hint=nearest(store, itertools.chain(*known.values())))
+    return {
+        ros: MessageLibrary(ros, paths, environment, store if store in names else None) for ros, names in known.items()
+    }
 
 
 def _check_folders(empty: Iterable[Path]) -> None:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.generator import VHDL, message_library, publisher_files, subscriber_files
+from fusesoc_firm.converter.generator import VHDL, library_sources, publisher_files, subscriber_files
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.message.stores import distributions
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
@@ -53,15 +52,7 @@ def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary]) -> Load
 
 def load_requested(request: Request) -> LoadedSystem:
     """The system of a generator call."""
-    return load_system(specification_path(request), {ros: _library(request, ros) for ros in RosVersion})
-
-
-def _library(request: Request, ros: RosVersion) -> MessageLibrary:
-    """The library of one version; a distribution belongs to one, and the other keeps its default."""
-    of_others = [name for other in RosVersion if other is not ros for name in distributions(other)]
-    if request.parameters.get("distro") in of_others:
-        request = replace(request, parameters={**request.parameters, "distro": None})
-    return message_library(request, ros)
+    return load_system(specification_path(request), libraries(*library_sources(request)))
 
 
 def specification_path(request: Request) -> Path:

@@ -147,10 +147,10 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
                 "result": f"result_{argument.port}",
                 "valid": f"valid_{argument.port}",
                 "bits": "(0)" if argument.field.width is None else "",
-                "type": vhdl_type(argument.bits),
             }
             for argument in outputs
         ],
+        "signals": _kernel_signals(inputs, outputs),
         "ports": port_map(_kernel_map(inputs, outputs)),
         "bits_in": [
             {"name": f"argument_{argument.port}", "signal": argument.signal}
@@ -158,6 +158,15 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
             if argument.field.width is None
         ],
     }
+
+
+def _kernel_signals(inputs: Sequence[Argument], outputs: Sequence[Argument]) -> list[Configuration]:
+    """What the kernel's ports need besides the accelerator's own: a vector for a single bit, and every result."""
+    declared = [(f"argument_{item.port}", vhdl_type(1)) for item in inputs if item.field.width is None]
+    for argument in outputs:
+        declared += [(f"result_{argument.port}", vhdl_type(argument.bits)), (f"valid_{argument.port}", vhdl_type(None))]
+    column = max((len(name) for name, _ in declared), default=0)
+    return [{"name": name.ljust(column), "type": type_} for name, type_ in declared]
 
 
 def _kernel_map(inputs: Sequence[Argument], outputs: Sequence[Argument]) -> Iterator[tuple[str, str]]:
