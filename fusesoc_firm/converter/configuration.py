@@ -7,10 +7,12 @@ arithmetic and no choice beyond 'is this there'.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from fusesoc_firm.converter.ports import FieldPort, field_ports
-from fusesoc_firm.converter.slices import Slice, slices_of, stored_offset, windows_of
+from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
+from fusesoc_firm.converter.slices import Slice, slices_of, windows_of
+from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, ranges, stores_of
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
 from fusesoc_firm.naming import entity_name
@@ -19,7 +21,6 @@ Configuration = dict[str, Any]
 
 SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
-WIDTHS = (8,)
 _LARGEST_FRAME = (2**31 - 1) // 8
 
 
@@ -37,30 +38,31 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
     _check_width(width)
     _check_size(frame)
+    stream = Stream(width)
     windows = windows_of(frame)
-    end = LENGTH_BYTES + frame.payload_bytes
-    stored_bytes = sum(last - first for first, last in windows)
-    last_header = min(LENGTH_BYTES, end - 1)
+    stores = stores_of(stream, windows)
+    ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
+    # Until then nothing of the message that waits is touched, and none can follow it.
+    hold_position = min(stream.beat(stream.payload_start), stream.beat(ends[0]))
     return {
-        **_common(frame, subscriber_entity(frame), "out"),
-        "end_position": end,
-        "last_position": end - 1,
-        "position_high": end.bit_length() - 1,
-        "hold_position": last_header,
-        "has_fields": stored_bytes > 0,
-        "has_many_bytes": stored_bytes > 1,
-        "stored_high": 8 * stored_bytes - 1,
-        "windows": [
-            {"first": LENGTH_BYTES + first, "end": LENGTH_BYTES + last, "joint": joint}
-            for (first, last), joint in zip(windows, _joints(len(windows), " or", " else '0';"), strict=True)
-        ],
-        "assignments": _subscriber_assignments(frame, windows),
-        **_length_check(frame),
+        **_common(frame, stream, subscriber_entity(frame), "out"),
+        "is_byte_wide": stream.lanes == 1,
+        "has_void_lane": stream.length_start > 0,
+        "last_position": stream.beat(ends[-1]),
+        "position_high": max(1, stream.beat(ends[-1]).bit_length()) - 1,
+        "hold_position": hold_position,
+        "has_slack": hold_position > 0,
+        "has_fields": bool(windows),
+        "stores": [_store(store, name) for store, name in zip(stores, _store_names(stores), strict=True)],
+        "store_signals": _store_signals(stores),
+        "assignments": _subscriber_assignments(frame, stream, stores),
+        "has_trailing": frame.trailing_bytes > 0,
+        "trailing_bytes": frame.trailing_bytes,
+        "match_high": frame.trailing_bytes,
+        "length_beats": _length_beats(frame, stream),
         "has_encoding": frame.checked_prefix > 0,
-        "prefix_checks": [
-            {"position": LENGTH_BYTES + index, "value": f"{frame.prefix[index]:02x}"}
-            for index in range(frame.checked_prefix)
-        ],
+        "prefix_checks": [_byte_check(stream, *item) for item in _prefix_bytes(frame, stream)],
+        "ends": [_end(stream, number, byte, len(ends)) for number, byte in enumerate(ends)],
     }
 
 
@@ -68,12 +70,17 @@ def publisher_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
     _check_width(width)
     _check_size(frame)
+    stream = Stream(width)
+    beats = stream.beat(frame.frame_bytes - 1) + 1
+    last_lanes = stream.lane(frame.frame_bytes - 1) + 1
     return {
-        **_common(frame, publisher_entity(frame), "in"),
-        "frame_bytes": frame.frame_bytes,
-        "frame_high": 8 * frame.frame_bytes - 1,
-        "position_high": max(1, (frame.frame_bytes - 1).bit_length()) - 1,
-        "pieces": _publisher_pieces(frame),
+        **_common(frame, stream, publisher_entity(frame), "in"),
+        "frame_beats": beats,
+        "frame_high": beats * width - 1,
+        "position_high": max(1, (beats - 1).bit_length()) - 1,
+        "has_partial_beat": last_lanes < stream.lanes,
+        "last_keep": "0" * (stream.lanes - last_lanes) + "1" * last_lanes,
+        "pieces": _publisher_pieces(frame, beats * stream.lanes),
     }
 
 
@@ -90,9 +97,12 @@ def _check_size(frame: Frame) -> None:
         )
 
 
-def _common(frame: Frame, entity: str, direction: str) -> Configuration:
+def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Configuration:
     ports = field_ports(frame)
     return {
+        "width": stream.width,
+        "data_high": stream.width - 1,
+        "keep_high": stream.lanes - 1,
         "entity": entity,
         "message": str(frame.message),
         "ros": int(frame.ros),
@@ -119,53 +129,124 @@ def _port_declarations(ports: Sequence[FieldPort], direction: str) -> list[Confi
     ]
 
 
-def _length_check(frame: Frame) -> Configuration:
-    """What the four length bytes must be: the payload's length, or up to `trailing_bytes` more.
+def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
+    """The beats that carry the length, and for each legal length the bytes that it has there.
 
-    A length that may be longer can carry from its lowest byte into the next; then `carried` is what the
-    upper bytes must be behind such a carry.
+    Legal are the payload's own length and, where writers append bytes, a few more. Bit k of `match` is high as long as
+    the length can be the one with k more.
     """
-    low = frame.payload_bytes.to_bytes(LENGTH_BYTES, "little")
-    high = (frame.payload_bytes + frame.trailing_bytes).to_bytes(LENGTH_BYTES, "little")
-    carries = low[1:] != high[1:]
-    low_bytes = [(low[0] + more) % 256 for more in range(frame.trailing_bytes + 1)]
-    carried_bytes = [byte for byte in low_bytes if byte < low[0]]
+    places = range(stream.length_start, stream.length_start + LENGTH_BYTES)
+    beats = sorted({stream.beat(byte) for byte in places})
+    return [
+        {
+            "position": beat,
+            "condition": "if" if beat == beats[0] else "elsif",
+            "is_first": beat == beats[0],
+            "candidates": [
+                {"number": more, **_length_candidate(frame.payload_bytes + more, beat, stream)}
+                for more in range(frame.trailing_bytes + 1)
+            ],
+        }
+        for beat in beats
+    ]
+
+
+def _length_candidate(length: int, beat: int, stream: Stream) -> Configuration:
+    """The condition under which a beat rules a length out: any of its bytes is there and another one."""
+    data = length.to_bytes(LENGTH_BYTES, "little")
+    checks = [
+        _byte_check(stream, stream.length_start + index, byte)
+        for index, byte in enumerate(data)
+        if stream.beat(stream.length_start + index) == beat
+    ]
+    joints = _joints(len(checks), " or", "")
+    return {"checks": [{**check, "joint": joint} for check, joint in zip(checks, joints, strict=True)]}
+
+
+def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
+    return [(stream.payload_start + index, frame.prefix[index]) for index in range(frame.checked_prefix)]
+
+
+def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
+    """That a byte of the stream has a value; `keep` is its lane's bit of tkeep."""
+    lane = stream.lane(byte)
     return {
-        "has_trailing": frame.trailing_bytes > 0,
-        "trailing_bytes": frame.trailing_bytes,
-        "length_low": low[0],
-        "low_bytes": [f"{byte:02x}" for byte in low_bytes],
-        "length_carries": carries,
-        "carried_bytes": [
-            {"value": f"{byte:02x}", "joint": joint}
-            for byte, joint in zip(carried_bytes, _joints(len(carried_bytes), " or", ""), strict=True)
+        "position": stream.beat(byte),
+        "keep": lane,
+        "is_kept": stream.lanes > 1,
+        "bits": "" if stream.lanes == 1 else f"({stream.data(lane)})",
+        "value": f"{value:02x}",
+    }
+
+
+def _end(stream: Stream, number: int, last_byte: int, count: int) -> Configuration:
+    """Where a frame ends of which bit `number` of `match` tells the length."""
+    lane = stream.lane(last_byte)
+    return {
+        "number": number,
+        "condition": "if" if number == 0 else "elsif",
+        "position": stream.beat(last_byte),
+        "lane": lane,
+        "is_kept": stream.lanes > 1,
+        "has_lane_behind": lane + 1 < stream.lanes,
+        "lane_behind": lane + 1,
+    }
+
+
+def _store_names(stores: Sequence[Store]) -> list[str]:
+    """What tells the stores apart in names: nothing if there is but one."""
+    return [""] if len(stores) == 1 else [f"_{number}" for number in range(len(stores))]
+
+
+def _store(store: Store, suffix: str) -> Configuration:
+    lanes = ranges(store.lanes)
+    register = f"fields{suffix}_r"
+    data = [f"s_axis_tdata({8 * last + 7} downto {8 * first})" for first, last in reversed(lanes)]
+    if len(store.beats) > 1:
+        data.append(f"{register}({store.bits - 1} downto {store.beat_bits})")
+    windows = ranges(store.beats)
+    return {
+        "store": f"store{suffix}",
+        "register": register,
+        "high": store.bits - 1,
+        "data": [
+            {"piece": piece, "joint": joint} for piece, joint in zip(data, _joints(len(data), " &", ";"), strict=True)
         ],
-        "length_checks": [
-            {
-                "position": index,
-                "value": f"{low[index]:02x}",
-                "carried": f"{high[index]:02x}",
-                "carries": low[index] != high[index],
-            }
-            for index in range(1, LENGTH_BYTES)
+        "windows": [
+            {"first": first, "last": last, "is_one": first == last, "joint": joint}
+            for (first, last), joint in zip(windows, _joints(len(windows), " or", " else '0';"), strict=True)
         ],
     }
 
 
-def _subscriber_assignments(frame: Frame, windows: Sequence[tuple[int, int]]) -> list[Configuration]:
-    """`port <= fields_r(...)` for every piece; `fields_r` holds the windows' bytes, the first byte lowest."""
-    pieces = [piece for port in field_ports(frame) for piece in slices_of(port)]
-    column = max([0, *(len(_target(piece)) for piece in pieces)])
-    return [
-        {"target": _target(piece).ljust(column), "value": _stored_value(piece, stored_offset(windows, piece.offset))}
-        for piece in pieces
-    ]
+def _store_signals(stores: Sequence[Store]) -> list[Configuration]:
+    """The declaration of each store and of what makes it take a beat, in columns."""
+    declared = []
+    for store, suffix in zip(stores, _store_names(stores), strict=True):
+        declared += [(f"store{suffix}", vhdl_type(None)), (f"fields{suffix}_r", vhdl_type(store.bits))]
+    column = max((len(name) for name, _ in declared), default=0)
+    return [{"name": name.ljust(column), "type": type_} for name, type_ in declared]
 
 
-def _stored_value(piece: Slice, first_byte: int) -> str:
-    stored = f"fields_r({8 * (first_byte + piece.bytes) - 1} downto {8 * first_byte})"
-    # As roscpp and rospy read a bool: whatever is not zero is true.
-    return f"'0' when {stored} = x\"00\" else '1'" if _is_bit(piece) else stored
+def _subscriber_assignments(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Configuration]:
+    """`port <= fields_r(...)` for every piece of a port that lies in one piece in a store."""
+    names = _store_names(stores)
+    places = StoreMap(stream, stores)
+    pairs: list[tuple[str, str]] = []
+    for port in field_ports(frame):
+        for piece in slices_of(port):
+            low = piece.low
+            for stored in places.pieces(piece.offset, piece.bytes):
+                bits = f"fields{names[stored.store]}_r({stored.high} downto {stored.low})"
+                if _is_bit(piece):
+                    # As roscpp and rospy read a bool: whatever is not zero is true.
+                    pairs.append((_target(piece), f"'0' when {bits} = x\"00\" else '1'"))
+                else:
+                    part = replace(piece, low=low, width=8 * stored.count)
+                    pairs.append((_target(part), bits))
+                low += 8 * stored.count
+    column = max([0, *(len(target) for target, _ in pairs)])
+    return [{"target": target.ljust(column), "value": value} for target, value in pairs]
 
 
 def _target(piece: Slice) -> str:
@@ -180,8 +261,8 @@ def _is_bit(piece: Slice) -> bool:
     return piece.port.field.type.bits == 1
 
 
-def _publisher_pieces(frame: Frame) -> list[Configuration]:
-    """`frame(...) <= value` for every part of the frame: the header, the constant bytes, the fields."""
+def _publisher_pieces(frame: Frame, size: int) -> list[Configuration]:
+    """`frame(...) <= value` for every part of the frame: the header, constant bytes, fields, and zeros up to `size`."""
     header = ID_BYTES + LENGTH_BYTES
     pieces = [
         (0, ID_BYTES, f"std_logic_vector(to_unsigned(ID, {8 * ID_BYTES}))"),
@@ -193,6 +274,8 @@ def _publisher_pieces(frame: Frame) -> list[Configuration]:
             for piece in slices_of(port)
         ),
     ]
+    if size > frame.frame_bytes:
+        pieces.append((frame.frame_bytes, size - frame.frame_bytes, "(others => '0')"))
     targets = [f"frame({8 * (first + count) - 1} downto {8 * first})" for first, count, _ in pieces]
     column = max(map(len, targets))
     return [

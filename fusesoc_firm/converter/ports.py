@@ -12,11 +12,13 @@ _TAKEN = """
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
     segment_valid msg_valid msg_ready frame_error frame_error_code
-    id code_t no_fault bad_length short_frame long_frame bad_encoding end_position frame_bytes
-    position_r position_last trailing_r carry_r fields_r fault_r msg_valid_r fault beat_fault ready beat store frame
+    id code_t no_fault bad_length short_frame long_frame bad_encoding last_position no_length frame_beats
+    position_r position_last match match_r compare fields_r fault_r msg_valid_r fault beat_fault ready beat store frame
     check receive send u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
     std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
 """.split()
+# A wide stream has up to one store a lane.
+_TAKEN += [name for number in range(64) for name in (f"store_{number}", f"fields_{number}_r")]
 
 
 @dataclass(frozen=True)

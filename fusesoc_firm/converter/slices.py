@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fusesoc_firm.converter.ports import FieldPort
@@ -51,13 +51,3 @@ def windows_of(frame: Frame) -> list[tuple[int, int]]:
         else:
             windows.append((first, end))
     return windows
-
-
-def stored_offset(windows: Sequence[tuple[int, int]], offset: int) -> int:
-    """Where the payload's byte `offset` lies once the bytes outside the windows are left out."""
-    stored = 0
-    for first, end in windows:
-        if offset < end:
-            return stored + offset - first
-        stored += end - first
-    raise ValueError(f"byte {offset} lies in no window")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fusesoc_firm.converter.configuration import WIDTHS
+from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.diagnostics import Diagnostics, fail
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.grammar import Section, key, read

@@ -1,7 +1,7 @@
 -- axis_to_geometry_msgs_quaternion: a frame of geometry_msgs/Quaternion (ROS 1) to its fields.
 --
 -- s_axis carries the frame behind its id: length (4 bytes), payload (32 bytes). msg_valid rises
--- behind the last byte and stays, with the fields, until msg_ready; the next frame's length may come meanwhile.
+-- behind the last beat and stays, with the fields, until msg_ready.
 -- A broken frame gives one cycle of frame_error instead, and the next frame is received as usual.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
@@ -43,11 +43,15 @@ architecture rtl of axis_to_geometry_msgs_quaternion is
   constant SHORT_FRAME  : code_t := "0010";
   constant LONG_FRAME   : code_t := "0011";
 
-  -- One behind the last byte that a frame must have, counted from the length's first byte.
-  constant END_POSITION : natural := 36;
+  -- The beat with the last byte that a frame may have, counted from the length's.
+  constant LAST_POSITION : natural := 35;
+  constant NO_LENGTH     : std_logic_vector(0 downto 0) := (others => '0');
 
-  -- The byte on s_axis; rests at END_POSITION until tlast.
+  -- The beat on s_axis; rests at LAST_POSITION until tlast.
   signal position_r : unsigned(5 downto 0) := (others => '0');
+  -- Whether the bytes of the length so far are right.
+  signal match      : std_logic_vector(0 downto 0);
+  signal match_r    : std_logic_vector(0 downto 0) := (others => '0');
 
   signal ready, beat   : std_logic;
   -- The fault of this beat, and the frame's first fault so far.
@@ -55,9 +59,9 @@ architecture rtl of axis_to_geometry_msgs_quaternion is
   signal fault         : code_t;
   signal fault_r       : code_t := NO_FAULT;
   signal msg_valid_r   : std_logic := '0';
-  signal store         : std_logic;
-  -- The bytes of the fields; every new one pushes the others down.
-  signal fields_r      : std_logic_vector(255 downto 0);
+  -- The bytes of the fields; those of a new beat push the others down.
+  signal store    : std_logic;
+  signal fields_r : std_logic_vector(255 downto 0);
 
 begin
 
@@ -67,7 +71,7 @@ begin
   s_axis_tready <= ready;
 
   store <= '1' when
-      (position_r >= 4 and position_r < 36) else '0';
+      (position_r >= 4 and position_r <= 35) else '0';
 
   -- Each field as it lies among the bytes that were stored.
   x <= fields_r(63 downto 0);
@@ -78,22 +82,47 @@ begin
   segment_valid <= (others => msg_valid_r);
   msg_valid     <= msg_valid_r;
 
-  check : process (position_r, s_axis_tdata, s_axis_tlast, fault_r, beat_fault)
+  compare : process (position_r, s_axis_tdata, match_r)
+  begin
+    match <= match_r;
+    if position_r = 0 then
+      match <= (others => '1');
+      if
+          s_axis_tdata /= x"20"
+      then
+        match(0) <= '0';
+      end if;
+    elsif position_r = 1 then
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(0) <= '0';
+      end if;
+    elsif position_r = 2 then
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(0) <= '0';
+      end if;
+    elsif position_r = 3 then
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(0) <= '0';
+      end if;
+    end if;
+  end process;
+
+  check : process (position_r, s_axis_tlast, match, fault_r, beat_fault)
   begin
     beat_fault <= NO_FAULT;
-    if position_r = 0
-       and s_axis_tdata /= x"20"
-    then
+    if match = NO_LENGTH then
       beat_fault <= BAD_LENGTH;
-    elsif position_r = 1 and s_axis_tdata /= x"00" then
-      beat_fault <= BAD_LENGTH;
-    elsif position_r = 2 and s_axis_tdata /= x"00" then
-      beat_fault <= BAD_LENGTH;
-    elsif position_r = 3 and s_axis_tdata /= x"00" then
-      beat_fault <= BAD_LENGTH;
-    elsif position_r = END_POSITION then
-      beat_fault <= LONG_FRAME;
-    elsif s_axis_tlast = '1' and position_r /= END_POSITION - 1 then
+    elsif match(0) = '1' and position_r = 35 then
+      if s_axis_tlast = '0' then
+        beat_fault <= LONG_FRAME;
+      end if;
+    elsif s_axis_tlast = '1' then
       beat_fault <= SHORT_FRAME;
     end if;
 
@@ -124,13 +153,16 @@ begin
           end if;
         else
           fault_r <= fault;
-          if position_r /= END_POSITION then
+          if position_r /= LAST_POSITION then
             position_r <= position_r + 1;
           end if;
         end if;
+        match_r <= match;
 
         if store = '1' then
-          fields_r <= s_axis_tdata & fields_r(255 downto 8);
+          fields_r <=
+              s_axis_tdata(7 downto 0) &
+              fields_r(255 downto 8);
         end if;
       end if;
 

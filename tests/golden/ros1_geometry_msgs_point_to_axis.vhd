@@ -1,7 +1,7 @@
 -- geometry_msgs_point_to_axis: the fields of geometry_msgs/Point (ROS 1) to a frame.
 --
 -- The frame is id (1 byte), length (4 bytes), payload (24 bytes). segment_valid says that the fields hold;
--- they must do so until msg_ready, which comes with the frame's last byte. Nothing is stored but the position.
+-- they must do so until msg_ready, which comes with the frame's last beat. Nothing is stored but the position.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
 library ieee;
@@ -35,11 +35,11 @@ end entity;
 
 architecture rtl of geometry_msgs_point_to_axis is
 
-  constant FRAME_BYTES : natural := 29;
+  constant FRAME_BEATS : natural := 29;
 
   -- The whole frame, its first byte lowest.
   signal frame         : std_logic_vector(231 downto 0);
-  -- The byte on m_axis.
+  -- The beat on m_axis.
   signal position_r    : unsigned(4 downto 0) := (others => '0');
   signal position_last : std_logic;
 
@@ -55,11 +55,11 @@ begin
   frame(167 downto 104) <= y;
   frame(231 downto 168) <= z;
 
-  position_last <= '1' when position_r = FRAME_BYTES - 1 else '0';
+  position_last <= '1' when position_r = FRAME_BEATS - 1 else '0';
 
   u_select : entity firm.firm_axis_select
     generic map (
-      WORDS => FRAME_BYTES,
+      WORDS => FRAME_BEATS,
       WIDTH => 8
     )
     port map (
@@ -68,7 +68,7 @@ begin
       word     => m_axis_tdata
     );
 
-  m_axis_tkeep  <= "1";
+  m_axis_tkeep  <= (others => '1');
   m_axis_tvalid <= segment_valid(0);
   m_axis_tlast  <= position_last;
   msg_ready     <= segment_valid(0) and m_axis_tready and position_last;

@@ -1,7 +1,7 @@
 -- awkward_msgs_gaps_to_axis: the fields of awkward_msgs/Gaps (ROS 2) to a frame.
 --
 -- The frame is id (1 byte), length (4 bytes), payload (92 bytes). segment_valid says that the fields hold;
--- they must do so until msg_ready, which comes with the frame's last byte. Nothing is stored but the position.
+-- they must do so until msg_ready, which comes with the frame's last beat. Nothing is stored but the position.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
 library ieee;
@@ -40,11 +40,11 @@ end entity;
 
 architecture rtl of awkward_msgs_gaps_to_axis is
 
-  constant FRAME_BYTES : natural := 97;
+  constant FRAME_BEATS : natural := 97;
 
   -- The whole frame, its first byte lowest.
   signal frame         : std_logic_vector(775 downto 0);
-  -- The byte on m_axis.
+  -- The beat on m_axis.
   signal position_r    : unsigned(6 downto 0) := (others => '0');
   signal position_last : std_logic;
 
@@ -78,11 +78,11 @@ begin
   frame(655 downto 648) <= single_tail;
   frame(775 downto 712) <= last;
 
-  position_last <= '1' when position_r = FRAME_BYTES - 1 else '0';
+  position_last <= '1' when position_r = FRAME_BEATS - 1 else '0';
 
   u_select : entity firm.firm_axis_select
     generic map (
-      WORDS => FRAME_BYTES,
+      WORDS => FRAME_BEATS,
       WIDTH => 8
     )
     port map (
@@ -91,7 +91,7 @@ begin
       word     => m_axis_tdata
     );
 
-  m_axis_tkeep  <= "1";
+  m_axis_tkeep  <= (others => '1');
   m_axis_tvalid <= segment_valid(0);
   m_axis_tlast  <= position_last;
   msg_ready     <= segment_valid(0) and m_axis_tready and position_last;

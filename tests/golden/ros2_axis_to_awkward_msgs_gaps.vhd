@@ -1,7 +1,7 @@
 -- axis_to_awkward_msgs_gaps: a frame of awkward_msgs/Gaps (ROS 2) to its fields.
 --
 -- s_axis carries the frame behind its id: length (4 bytes), payload (92 bytes). msg_valid rises
--- behind the last byte and stays, with the fields, until msg_ready; the next frame's length may come meanwhile.
+-- behind the last beat and stays, with the fields, until msg_ready.
 -- A broken frame gives one cycle of frame_error instead, and the next frame is received as usual.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
@@ -48,13 +48,15 @@ architecture rtl of axis_to_awkward_msgs_gaps is
   constant LONG_FRAME   : code_t := "0011";
   constant BAD_ENCODING : code_t := "0100";
 
-  -- One behind the last byte that a frame must have, counted from the length's first byte.
-  constant END_POSITION : natural := 96;
+  -- The beat with the last byte that a frame may have, counted from the length's.
+  constant LAST_POSITION : natural := 98;
+  constant NO_LENGTH     : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The byte on s_axis; rests at END_POSITION until tlast.
+  -- The beat on s_axis; rests at LAST_POSITION until tlast.
   signal position_r : unsigned(6 downto 0) := (others => '0');
-  -- Bytes behind the last field that the frame announced and that are still to come.
-  signal trailing_r : unsigned(1 downto 0) := (others => '0');
+  -- Which length the bytes so far can be: bit k that of the payload's 92 bytes and k that its writer appended.
+  signal match      : std_logic_vector(3 downto 0);
+  signal match_r    : std_logic_vector(3 downto 0) := (others => '0');
 
   signal ready, beat   : std_logic;
   -- The fault of this beat, and the frame's first fault so far.
@@ -62,9 +64,9 @@ architecture rtl of axis_to_awkward_msgs_gaps is
   signal fault         : code_t;
   signal fault_r       : code_t := NO_FAULT;
   signal msg_valid_r   : std_logic := '0';
-  signal store         : std_logic;
-  -- The bytes of the fields; every new one pushes the others down.
-  signal fields_r      : std_logic_vector(431 downto 0);
+  -- The bytes of the fields; those of a new beat push the others down.
+  signal store    : std_logic;
+  signal fields_r : std_logic_vector(431 downto 0);
 
 begin
 
@@ -74,13 +76,13 @@ begin
   s_axis_tready <= ready;
 
   store <= '1' when
-      (position_r >= 8 and position_r < 9) or
-      (position_r >= 16 and position_r < 26) or
-      (position_r >= 32 and position_r < 42) or
-      (position_r >= 48 and position_r < 57) or
-      (position_r >= 58 and position_r < 65) or
-      (position_r >= 72 and position_r < 81) or
-      (position_r >= 88 and position_r < 96) else '0';
+      position_r = 8 or
+      (position_r >= 16 and position_r <= 25) or
+      (position_r >= 32 and position_r <= 41) or
+      (position_r >= 48 and position_r <= 56) or
+      (position_r >= 58 and position_r <= 64) or
+      (position_r >= 72 and position_r <= 80) or
+      (position_r >= 88 and position_r <= 95) else '0';
 
   -- Each field as it lies among the bytes that were stored.
   elements_flag(0)               <= '0' when fields_r(7 downto 0) = x"00" else '1';
@@ -101,31 +103,123 @@ begin
   segment_valid <= (others => msg_valid_r);
   msg_valid     <= msg_valid_r;
 
-  check : process (position_r, s_axis_tdata, s_axis_tlast, fault_r, beat_fault, trailing_r)
+  compare : process (position_r, s_axis_tdata, match_r)
+  begin
+    match <= match_r;
+    if position_r = 0 then
+      match <= (others => '1');
+      if
+          s_axis_tdata /= x"5c"
+      then
+        match(0) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"5d"
+      then
+        match(1) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"5e"
+      then
+        match(2) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"5f"
+      then
+        match(3) <= '0';
+      end if;
+    elsif position_r = 1 then
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(0) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(1) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(2) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(3) <= '0';
+      end if;
+    elsif position_r = 2 then
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(0) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(1) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(2) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(3) <= '0';
+      end if;
+    elsif position_r = 3 then
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(0) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(1) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(2) <= '0';
+      end if;
+      if
+          s_axis_tdata /= x"00"
+      then
+        match(3) <= '0';
+      end if;
+    end if;
+  end process;
+
+  check : process (position_r, s_axis_tdata, s_axis_tlast, match, fault_r, beat_fault)
   begin
     beat_fault <= NO_FAULT;
-    -- The payload's 92 bytes, or up to 3 more that its writer appended.
-    if position_r = 0
-       and s_axis_tdata /= x"5c"
-       and s_axis_tdata /= x"5d"
-       and s_axis_tdata /= x"5e"
-       and s_axis_tdata /= x"5f"
-    then
-      beat_fault <= BAD_LENGTH;
-    elsif position_r = 1 and s_axis_tdata /= x"00" then
-      beat_fault <= BAD_LENGTH;
-    elsif position_r = 2 and s_axis_tdata /= x"00" then
-      beat_fault <= BAD_LENGTH;
-    elsif position_r = 3 and s_axis_tdata /= x"00" then
+    if match = NO_LENGTH then
       beat_fault <= BAD_LENGTH;
     elsif position_r = 4 and s_axis_tdata /= x"00" then
       beat_fault <= BAD_ENCODING;
     elsif position_r = 5 and s_axis_tdata /= x"01" then
       beat_fault <= BAD_ENCODING;
-    elsif position_r = END_POSITION and trailing_r = 0 then
-      beat_fault <= LONG_FRAME;
-    elsif s_axis_tlast = '1' and not ((position_r = END_POSITION - 1 and trailing_r = 0)
-                                      or (position_r = END_POSITION and trailing_r = 1)) then
+    elsif match(0) = '1' and position_r = 95 then
+      if s_axis_tlast = '0' then
+        beat_fault <= LONG_FRAME;
+      end if;
+    elsif match(1) = '1' and position_r = 96 then
+      if s_axis_tlast = '0' then
+        beat_fault <= LONG_FRAME;
+      end if;
+    elsif match(2) = '1' and position_r = 97 then
+      if s_axis_tlast = '0' then
+        beat_fault <= LONG_FRAME;
+      end if;
+    elsif match(3) = '1' and position_r = 98 then
+      if s_axis_tlast = '0' then
+        beat_fault <= LONG_FRAME;
+      end if;
+    elsif s_axis_tlast = '1' then
       beat_fault <= SHORT_FRAME;
     end if;
 
@@ -156,20 +250,16 @@ begin
           end if;
         else
           fault_r <= fault;
-          if position_r /= END_POSITION then
+          if position_r /= LAST_POSITION then
             position_r <= position_r + 1;
           end if;
         end if;
-
-        if position_r = 0 then
-          -- Of a right length only these two bits are not known beforehand.
-          trailing_r <= resize(unsigned(s_axis_tdata) - 92, 2);
-        elsif position_r = END_POSITION then
-          trailing_r <= trailing_r - 1;
-        end if;
+        match_r <= match;
 
         if store = '1' then
-          fields_r <= s_axis_tdata & fields_r(431 downto 8);
+          fields_r <=
+              s_axis_tdata(7 downto 0) &
+              fields_r(431 downto 8);
         end if;
       end if;
 
@@ -179,7 +269,6 @@ begin
         msg_valid_r      <= '0';
         frame_error      <= '0';
         frame_error_code <= NO_FAULT;
-        trailing_r       <= (others => '0');
       end if;
     end if;
   end process;

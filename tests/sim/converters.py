@@ -31,7 +31,6 @@ from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.unit.frame.oracle import Oracle
 from tests.unit.frame.samples import AWKWARD
 
-WIDTH = 8
 SUBSCRIBER = 1
 PUBLISHER = 2
 LENGTH_BYTES = 4
@@ -43,24 +42,24 @@ _LONGEST_TAIL = {RosVersion.ROS1: 0, RosVersion.ROS2: 3}
 
 @dataclass(frozen=True)
 class ConverterBench:
-    """GHDL's libraries in one directory: `firm`, and one for the converters of each ROS version."""
+    """GHDL's libraries in one directory: `firm`, and one for the converters of each ROS version and width."""
 
     directory: Path
     oracles: Mapping[RosVersion, Oracle] = field(default_factory=lambda: {r: Oracle(r, AWKWARD[r]) for r in RosVersion})
-    pairs: dict[tuple[RosVersion, str], Pair] = field(default_factory=dict)
+    pairs: dict[tuple[RosVersion, str, int], Pair] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(
             core_files("axis/axis", "sched/fixed_priority", "manager/manager", "sim/host")
         )
 
-    def pair(self, ros: RosVersion, name: str) -> Pair:
+    def pair(self, ros: RosVersion, name: str, width: int = 8) -> Pair:
         """The converters of a message with their bench, generated and analysed once."""
-        if (ros, name) not in self.pairs:
-            pair = Pair(Library(f"ros{int(ros)}", self.directory), self.oracles[ros], name)
+        if (ros, name, width) not in self.pairs:
+            pair = Pair(Library(f"ros{int(ros)}_{width}", self.directory), self.oracles[ros], name, width)
             pair.analyse()
-            self.pairs[ros, name] = pair
-        return self.pairs[ros, name]
+            self.pairs[ros, name, width] = pair
+        return self.pairs[ros, name, width]
 
 
 @dataclass(frozen=True)
@@ -80,6 +79,7 @@ class Pair:
     library: Library
     oracle: Oracle
     name: str
+    width: int = 8
 
     @cached_property
     def frame(self) -> Frame:
@@ -95,7 +95,7 @@ class Pair:
 
     def analyse(self) -> None:
         """Generate and analyse converters and bench."""
-        files = subscriber_files([self.frame], WIDTH) | publisher_files([self.frame], WIDTH)
+        files = subscriber_files([self.frame], self.width) | publisher_files([self.frame], self.width)
         folder = self.library.directory / self.library.name
         folder.mkdir(exist_ok=True)
         for name, file in files.items():
@@ -114,7 +114,7 @@ class Pair:
         """Send the frames; the run fails unless just the good ones come back and every other is reported."""
         answers = [(cause, self._answer(sent)) for cause, sent in enumerate(frames) if self.is_good(sent)]
         write_stimulus(directory / "stimulus.txt", (sent.to_bytes() for sent in frames))
-        write_expected(directory / "expected.txt", answers, sum(not sent.body for sent in frames))
+        write_expected(directory / "expected.txt", answers, sum(not self._reaches_converter(sent) for sent in frames))
         with (directory / "expected.txt").open("a", encoding="ascii") as file:
             file.write(f"! frame_error {len(self.error_codes(frames))}\n")
         result = self.library.run(self._bench, generics, directory=directory)
@@ -124,6 +124,10 @@ class Pair:
         # At the very beginning the wires of a netlist are undefined; later, a warning means that a fault was hidden.
         assert not re.search(r"^(?!.*@0ms).*warning", result.output, re.MULTILINE), result.output
         return result
+
+    def beats(self, sent: Sent) -> int:
+        """Beats that the host sends for a frame."""
+        return -(-len(sent.to_bytes()) // (self.width // 8))
 
     def payload(self, source: random.Random) -> bytes:
         """A random message as rosbags serialises it."""
@@ -135,11 +139,11 @@ class Pair:
 
     def error_codes(self, frames: Sequence[Sent]) -> list[int]:
         """The codes that the frames must give, in their order."""
-        return [code for sent in frames if sent.body and (code := self._verdict(sent.body))]
+        return [code for sent in frames if self._reaches_converter(sent) and (code := self._verdict(sent.body))]
 
     def is_good(self, sent: Sent) -> bool:
         """Whether a message must come of the frame."""
-        return bool(sent.body) and self._verdict(sent.body) == 0
+        return self._verdict(sent.body) == 0
 
     def field_bits(self, value: Mapping[str, Any]) -> int:
         """What all ports of the message side together must show for a message: the first field lowest."""
@@ -149,6 +153,10 @@ class Pair:
                 bits |= _element_bits(element, port) << low
                 low += port.field.type.bits
         return bits
+
+    def _reaches_converter(self, sent: Sent) -> bool:
+        """An id alone is a beat of its own at 8 bits, which the Manager keeps and reports; wider, it is passed on."""
+        return bool(sent.body) or self.width > 8
 
     def _verdict(self, body: bytes) -> int:
         """0, or the code of the first fault in the order of the bytes."""
@@ -200,6 +208,9 @@ class Pair:
             "publisher_entity": publisher,
             "subscriber": SUBSCRIBER,
             "publisher": PUBLISHER,
+            "width": self.width,
+            "data_high": self.width - 1,
+            "keep_high": self.width // 8 - 1,
             "select_high": PUBLISHER.bit_length() - 1,
             "bits_high": max(1, low) - 1,
             "fields": fields,

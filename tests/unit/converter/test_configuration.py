@@ -13,7 +13,8 @@ from fusesoc_firm.converter.configuration import (
     subscriber_entity,
 )
 from fusesoc_firm.converter.ports import field_ports
-from fusesoc_firm.converter.slices import slices_of, stored_offset, windows_of
+from fusesoc_firm.converter.slices import slices_of, windows_of
+from fusesoc_firm.converter.stream import WIDTHS, Store, StoredBytes, StoreMap, Stream, ranges, stores_of
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.naming import KEYWORDS
@@ -104,7 +105,11 @@ def test_windows_leave_the_gaps_out() -> None:
     frame = layout(ROS2, "uint8 a\nuint32[2] b\nuint8 c\nfloat64 d\n")
     windows = windows_of(frame)
     assert windows == [(4, 5), (8, 17), (20, 28)]
-    assert [stored_offset(windows, offset) for offset in (4, 8, 16, 20)] == [0, 1, 9, 10]
+    (store,) = stores_of(Stream(8), windows)
+    assert store.bits == 8 * (1 + 9 + 8)
+    places = StoreMap(Stream(8), [store])
+    assert places.pieces(8, 9) == [StoredBytes(0, 8, 9)]
+    assert [places.pieces(offset, 1)[0].low for offset in (4, 8, 16, 20)] == [0, 8, 72, 80]
     assert windows_of(layout(ROS2, "")) == []
 
 
@@ -122,33 +127,90 @@ def test_bools_are_pieces_of_a_bit_and_the_rest_is_cut_at_gaps_only() -> None:
     ]
 
 
-def test_a_publisher_drives_each_bit_once() -> None:
-    for ros in RosVersion:
-        frame = layout(ros, "bool a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
-        driven: list[int] = []
-        for piece in publisher_configuration(frame, 8)["pieces"]:
-            high, low = piece["target"].strip().removeprefix("frame(").removesuffix(")").split(" downto ")
-            driven += range(int(low), int(high) + 1)
-        assert sorted(driven) == list(range(8 * frame.frame_bytes))
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("ros", RosVersion)
+def test_a_publisher_drives_each_bit_once(ros: RosVersion, width: int) -> None:
+    frame = layout(ros, "bool a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
+    configuration = publisher_configuration(frame, width)
+    driven: list[int] = []
+    for piece in configuration["pieces"]:
+        high, low = piece["target"].strip().removeprefix("frame(").removesuffix(")").split(" downto ")
+        driven += range(int(low), int(high) + 1)
+    assert sorted(driven) == list(range(configuration["frame_high"] + 1))
+
+
+def test_lanes_that_are_used_in_the_same_beats_share_a_store() -> None:
+    # Behind the void lane and the length, 32 bytes begin in lane 5 of 8 and end in lane 4.
+    narrow, wide = stores_of(Stream(64), [(0, 32)])
+    assert narrow == Store(lanes=(0, 1, 2, 3, 4), beats=(1, 2, 3, 4))
+    assert wide == Store(lanes=(5, 6, 7), beats=(0, 1, 2, 3))
+    places = StoreMap(Stream(64), [narrow, wide])
+    assert places.pieces(0, 8) == [StoredBytes(1, 0, 3), StoredBytes(0, 0, 5)]
+    assert places.pieces(24, 8) == [StoredBytes(1, 72, 3), StoredBytes(0, 120, 5)]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("ros", RosVersion)
+def test_every_bit_of_a_field_comes_from_a_bit_of_its_own(ros: RosVersion, width: int) -> None:
+    frame = layout(ros, "int8 a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
+    configuration = subscriber_configuration(frame, width)
+    kept = sum(store["high"] + 1 for store in configuration["stores"])
+    assert kept == sum(port.width or 1 for port in field_ports(frame))
+    read = [assignment["value"] for assignment in configuration["assignments"]]
+    assert len(set(read)) == len(read)
+
+
+def test_ranges() -> None:
+    assert ranges([]) == []
+    assert ranges([3]) == [(3, 3)]
+    assert ranges([0, 1, 2, 5, 7, 8]) == [(0, 2), (5, 5), (7, 8)]
+
+
+def lengths(ros: RosVersion, count: int, width: int) -> list[list[list[str]]]:
+    """For each beat with a part of the length, and each legal length, the bytes that it has there."""
+    beats = subscriber_configuration(layout(ros, f"uint8[{count}] a\n"), width)["length_beats"]
+    return [[[check["value"] for check in one["checks"]] for one in beat["candidates"]] for beat in beats]
 
 
 def test_the_lengths_of_ros1_and_ros2() -> None:
-    one = subscriber_configuration(layout(ROS1, "uint8[300] a\n"), 8)
-    assert (one["low_bytes"], one["length_carries"], one["has_trailing"]) == (["2c"], False, False)
-    assert [check["value"] for check in one["length_checks"]] == ["01", "00", "00"]
-    two = subscriber_configuration(layout(ROS2, "uint8[250] a\n"), 8)
-    assert (two["low_bytes"], two["length_carries"], two["has_trailing"]) == (["fe", "ff", "00", "01"], True, True)
-    assert [byte["value"] for byte in two["carried_bytes"]] == ["00", "01"]
-    assert [(check["value"], check["carried"]) for check in two["length_checks"]] == [
-        ("00", "01"),
-        ("00", "00"),
-        ("00", "00"),
+    assert lengths(ROS1, 300, 8) == [[["2c"]], [["01"]], [["00"]], [["00"]]]
+    assert lengths(ROS1, 300, 64) == [[["2c", "01", "00", "00"]]]
+    # A payload of 254 bytes and up to three behind it.
+    assert lengths(ROS2, 250, 32) == [
+        [["fe", "00", "00"], ["ff", "00", "00"], ["00", "01", "00"], ["01", "01", "00"]],
+        [["00"], ["00"], ["00"], ["00"]],
     ]
 
 
-@pytest.mark.parametrize(("count", "carries"), [(248, False), (249, True), (251, True), (252, False)])
-def test_a_length_carries_only_where_three_more_bytes_reach_it(count: int, carries: bool) -> None:
-    assert subscriber_configuration(layout(ROS2, f"uint8[{count}] a\n"), 8)["length_carries"] is carries
+@pytest.mark.parametrize(
+    ("width", "last_beats", "last_lanes"),
+    [
+        (8, [8, 9, 10, 11], [0, 0, 0, 0]),
+        (32, [2, 2, 2, 3], [1, 2, 3, 0]),
+        (64, [1, 1, 1, 1], [1, 2, 3, 4]),
+        (512, [0, 0, 0, 0], [9, 10, 11, 12]),
+    ],
+)
+def test_where_a_frame_may_end(width: int, last_beats: list[int], last_lanes: list[int]) -> None:
+    configuration = subscriber_configuration(layout(ROS2, "uint8 a\n"), width)
+    assert [end["position"] for end in configuration["ends"]] == last_beats
+    assert [end["lane"] for end in configuration["ends"]] == last_lanes
+    assert configuration["last_position"] == last_beats[-1]
+
+
+@pytest.mark.parametrize(("width", "hold"), [(8, 4), (16, 2), (32, 1), (64, 0), (512, 0)])
+def test_what_a_waiting_message_lets_pass(width: int, hold: int) -> None:
+    configuration = subscriber_configuration(layout(ROS1, "float64[4] a\n"), width)
+    assert configuration["hold_position"] == hold
+    assert configuration["has_slack"] is (hold > 0)
+
+
+@pytest.mark.parametrize(("width", "beats", "keep"), [(8, 13, "1"), (32, 4, "0001"), (64, 2, "00011111")])
+def test_the_publishers_last_beat(width: int, beats: int, keep: str) -> None:
+    configuration = publisher_configuration(layout(ROS1, "float64 a\n"), width)
+    assert (configuration["frame_beats"], configuration["last_keep"]) == (beats, keep)
+    assert configuration["frame_high"] == beats * width - 1
+    assert configuration["has_partial_beat"] is ("0" in keep)
 
 
 def test_widths_without_a_template_are_refused() -> None:

@@ -24,9 +24,9 @@ MESSAGES = [
 LONGEST_LINE = 120
 
 
-def texts(frame: Frame) -> dict[str, str]:
+def texts(frame: Frame, width: int = 8) -> dict[str, str]:
     """Both converters of a message by their files' names."""
-    files = subscriber_files([frame], 8) | publisher_files([frame], 8)
+    files = subscriber_files([frame], width) | publisher_files([frame], width)
     return {name: str(file.content) for name, file in files.items()}
 
 
@@ -45,9 +45,15 @@ def test_golden_files(ros: RosVersion, name: str, file: str) -> None:
     check_golden(f"ros{int(ros)}_{file}", texts(ORACLES[ros].frame(name))[file])
 
 
+@pytest.mark.parametrize("file", ["axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"])
+def test_golden_files_of_a_wide_stream(file: str) -> None:
+    check_golden(f"ros2_64_{file}", texts(ORACLES[ROS2].frame("geometry_msgs/Quaternion"), 64)[file])
+
+
+@pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize(("ros", "name"), MESSAGES)
-def test_the_text_is_clean(ros: RosVersion, name: str) -> None:
-    for file, text in texts(ORACLES[ros].frame(name)).items():
+def test_the_text_is_clean(ros: RosVersion, name: str, width: int) -> None:
+    for file, text in texts(ORACLES[ros].frame(name), width).items():
         code = re.sub(r"--.*", "", text)
         assert text.isascii(), file
         assert text.endswith("\n"), file

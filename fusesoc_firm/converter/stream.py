@@ -1,0 +1,129 @@
+"""Where the bytes of a frame lie on a stream of some width, and which registers keep those of the fields.
+
+A subscriber's stream carries the frame behind its id. At 8 bits it starts with the length; at wider streams the
+id's byte is still there, in the lowest lane of the first beat, and void (docs/architecture.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
+
+WIDTHS = (8, 16, 32, 64, 128, 256, 512)
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A stream of `width` bits, a byte a lane."""
+
+    width: int
+
+    @property
+    def lanes(self) -> int:
+        """Bytes of a beat."""
+        return self.width // 8
+
+    @property
+    def length_start(self) -> int:
+        """Bytes in front of the length on a subscriber's stream."""
+        return 0 if self.lanes == 1 else ID_BYTES
+
+    @property
+    def payload_start(self) -> int:
+        """Bytes in front of the payload on a subscriber's stream."""
+        return self.length_start + LENGTH_BYTES
+
+    def beat(self, byte: int) -> int:
+        """The beat of a byte, both counted from 0."""
+        return byte // self.lanes
+
+    def lane(self, byte: int) -> int:
+        """The lane of a byte."""
+        return byte % self.lanes
+
+    def data(self, lane: int, count: int = 1) -> str:
+        """The bits of `count` lanes."""
+        return f"{8 * (lane + count) - 1} downto {8 * lane}"
+
+
+@dataclass(frozen=True)
+class Store:
+    """A shift register: in each of `beats` it takes the bytes of `lanes`, and ends with the first beat's lowest.
+
+    Lanes that hold bytes of fields in the same beats share one, so a field costs registers and wires alone.
+    """
+
+    lanes: tuple[int, ...]
+    beats: tuple[int, ...]
+
+    @property
+    def bits(self) -> int:
+        """Bits of the register."""
+        return 8 * len(self.lanes) * len(self.beats)
+
+    @property
+    def beat_bits(self) -> int:
+        """Bits that come with a beat."""
+        return 8 * len(self.lanes)
+
+
+def stores_of(stream: Stream, windows: Sequence[tuple[int, int]]) -> list[Store]:
+    """The stores for the payload's `windows`, given as (first, end) offsets."""
+    beats: dict[int, list[int]] = {}
+    for first, end in windows:
+        for byte in range(stream.payload_start + first, stream.payload_start + end):
+            beats.setdefault(stream.lane(byte), []).append(stream.beat(byte))
+    lanes: dict[tuple[int, ...], list[int]] = {}
+    for lane in sorted(beats):
+        lanes.setdefault(tuple(beats[lane]), []).append(lane)
+    return [Store(tuple(found), key) for key, found in lanes.items()]
+
+
+@dataclass(frozen=True)
+class StoredBytes:
+    """`count` bytes of the payload that lie in one piece in store number `store`, from bit `low` on."""
+
+    store: int
+    low: int
+    count: int
+
+    @property
+    def high(self) -> int:
+        """The highest bit."""
+        return self.low + 8 * self.count - 1
+
+
+class StoreMap:
+    """Finds the payload's bytes in the stores."""
+
+    def __init__(self, stream: Stream, stores: Sequence[Store]) -> None:
+        self._stream = stream
+        self._place: dict[tuple[int, int], tuple[int, int]] = {}
+        for number, store in enumerate(stores):
+            for row, beat in enumerate(store.beats):
+                for column, lane in enumerate(store.lanes):
+                    self._place[beat, lane] = number, row * store.beat_bits + 8 * column
+
+    def pieces(self, offset: int, count: int) -> list[StoredBytes]:
+        """The payload's bytes `offset` to `offset + count - 1`, neighbours in a store joined, in order."""
+        found: list[StoredBytes] = []
+        for byte in range(self._stream.payload_start + offset, self._stream.payload_start + offset + count):
+            store, low = self._place[self._stream.beat(byte), self._stream.lane(byte)]
+            if found and found[-1].store == store and found[-1].high + 1 == low:
+                found[-1] = StoredBytes(store, found[-1].low, found[-1].count + 1)
+            else:
+                found.append(StoredBytes(store, low, 1))
+        return found
+
+
+def ranges(numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """Ascending numbers as (first, last) of each run without a gap."""
+    found: list[tuple[int, int]] = []
+    for number in numbers:
+        if found and found[-1][1] + 1 == number:
+            found[-1] = (found[-1][0], number)
+        else:
+            found.append((number, number))
+    return found
