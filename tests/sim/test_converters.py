@@ -45,10 +45,11 @@ def case(ros: RosVersion, name: str, width: int) -> Any:
     return pytest.param(ros, name, width, id=f"ros{int(ros)}-{name}-{width}")
 
 
-# Every message at 8 bits, and every kind at every width.
+# Every message at 8 bits, and every kind at every width; with broken frames where the header lies in three beats (16
+# bits), in one with some payload (64), and where a whole frame does (512).
 SAMPLE = [case(ros, name, 8) for ros in RosVersion for name in [*_FROM_DISTRIBUTIONS[ros], *AWKWARD[ros]]]
 SAMPLE += [case(ros, name, width) for width in WIDTHS if width > 8 for ros, name in _KINDS]
-TROUBLED = [case(ros, name, width) for width in WIDTHS for ros, name in _KINDS]
+TROUBLED = [case(ros, name, width) for width in (8, 16, 64, 512) for ros, name in _KINDS]
 NETLISTS = [
     case(ROS1, "std_msgs/Empty", 8),
     case(ROS1, "geometry_msgs/Quaternion", 8),
@@ -117,6 +118,8 @@ def test_a_message_that_waits_loses_nothing(
     # Behind the id at 8 bits, the void lane at others. The last beat of all waits as well.
     length_end = 4 if width == 8 else 5
     accepted = min(length_end // (width // 8), (length_end + len(payloads[0]) - 1) // (width // 8))
+    # Where the first beat brings payload it comes in the cycle that takes the message.
+    accepted = max(accepted, 1)
     assert printed(result, "beats behind a message:") == [str(accepted)] * 19 + ["0"]
 
 

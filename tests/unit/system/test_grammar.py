@@ -60,7 +60,7 @@ def test_a_word_is_text_whatever_yaml_takes_it_for(tmp_path: Path, word: str) ->
     [
         ("project: {name: a, width: '8'}", "'width' must be an integer, not '8'"),
         ("project: {name: a, width: [8]}", "'width' must be an integer, not a list"),
-        ("project: {name: a, width: 16}", "'width' cannot be '16'"),
+        ("project: {name: a, width: 24}", "'width' cannot be '24'"),
         ("project: {name: {}}", "'name' must be a word, not a mapping"),
         ("project: {name: ''}", "'name' must be a word, not ''"),
         ("project:", "'project' must be a mapping of keys to values, not nothing"),
