@@ -154,9 +154,10 @@ def _stage(stage: str, name: MessageName, definitions: dict[MessageName, Message
     from fusesoc_firm.frame import tree
     from fusesoc_firm.frame.layout import frame_of
     from fusesoc_firm.message.printer import to_text
+    from fusesoc_firm.message.signature import signature
 
     if stage == "message":
-        return to_text(definitions[name])
+        return to_text(definitions[name], signature(name, definitions))
     if stage == "tree":
         try:
             frame = frame_of(name, definitions)

@@ -14,13 +14,10 @@ from fusesoc_firm.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.message.dialect import dialect_of
 from fusesoc_firm.message.folders import environment_folders, message_files
 from fusesoc_firm.message.model import (
-    ArrayType,
-    Field,
     MessageDefinition,
     MessageName,
-    MessageType,
     RosVersion,
-    SequenceType,
+    nested_message,
 )
 from fusesoc_firm.message.parser import parse_message
 from fusesoc_firm.message.stores import DistributionStore
@@ -137,7 +134,7 @@ class MessageLibrary:
         if definition is None:
             return
         for field in definition.fields:
-            if nested := _nested_message(field):
+            if nested := nested_message(field.type):
                 self._collect(nested, field.source, (*above, name), closure, diagnostics)
         closure[name] = definition
 
@@ -164,9 +161,3 @@ def _check_folders(empty: Iterable[Path]) -> None:
         reason = "holds no .msg file" if path.is_dir() else "is not a folder"
         diagnostics.error(f"message path '{path}' {reason}", hint="give a package, a workspace or a folder of packages")
     diagnostics.raise_if_any()
-
-
-def _nested_message(field: Field) -> MessageName | None:
-    kind = field.type
-    element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
-    return element.name if isinstance(element, MessageType) else None

@@ -163,7 +163,7 @@ class _Reader:
             value = line.part(value.start).strip()
         scalar = read_value(value, constant_type, self._dialect, self._diagnostics)
         if scalar is not None and is_named:
-            self.constants.append(Constant(name.text, constant_type, scalar, kind.source))
+            self.constants.append(Constant(name.text, constant_type, scalar, value.text, kind.source))
 
     def _constant_type(self, kind: Piece) -> PrimitiveType | StringType | None:
         if kind.text in self._dialect.strings:

@@ -92,6 +92,18 @@ def test_every_stage_is_printed(stage: str, capsys: Captured) -> None:
         assert all(isinstance(document, dict) for document in yaml.safe_load_all(text))
 
 
+@pytest.mark.parametrize(
+    ("ros", "signature"),
+    [
+        ("1", "4a842b65f413084dc2b10fb484ea7f17"),
+        ("2", "RIHS01_6963084842a9b04494d6b2941d11444708d892da2f4b09843b9c43f42a7f6881"),
+    ],
+)
+def test_a_message_is_printed_with_its_signature(ros: str, signature: str, capsys: Captured) -> None:
+    lines = out(capsys, "message", "show", "geometry_msgs/Point", "--ros", ros, "--stage", "message").splitlines()
+    assert lines[:3] == [f"# geometry_msgs/Point (ROS {ros})", f"# signature: {signature}", ""]
+
+
 def test_both_converters_are_printed(capsys: Captured) -> None:
     text = out(capsys, "message", "show", "geometry_msgs/Point", "--stage", "vhdl")
     assert text.count("\nend entity") == 2
