@@ -226,10 +226,10 @@ def _show_system(arguments: argparse.Namespace) -> None:
 
 
 def _load(arguments: argparse.Namespace) -> Any:
-    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.message.library import libraries
     from fusesoc_firm.system.generator import load_system
 
-    return load_system(arguments.spec, {ros: _library(arguments, ros) for ros in RosVersion}).system
+    return load_system(arguments.spec, libraries(arguments.path, os.environ, arguments.distro)).system
 
 
 def _yaml(data: dict[str, Any]) -> str:

@@ -6,13 +6,20 @@ tied to its place: `Text` is a string that knows it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail
+
+_CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
+_REPLACEMENT = "\ufffd"
+# The ends of lines that PyYAML counts.
+_LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 
 
 class Text(str):
@@ -31,11 +38,15 @@ class Text(str):
 
 @dataclass(frozen=True)
 class YamlText:
-    """A YAML file's lines and its root node; `file` is how it is called in messages."""
+    """A YAML file's lines and its root node; `file` is how it is called in messages.
+
+    `is_cut` tells that the text stops being YAML somewhere, and `root` holds only what stands above.
+    """
 
     file: str
     lines: tuple[str, ...]
     root: yaml.Node | None
+    is_cut: bool = False
 
     def source(self, node: yaml.Node) -> SourceRef:
         """The place of a node; a node of several lines is shown by its first."""
@@ -49,36 +60,89 @@ class YamlText:
         return Text(str(node.value), self.source(node))
 
 
-def read_yaml(path: Path, file: str | None = None) -> YamlText:
-    """Read a file. Raises `InputError` if it cannot be read or is no YAML."""
+def read_yaml(path: Path, file: str | None = None, faults: Diagnostics | None = None) -> YamlText:
+    """Read a file, called `file` in messages.
+
+    Raises `InputError` if it cannot be read or is no YAML. With `faults`, what is no YAML is noted there, and what
+    stands above it is returned.
+    """
     name = file or str(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        # Some editors put a byte order mark in front.
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         fail(f"cannot read {name}: {error.strerror}")
     except UnicodeDecodeError as error:
         fail(f"{name} is not UTF-8: byte {error.start} is 0x{error.object[error.start]:02x}")
-    return parse_yaml(text, name)
+    noted = Diagnostics() if faults is None else faults
+    read = parse_yaml(text, name, noted)
+    if faults is None:
+        noted.raise_if_any()
+    return read
 
 
-def parse_yaml(text: str, file: str) -> YamlText:
-    """The nodes of a YAML text. Raises `InputError` at the place where it stops being YAML."""
-    lines = tuple(text.splitlines())
+def parse_yaml(text: str, file: str, faults: Diagnostics) -> YamlText:
+    """The nodes of a YAML text; where it stops being YAML is noted, and what stands above is kept."""
+    lines = tuple(_LINE_END.split(text.rstrip()))
+    _note_control_characters(text, file, faults)
+    text = _CONTROL_CHARACTERS.sub(_REPLACEMENT, text)
     try:
         return YamlText(file, lines, yaml.compose(text, Loader=yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line, column = (mark.line, mark.column) if mark else (0, 0)
-        shown = lines[line] if line < len(lines) else ""
-        context = f" ({error.context})" if error.context else ""
-        fail(f"this is not YAML: {error.problem}{context}", SourceRef(file, line + 1, column + 1, shown))
-    except yaml.YAMLError as error:
-        fail(f"{file} is not YAML: {' '.join(str(error).split())}")
+        _note_syntax(error, file, lines, faults)
+        return YamlText(file, lines, _composed_above(error, text.splitlines(keepends=True)), is_cut=True)
+
+
+def _note_control_characters(text: str, file: str, faults: Diagnostics) -> None:
+    for number, line in enumerate(_LINE_END.split(text)):
+        for found in _CONTROL_CHARACTERS.finditer(line):
+            shown = _CONTROL_CHARACTERS.sub("?", line)
+            message = f"this is not YAML: it holds the control character 0x{ord(found.group()):02x}"
+            faults.error(message, SourceRef(file, number + 1, found.start() + 1, shown))
+
+
+def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...], faults: Diagnostics) -> None:
+    problem = error.problem or error.context or "syntax error"
+    context = error.context_mark
+    mark = error.problem_mark or context
+    # Where a word lacks its colon, or something is still open at the end, the fault is where that began.
+    is_late = problem.startswith("could not find expected ':'") or (mark is not None and mark.line >= len(lines))
+    if context is not None and is_late:
+        mark, context = context, None
+    hint = ""
+    if "'\\t'" in problem:
+        hint = "YAML is indented with blanks, never with tabs"
+    elif error.context and context is not None:
+        hint = f"{error.context}, which begins at {file}:{context.line + 1}:{context.column + 1}"
+    elif error.context and is_late:
+        hint = error.context
+    line, column = len(lines) - 1, max(0, len(lines[-1]) - 1)
+    if mark is not None and mark.line < len(lines):
+        line, column = mark.line, mark.column
+    faults.error(f"this is not YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
+
+
+def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
+    """The root node of the lines above a fault or, if it lies in something still open, above that; None without any."""
+    for mark in (error.problem_mark, error.context_mark):
+        if mark is not None:
+            with suppress(yaml.YAMLError):
+                return yaml.compose("".join(lines[: mark.line]), Loader=yaml.SafeLoader)
+    return None
 
 
 def is_null(node: yaml.Node) -> bool:
     """Tell whether a key was written without a value, as listing 6.1 of the dissertation does with `type:`."""
     return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"
+
+
+def kind(node: yaml.Node) -> str:
+    """What a node is, for messages: its word, "a list", "a mapping" or "nothing"."""
+    if is_null(node):
+        return "nothing"
+    if isinstance(node, yaml.MappingNode):
+        return "a mapping"
+    return "a list" if isinstance(node, yaml.SequenceNode) else f"'{node.value}'"
 
 
 def items(

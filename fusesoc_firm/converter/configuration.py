@@ -6,7 +6,7 @@ arithmetic and no choice beyond 'is this there'.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from fusesoc_firm.converter.ports import FieldPort, field_ports
@@ -20,21 +20,23 @@ Configuration = dict[str, Any]
 SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
 WIDTHS = (8,)
+_LARGEST_FRAME = (2**31 - 1) // 8
 
 
 def subscriber_entity(frame: Frame) -> str:
-    """The entity, and file, that turns frames into messages."""
+    """`axis_to_<pkg>_<type>`."""
     return f"axis_to_{entity_name(frame.message.package, frame.message.name)}"
 
 
 def publisher_entity(frame: Frame) -> str:
-    """The entity, and file, that turns messages into frames."""
+    """`<pkg>_<type>_to_axis`."""
     return f"{entity_name(frame.message.package, frame.message.name)}_to_axis"
 
 
 def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
     _check_width(width)
+    _check_size(frame)
     windows = windows_of(frame)
     end = LENGTH_BYTES + frame.payload_bytes
     stored_bytes = sum(last - first for first, last in windows)
@@ -65,27 +67,27 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
 def publisher_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
     _check_width(width)
-    header = ID_BYTES + LENGTH_BYTES
+    _check_size(frame)
     return {
         **_common(frame, publisher_entity(frame), "in"),
         "frame_bytes": frame.frame_bytes,
         "frame_high": 8 * frame.frame_bytes - 1,
-        "last_position": frame.frame_bytes - 1,
         "position_high": max(1, (frame.frame_bytes - 1).bit_length()) - 1,
-        "length_value": f"{frame.payload_bytes:08x}",
-        "constants": [
-            _piece(header + offset, len(data), "".join(f"{byte:02x}" for byte in reversed(data)))
-            for offset, data in _constant_bytes(frame)
-        ],
-        "assignments": [
-            _publisher_assignment(piece, header) for port in field_ports(frame) for piece in slices_of(port)
-        ],
+        "pieces": _publisher_pieces(frame),
     }
 
 
 def _check_width(width: int) -> None:
     if width not in WIDTHS:
         fail(f"no converter is made for a stream of {width} bits", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
+
+
+def _check_size(frame: Frame) -> None:
+    if frame.frame_bytes > _LARGEST_FRAME:
+        fail(
+            f"{frame.message} takes {frame.payload_bytes} bytes, too many for a converter",
+            hint=f"at most {_LARGEST_FRAME - ID_BYTES - LENGTH_BYTES}: VHDL counts the bits of a frame up to 2**31-1",
+        )
 
 
 def _common(frame: Frame, entity: str, direction: str) -> Configuration:
@@ -95,26 +97,25 @@ def _common(frame: Frame, entity: str, direction: str) -> Configuration:
         "message": str(frame.message),
         "ros": int(frame.ros),
         "payload_bytes": frame.payload_bytes,
-        "ports": port_declarations(ports, direction),
+        "has_ports": bool(ports),
+        "ports": _port_declarations(ports, direction),
     }
 
 
-def port_declarations(ports: Iterable[FieldPort], direction: str, prefix: str = "") -> list[Configuration]:
-    """The fields as port declarations; names and types are padded so that columns align with the fixed ports."""
-    ports = list(ports)
-    names = [prefix + port.name for port in ports]
-    # The longest fixed port name is frame_error_code.
-    width = max([len("frame_error_code"), *map(len, names)])
+def _port_declarations(ports: Sequence[FieldPort], direction: str) -> list[Configuration]:
+    """The fields as port declarations; names and types are padded so that columns align."""
+    # Where no name is long, the fields align with the fixed ports too, of which frame_error_code is the longest.
+    width = max([len("frame_error_code"), *(len(port.name) for port in ports)])
     types = max([0, *(len(port.vhdl_type) for port in ports)])
     return [
         {
-            "name": name.ljust(width),
+            "name": port.name.ljust(width),
             "direction": direction.ljust(3),
             "type": port.vhdl_type,
             "padding": " " * (types - len(port.vhdl_type)),
             "comment": port.comment,
         }
-        for name, port in zip(names, ports, strict=True)
+        for port in ports
     ]
 
 
@@ -127,14 +128,25 @@ def _length_check(frame: Frame) -> Configuration:
     low = frame.payload_bytes.to_bytes(LENGTH_BYTES, "little")
     high = (frame.payload_bytes + frame.trailing_bytes).to_bytes(LENGTH_BYTES, "little")
     carries = low[1:] != high[1:]
+    low_bytes = [(low[0] + more) % 256 for more in range(frame.trailing_bytes + 1)]
+    carried_bytes = [byte for byte in low_bytes if byte < low[0]]
     return {
         "has_trailing": frame.trailing_bytes > 0,
         "trailing_bytes": frame.trailing_bytes,
         "length_low": low[0],
-        "length_low_hex": f"{low[0]:02x}",
+        "low_bytes": [f"{byte:02x}" for byte in low_bytes],
         "length_carries": carries,
+        "carried_bytes": [
+            {"value": f"{byte:02x}", "joint": joint}
+            for byte, joint in zip(carried_bytes, _joints(len(carried_bytes), " or", ""), strict=True)
+        ],
         "length_checks": [
-            {"position": index, "value": f"{low[index]:02x}", "carried": f"{high[index]:02x}", "carries": carries}
+            {
+                "position": index,
+                "value": f"{low[index]:02x}",
+                "carried": f"{high[index]:02x}",
+                "carries": low[index] != high[index],
+            }
             for index in range(1, LENGTH_BYTES)
         ],
     }
@@ -145,16 +157,15 @@ def _subscriber_assignments(frame: Frame, windows: Sequence[tuple[int, int]]) ->
     pieces = [piece for port in field_ports(frame) for piece in slices_of(port)]
     column = max([0, *(len(_target(piece)) for piece in pieces)])
     return [
-        {
-            "target": _target(piece).ljust(column),
-            "source": _bits(8 * stored_offset(windows, piece.offset), piece),
-        }
+        {"target": _target(piece).ljust(column), "value": _stored_value(piece, stored_offset(windows, piece.offset))}
         for piece in pieces
     ]
 
 
-def _bits(low: int, piece: Slice) -> str:
-    return f"({low})" if _is_bit(piece) else f"({low + piece.width - 1} downto {low})"
+def _stored_value(piece: Slice, first_byte: int) -> str:
+    stored = f"fields_r({8 * (first_byte + piece.bytes) - 1} downto {8 * first_byte})"
+    # As roscpp and rospy read a bool: whatever is not zero is true.
+    return f"'0' when {stored} = x\"00\" else '1'" if _is_bit(piece) else stored
 
 
 def _target(piece: Slice) -> str:
@@ -162,20 +173,36 @@ def _target(piece: Slice) -> str:
     port = piece.port
     if port.width is None or (piece.width == port.width and not _is_bit(piece)):
         return port.name
-    return f"{port.name}{_bits(piece.low, piece)}"
+    return f"{port.name}({piece.low})" if _is_bit(piece) else f"{port.name}({piece.high} downto {piece.low})"
 
 
 def _is_bit(piece: Slice) -> bool:
     return piece.port.field.type.bits == 1
 
 
-def _publisher_assignment(piece: Slice, header: int) -> Configuration:
-    value = _target(piece)
-    return _piece(header + piece.offset, piece.bytes, f'"0000000" & {value}' if _is_bit(piece) else value)
+def _publisher_pieces(frame: Frame) -> list[Configuration]:
+    """`frame(...) <= value` for every part of the frame: the header, the constant bytes, the fields."""
+    header = ID_BYTES + LENGTH_BYTES
+    pieces = [
+        (0, ID_BYTES, f"std_logic_vector(to_unsigned(ID, {8 * ID_BYTES}))"),
+        (ID_BYTES, LENGTH_BYTES, _hex(frame.payload_bytes.to_bytes(LENGTH_BYTES, "little"))),
+        *((header + offset, len(data), _hex(data)) for offset, data in _constant_bytes(frame)),
+        *(
+            (header + piece.offset, piece.bytes, f'"0000000" & {_target(piece)}' if _is_bit(piece) else _target(piece))
+            for port in field_ports(frame)
+            for piece in slices_of(port)
+        ),
+    ]
+    targets = [f"frame({8 * (first + count) - 1} downto {8 * first})" for first, count, _ in pieces]
+    column = max(map(len, targets))
+    return [
+        {"target": target.ljust(column), "value": value} for target, (_, _, value) in zip(targets, pieces, strict=True)
+    ]
 
 
-def _piece(first_byte: int, count: int, value: str) -> Configuration:
-    return {"high": 8 * (first_byte + count) - 1, "low": 8 * first_byte, "value": value}
+def _hex(data: bytes) -> str:
+    """Bytes as a VHDL literal, the first one lowest."""
+    return f'x"{data[::-1].hex()}"'
 
 
 def _constant_bytes(frame: Frame) -> list[tuple[int, bytes]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from fusesoc_firm.converter.configuration import (
@@ -25,17 +25,12 @@ from fusesoc_firm.render import render
 VHDL = "vhdlSource-93"
 
 
-def message_library(request: Request, ros: RosVersion) -> MessageLibrary:
-    """The library that a request's parameters and the environment ask for."""
+def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], str | None]:
+    """Where a request's messages come from, as `MessageLibrary` takes it: folders, environment, distribution."""
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
-    return MessageLibrary(
-        ros,
-        [request.files_root / path for path in paths],
-        environment=os.environ,
-        store=None if distro is None else str(distro),
-    )
+    return [request.files_root / path for path in paths], os.environ, None if distro is None else str(distro)
 
 
 def inputs(request: Request) -> list[Path]:
@@ -82,4 +77,4 @@ def publisher_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedF
 def _message(request: Request) -> tuple[MessageLibrary, MessageName]:
     ros = request.parameters["ros"]
     assert isinstance(ros, int)
-    return message_library(request, RosVersion(ros)), parse_name(str(request.parameters["message"]))
+    return MessageLibrary(RosVersion(ros), *library_sources(request)), parse_name(str(request.parameters["message"]))

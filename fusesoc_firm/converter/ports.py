@@ -29,7 +29,7 @@ class FieldPort:
 
     @property
     def vhdl_type(self) -> str:
-        """The port's type."""
+        """The port's type in VHDL."""
         return vhdl_type(self.width)
 
     @property

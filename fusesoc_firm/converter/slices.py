@@ -22,6 +22,11 @@ class Slice:
     offset: int
     bytes: int
 
+    @property
+    def high(self) -> int:
+        """The highest of the port's bits."""
+        return self.low + self.width - 1
+
 
 def slices_of(port: FieldPort) -> Iterator[Slice]:
     """The pieces of a port that lie in one piece in the payload, lowest bits first."""

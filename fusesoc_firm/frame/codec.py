@@ -68,8 +68,11 @@ def pack_frame(identifier: int, payload: bytes) -> bytes:
 
 def _pack(field: FrameField, value: object) -> bytes:
     try:
+        # `struct` takes anything for a bool: the text "False" would be sent as true.
+        if field.type.code == "?" and value not in (False, True):
+            raise TypeError
         return struct.pack(f"<{field.type.code}", value)
-    except (struct.error, OverflowError, TypeError) as error:
+    except (struct.error, OverflowError, TypeError, ValueError) as error:
         raise CodecError(f"'{'.'.join(field.names)}' takes a {field.type.name}, not {value!r}") from error
 
 
@@ -114,7 +117,8 @@ def _leaves(value: Any, names: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]
     if isinstance(value, Mapping):
         for name, inner in value.items():
             yield from _leaves(inner, (*names, str(name)))
-    elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+    elif isinstance(value, list | tuple) and (not value or isinstance(value[0], Mapping)):
+        # An array of no elements holds nothing that could be unknown.
         for inner in value:
             yield from _leaves(inner, names)
     elif names:

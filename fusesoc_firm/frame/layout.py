@@ -96,11 +96,11 @@ class _Walk:
         self.cursor += count * type_.size
 
     def variable(self, member: Field, path: tuple[Step, ...]) -> None:
-        name = ".".join([*(step.name for step in path), member.name])
+        name = ".".join([step.name for step in path] + [member.name])
         self.diagnostics.error(
             f"field '{name}' of type '{member.type}' has no fixed size",
             _known(member.source),
-            "converters are made for messages of fixed size: numbers, time, duration, fixed arrays, messages of these",
+            "converters take messages of fixed size: numbers, time, duration, fixed arrays and messages of these",
         )
 
 

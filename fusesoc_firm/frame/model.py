@@ -61,12 +61,12 @@ class FrameField:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The path without its arrays."""
+        """The names on the path."""
         return tuple(step.name for step in self.path)
 
     @property
     def is_array(self) -> bool:
-        """Whether an array lies anywhere on the path."""
+        """Whether an array, be it of one element, lies anywhere on the path."""
         return any(step.count is not None for step in self.path)
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import tempfile
 from pathlib import Path
@@ -23,8 +24,14 @@ _FLAGS = (
     "-shared",
     "-s",
     "-Wl,--build-id=none",
+    # A function that is nowhere defined is found here, not when the simulator loads the library.
+    "-Wl,-z,defs",
+    # Names the files that were included; those of the system are left out.
+    "-MMD",
     "-Wno-unknown-pragmas",
 )
+# A file in a rule of make; a blank in its name is escaped.
+_WORD = re.compile(r"(?:\\ |\S)+")
 _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
 
 
@@ -42,31 +49,44 @@ def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, Genera
 def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
     """The library's bytes: the same for the same sources, wherever they lie."""
     first, *others = accelerator.accelerator.sources
+    name = accelerator.accelerator.name
     units = [str((folder / source).resolve()) for source in others if Path(source).suffix in _CPP_SUFFIXES]
+    above = (folder / first).resolve().parent
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary)
         (place / "kernel.cpp").write_text(shim, encoding="utf-8")
-        command = [
-            _COMPILER,
-            *_FLAGS,
-            "-I",
-            str((folder / first).resolve().parent),
-            "kernel.cpp",
-            *units,
-            "-o",
-            "kernel.so",
-        ]
+        # An `assert` puts the name of its file into the library.
+        options = ["-I", str(above), f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
+        command = [_COMPILER, *_FLAGS, "kernel.cpp", *units, *options]
         try:
             result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
         except FileNotFoundError:
-            fail(f"'{_COMPILER}' is needed to simulate '{accelerator.accelerator.name}' and is not installed")
+            fail(f"'{_COMPILER}' is needed to simulate '{name}' and is not installed")
         if result.returncode:
             fail(
-                f"the C++ of '{accelerator.accelerator.name}' does not compile:\n{result.stderr.rstrip()}",
+                f"the C++ of '{name}' does not compile:\n{result.stderr.rstrip()}",
                 first.source,
                 f"expected: {_prototype(accelerator)}",
             )
+        _check_included(accelerator, folder, place)
         return (place / "kernel.so").read_bytes()
+
+
+def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> None:
+    """Every included file must be a source: a change of one that is not would never be noticed."""
+    sources = {(folder / source).resolve() for source in accelerator.accelerator.sources}
+    included = {
+        (place / word.replace("\\ ", " ")).resolve()
+        for rules in place.glob("*.d")
+        for word in _WORD.findall(rules.read_text(encoding="utf-8").replace("\\\n", " "))[1:]
+    }
+    missing = sorted(str(path) for path in included - sources if not path.is_relative_to(place.resolve()))
+    if missing:
+        fail(
+            f"'{accelerator.accelerator.name}' includes {', '.join(missing)}",
+            accelerator.accelerator.sources[0].source,
+            "list it under 'sources', too, so that a change of it is noticed",
+        )
 
 
 def _prototype(accelerator: AcceleratorType) -> str:

@@ -11,7 +11,8 @@ from __future__ import annotations
 import importlib.util
 import sys
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -20,6 +21,9 @@ from fusesoc_firm.diagnostics import SourceRef, fail, nearest
 from fusesoc_firm.frame.codec import CodecError, encode
 from fusesoc_firm.host.stimuli import Stimulus
 from fusesoc_firm.system.derived import Converter
+
+_MODULE = "_system_model"
+_ANSWER = "it returns a list of (publisher, message), the message a mapping of fields"
 
 Respond = Callable[[str, dict[str, Any]], list[tuple[str, dict[str, Any]]]]
 
@@ -36,58 +40,101 @@ class Response:
 
 def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Converter]) -> list[Response]:
     """What the model in `path` answers to all stimuli. Raises `InputError`, also for a fault within the model."""
-    respond = _load(path)
+    model = _Model(path, _load(path))
     known = {publisher.block: publisher for publisher in publishers}
     found: list[Response] = []
     for cause, stimulus in enumerate(stimuli):
-        try:
-            answer = list(respond(stimulus.subscriber.block, stimulus.message))
-        except Exception as error:  # noqa: BLE001 - the user's code may raise anything
-            _fail_in_model(path, error, f" for message {cause} to '{stimulus.subscriber.block}'")
-        found += [_response(path, item, cause, known) for item in answer]
+        when = f"message {cause} to '{stimulus.subscriber.block}'"
+        found += [model.response(item, cause, when, known) for item in model.answer(stimulus, when)]
     return found
 
 
-def _response(path: Path, item: object, cause: int, known: dict[str, Converter]) -> Response:
-    if not isinstance(item, tuple) or len(item) != 2:
-        fail(f"{path}: respond returned {item!r}; each item is (publisher, message)")
-    block, message = item
-    if block not in known:
-        fail(f"{path}: respond answered with '{block}', which is no publisher", hint=nearest(str(block), known))
-    publisher = known[block]
-    try:
-        return Response(publisher, encode(publisher.frame, message), message, cause)
-    except CodecError as error:
-        fail(f"{path}: respond's answer to message {cause} does not fit '{block}': {error}")
+@dataclass(frozen=True)
+class _Model:
+    """The user's file and its function. `when`, everywhere, is the message that it was asked for."""
+
+    path: Path
+    respond: Respond
+
+    def answer(self, stimulus: Stimulus, when: str) -> list[object]:
+        """What `respond` returns, as a list."""
+        try:
+            # A copy, as the message itself is what the report shows.
+            answer: object = self.respond(stimulus.subscriber.block, deepcopy(stimulus.message))
+            # A generator runs the user's code only here.
+            items = list(answer) if isinstance(answer, Iterable) and not isinstance(answer, str | Mapping) else None
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
+            _fail_in_model(self.path, error, f" for {when}", self._line())
+        if items is None:
+            self._fail(f"for {when}, 'respond' returned {answer!r}, which is not a list", _ANSWER)
+        return items
+
+    def response(self, item: object, cause: int, when: str, known: Mapping[str, Converter]) -> Response:
+        """An item of an answer."""
+        if not isinstance(item, tuple | list) or len(item) != 2:
+            self._fail(f"for {when}, 'respond' returned {item!r} in its list", _ANSWER)
+        block, message = item
+        if not isinstance(block, str) or block not in known:
+            self._fail(
+                f"for {when}, 'respond' gave a message to {block!r}, not a publisher", nearest(str(block), known)
+            )
+        if not isinstance(message, Mapping):
+            self._fail(
+                f"for {when}, 'respond' gave {message!r} to '{block}', which is not a mapping of fields", _ANSWER
+            )
+        publisher = known[block]
+        try:
+            return Response(publisher, encode(publisher.frame, message), dict(message), cause)
+        except CodecError as error:
+            self._fail(f"for {when}, what 'respond' gave to '{block}' does not fit: {error}")
+
+    def _fail(self, message: str, hint: str = "") -> NoReturn:
+        """Report a fault of what the function returned where the function stands."""
+        fail(message, _place(self.path, self._line()), hint)
+
+    def _line(self) -> int:
+        """The function's line; 1 if it is none of the file's own."""
+        code = getattr(self.respond, "__code__", None)
+        return code.co_firstlineno if code is not None and code.co_filename == str(self.path) else 1
 
 
 def _load(path: Path) -> Respond:
-    spec = importlib.util.spec_from_file_location("_system_model", path)
+    spec = importlib.util.spec_from_file_location(_MODULE, path)
     if spec is None or spec.loader is None or not path.is_file():
-        fail(f"there is no model at {path}; it is a Python file with a function 'respond'")
+        fail(f"there is no model at {path}", hint="it is a Python file (.py) with a function 'respond'")
     module = importlib.util.module_from_spec(spec)
+    # Dataclasses, for one, look their module up.
+    sys.modules[_MODULE] = module
     # No __pycache__ beside the user's file.
     writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # noqa: BLE001 - the user's code may raise anything
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
         _fail_in_model(path, error, "")
     finally:
         sys.dont_write_bytecode = writes
     respond = getattr(module, "respond", None)
     if not callable(respond):
-        fail(f"{path} has no function 'respond(subscriber, message)'")
+        fail(f"{path} has no function 'respond(subscriber, message)'", hint=_ANSWER)
     return respond  # type: ignore[no-any-return]
 
 
-def _fail_in_model(path: Path, error: Exception, when: str) -> NoReturn:
-    """Report an exception of the model at the model's own line."""
-    message = f"the model raised {type(error).__name__}{when}: {error}"
+def _fail_in_model(path: Path, error: BaseException, when: str, otherwise: int = 1) -> NoReturn:
+    """Report an exception at the model's own line that led to it, at the line `otherwise` if there is none."""
+    text = f": {error}" if str(error) else ""
+    message = f"the model raised {type(error).__name__}{when}{text}"
     if isinstance(error, SyntaxError) and error.filename == str(path):
-        fail(message, SourceRef(str(path), error.lineno or 1, error.offset or 1, (error.text or "").rstrip("\n")))
-    lines = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-    if not lines:
-        fail(f"{path}: {message}")
-    last = lines[-1]
-    text = path.read_text(encoding="utf-8").splitlines()[(last.lineno or 1) - 1]
-    fail(message, SourceRef(str(path), last.lineno or 1, (last.colno or 0) + 1, text))
+        line, column = error.lineno or 1, error.offset or 1
+        fail(
+            f"the model is not Python: {error.msg}",
+            SourceRef(str(path), line, column, (error.text or "").rstrip("\n")),
+        )
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
+    if not frames:
+        fail(message, _place(path, otherwise))
+    fail(message, _place(path, frames[-1].lineno or 1, (frames[-1].colno or 0) + 1))
+
+
+def _place(path: Path, line: int, column: int = 1) -> SourceRef:
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return SourceRef(str(path), line, column, lines[line - 1] if line <= len(lines) else "")

@@ -7,11 +7,12 @@ the same arguments and files give the same definitions.
 from __future__ import annotations
 
 import difflib
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.dialect import dialect_of
 from fusesoc_firm.message.folders import InterfaceFiles, environment_folders, interface_files
@@ -23,7 +24,7 @@ from fusesoc_firm.message.model import (
     nested_message,
 )
 from fusesoc_firm.message.parser import parse_message
-from fusesoc_firm.message.stores import DistributionStore
+from fusesoc_firm.message.stores import DistributionStore, distributions
 
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
@@ -202,6 +203,21 @@ class MessageLibrary:
         primitives = difflib.get_close_matches(name.name, sorted(builtin_types), n=1, cutoff=0.8)
         names = [str(known) for known in (*self.names(), *(interface.name for interface in self._interfaces))]
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
+
+
+def libraries(
+    paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None
+) -> dict[RosVersion, MessageLibrary]:
+    """A library of each version, for those who speak both.
+
+    `store` is a distribution of one of them; the other keeps its default. Raises `InputError` as `MessageLibrary` does.
+    """
+    known = {ros: distributions(ros) for ros in RosVersion}
+    if store is not None and not any(store in names for names in known.values()):
+        fail(f"'{store}' is not a distribution of ROS", hint=nearest(store, itertools.chain(*known.values())))
+    return {
+        ros: MessageLibrary(ros, paths, environment, store if store in names else None) for ros, names in known.items()
+    }
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:

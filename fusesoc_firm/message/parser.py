@@ -228,8 +228,11 @@ class _Reader:
         return self._size(piece.part(2), smallest=1)
 
     def _size(self, piece: Piece, smallest: int) -> int | None:
-        if piece.text.isascii() and piece.text.isdigit() and smallest <= int(piece.text) <= LARGEST_SIZE:
-            return int(piece.text)
+        digits = piece.text.lstrip("0") or "0"
+        # Python refuses to read a number of thousands of digits, so their count is looked at first.
+        is_short = piece.text.isascii() and piece.text.isdigit() and len(digits) <= len(str(LARGEST_SIZE))
+        if is_short and smallest <= int(digits) <= LARGEST_SIZE:
+            return int(digits)
         hint = f"a size is a whole number from {smallest} to {LARGEST_SIZE}"
         self._diagnostics.error(f"'{piece.text}' is not a size", piece.source, hint)
         return None

@@ -30,6 +30,7 @@ _TAKEN = """
     sub_axis_tdata sub_axis_tkeep sub_axis_tlast sub_axis_tvalid sub_axis_tready
     pub_axis_tdata pub_axis_tkeep pub_axis_tvalid pub_axis_tlast pub_axis_tready
     sched_request sched_beat sched_last sched_grant_valid sched_grant_select
+    std standard std_logic std_logic_vector
 """.split()
 _ERROR_CODE_BITS = 4
 
@@ -72,7 +73,7 @@ def accelerator_entity(accelerator: AcceleratorType) -> str:
 
 def system_configuration(system: DerivedSystem) -> Configuration:
     """The configuration of the top level."""
-    names = _SignalNames(system)
+    names = _Names(system)
     return {
         **_dimensions(system),
         "name": system.name,
@@ -130,33 +131,45 @@ def _blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]
     return blocks
 
 
-class _SignalNames:
-    """The signal of each port of each block."""
+class _Names:
+    """The signal of each port of each block, the fork's signals of each message with several takers, and the labels."""
 
     def __init__(self, system: DerivedSystem) -> None:
-        ports = [(block, f"{prefix}{port.name}") for block, found in _blocks(system) for prefix, port in found]
-        forks = [
-            (connection.source.block, f"{connection.source.prefix}{word}")
-            for connection in system.connections
-            for word in ("fork_valid", "fork_ready")
-        ]
+        blocks = _blocks(system)
+        forks = [connection.source for connection in system.connections if len(connection.sinks) > 1]
+        labels = [("u", block) for block, _ in blocks] + [("u", end.block, end.prefix, "fork") for end in forks]
+        label_names = distinct_identifiers(labels, _TAKEN)
+        self._labels = dict(zip(labels, label_names, strict=True))
+
         entities = {subscriber_entity(item.frame) for item in system.subscribers}
         entities |= {publisher_entity(item.frame) for item in system.publishers}
         entities |= {accelerator_entity(item) for item in system.accelerator_types}
-        labels = {f"u_{identifier(block)}" for block, _ in _blocks(system)}
-        keys = [*ports, *forks]
-        reserved = {*_TAKEN, system.entity, *entities, *labels}
-        self._names: Mapping[tuple[str, str], str] = dict(zip(keys, distinct_identifiers(keys, reserved), strict=True))
+        reserved = {*_TAKEN, system.entity, *entities, *label_names}
+        # A fork's signals have keys of three parts, so no field of a message can have the same.
+        ports = [(block, f"{prefix}{port.name}") for block, found in blocks for prefix, port in found]
+        signals = [(end.block, end.prefix, word) for end in forks for word in ("fork_valid", "fork_ready")]
+        keys = [*ports, *signals]
+        self._signals: Mapping[tuple[str, ...], str] = dict(
+            zip(keys, distinct_identifiers(keys, reserved), strict=True)
+        )
 
-    def __call__(self, block: str, port: str) -> str:
-        return self._names[block, port]
+    def label(self, block: str) -> str:
+        return self._labels["u", block]
+
+    def port(self, block: str, port: str) -> str:
+        return self._signals[block, port]
 
     def at(self, end: End, port: str) -> str:
-        return self(end.block, f"{end.prefix}{port}")
+        return self._signals[end.block, f"{end.prefix}{port}"]
+
+    def fork(self, end: End) -> tuple[str, str, str]:
+        """Label, valid and ready of the fork behind an output."""
+        valid, ready = (self._signals[end.block, end.prefix, word] for word in ("fork_valid", "fork_ready"))
+        return self._labels["u", end.block, end.prefix, "fork"], valid, ready
 
 
-def _signals(names: _SignalNames, block: str, ports: list[tuple[str, SidePort]]) -> Configuration:
-    declared = [(names(block, f"{prefix}{port.name}"), vhdl_type(port.width)) for prefix, port in ports]
+def _signals(names: _Names, block: str, ports: list[tuple[str, SidePort]]) -> Configuration:
+    declared = [(names.port(block, f"{prefix}{port.name}"), vhdl_type(port.width)) for prefix, port in ports]
     column = max(len(name) for name, _ in declared)
     return {
         "block": block,
@@ -174,12 +187,12 @@ def port_map(pairs: Iterable[tuple[str, str]]) -> list[Configuration]:
     ]
 
 
-def _subscriber(names: _SignalNames, converter: Converter) -> Configuration:
+def _subscriber(names: _Names, converter: Converter) -> Configuration:
     number = converter.id
     low, high = _ERROR_CODE_BITS * number, _ERROR_CODE_BITS * (number + 1) - 1
     ports = side_ports(converter.frame, gives=True, has_valid=True)
     return {
-        **_instance(converter.block, subscriber_entity(converter.frame)),
+        **_instance(names, converter.block, subscriber_entity(converter.frame)),
         "message": str(converter.frame.message),
         "id": number,
         "ports": port_map(
@@ -191,7 +204,7 @@ def _subscriber(names: _SignalNames, converter: Converter) -> Configuration:
                 ("s_axis_tvalid", f"sub_axis_tvalid({number})"),
                 ("s_axis_tlast", "sub_axis_tlast"),
                 ("s_axis_tready", f"sub_axis_tready({number})"),
-                *((port.name, names(converter.block, port.name)) for port in ports),
+                *((port.name, names.port(converter.block, port.name)) for port in ports),
                 ("frame_error", f"frame_error({number})"),
                 ("frame_error_code", f"frame_error_code({high} downto {low})"),
             ]
@@ -199,19 +212,19 @@ def _subscriber(names: _SignalNames, converter: Converter) -> Configuration:
     }
 
 
-def _publisher(names: _SignalNames, converter: Converter, width: int) -> Configuration:
+def _publisher(names: _Names, converter: Converter, width: int) -> Configuration:
     number = converter.id
     lanes = width // 8
     ports = side_ports(converter.frame, gives=False, has_valid=False)
     return {
-        **_instance(converter.block, publisher_entity(converter.frame)),
+        **_instance(names, converter.block, publisher_entity(converter.frame)),
         "message": str(converter.frame.message),
         "id": number,
         "ports": port_map(
             [
                 ("clk", "clk"),
                 ("rst_n", "rst_n"),
-                *((port.name, names(converter.block, port.name)) for port in ports),
+                *((port.name, names.port(converter.block, port.name)) for port in ports),
                 ("m_axis_tdata", f"pub_axis_tdata({width * (number + 1) - 1} downto {width * number})"),
                 ("m_axis_tkeep", f"pub_axis_tkeep({lanes * (number + 1) - 1} downto {lanes * number})"),
                 ("m_axis_tvalid", f"pub_axis_tvalid({number})"),
@@ -222,53 +235,58 @@ def _publisher(names: _SignalNames, converter: Converter, width: int) -> Configu
     }
 
 
-def _accelerator(names: _SignalNames, block: AcceleratorBlock) -> Configuration:
+def _accelerator(names: _Names, block: AcceleratorBlock) -> Configuration:
     formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type)]
     return {
-        **_instance(block.block, accelerator_entity(block.type)),
+        **_instance(names, block.block, accelerator_entity(block.type)),
         "ports": port_map(
-            [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names(block.block, formal)) for formal in formals)]
+            [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names.port(block.block, formal)) for formal in formals)]
         ),
     }
 
 
-def _instance(block: str, entity: str) -> Configuration:
-    return {"block": block, "label": f"u_{identifier(block)}", "entity": entity}
+def _instance(names: _Names, block: str, entity: str) -> Configuration:
+    return {"block": block, "label": names.label(block), "entity": entity}
 
 
-def _connection(names: _SignalNames, connection: Connection) -> Configuration:
+def _connection(names: _Names, connection: Connection) -> Configuration:
     """The assignments of a connection; with several sinks, a fork lets each take the message in its own time."""
     source, sinks = connection.source, connection.sinks
     fields = field_ports(connection.frame)
-    is_forked = len(sinks) > 1
     pairs: list[tuple[str, str]] = []
-    for number, sink in enumerate(sinks):
+    for sink, (valid, ready) in zip(sinks, _handshakes(names, connection), strict=True):
         pairs += [(names.at(sink, port.name), names.at(source, port.name)) for port in fields]
-        valid = (
-            f"{names.at(source, 'fork_valid')}({number})" if is_forked else f"{names.at(source, 'segment_valid')}(0)"
-        )
         pairs.append((f"{names.at(sink, 'segment_valid')}(0)", valid))
         if sink.prefix:
             pairs.append((names.at(sink, "msg_valid"), valid))
-        ready = f"{names.at(source, 'fork_ready')}({number})" if is_forked else names.at(source, "msg_ready")
         pairs.append((ready, names.at(sink, "msg_ready")))
     column = max(len(target) for target, _ in pairs)
     return {
         "message": str(connection.frame.message),
         "source": source.block,
         "sinks": ", ".join(sink.block for sink in sinks),
-        "fork": _fork(names, source, len(sinks)) if is_forked else None,
+        "fork": _fork(names, source, len(sinks)) if len(sinks) > 1 else None,
         "assignments": [{"target": target.ljust(column), "source": value} for target, value in pairs],
     }
 
 
-def _fork(names: _SignalNames, source: End, count: int) -> Configuration:
+def _handshakes(names: _Names, connection: Connection) -> list[tuple[str, str]]:
+    """Where each sink has its valid from, and its ready goes to."""
+    if len(connection.sinks) == 1:
+        source = connection.source
+        return [(f"{names.at(source, 'segment_valid')}(0)", names.at(source, "msg_ready"))]
+    _, valid, ready = names.fork(connection.source)
+    return [(f"{valid}({number})", f"{ready}({number})") for number in range(len(connection.sinks))]
+
+
+def _fork(names: _Names, source: End, count: int) -> Configuration:
+    label, valid, ready = names.fork(source)
     return {
-        "label": f"u_{identifier(source.block, source.prefix, 'fork')}",
+        "label": label,
         "count": count,
         "high": count - 1,
-        "valid": names.at(source, "fork_valid"),
-        "ready": names.at(source, "fork_ready"),
+        "valid": valid,
+        "ready": ready,
         "source_valid": f"{names.at(source, 'segment_valid')}(0)",
         "source_ready": names.at(source, "msg_ready"),
     }

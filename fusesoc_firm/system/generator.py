@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.generator import VHDL, message_library, publisher_files, subscriber_files
+from fusesoc_firm.converter.generator import VHDL, library_sources, publisher_files, subscriber_files
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
 from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
@@ -45,16 +46,13 @@ def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary]) -> Load
     """Read and derive the system of a specification. Raises `InputError` with all its faults."""
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
-    if specification is None:
-        faults.raise_if_any()
-    assert specification is not None
     system = derive(specification, path.parent, libraries, faults)
     return LoadedSystem(specification, path.parent, libraries, system)
 
 
 def load_requested(request: Request) -> LoadedSystem:
     """The system of a generator call."""
-    return load_system(specification_path(request), {ros: message_library(request, ros) for ros in RosVersion})
+    return load_system(specification_path(request), libraries(*library_sources(request)))
 
 
 def specification_path(request: Request) -> Path:
@@ -75,8 +73,9 @@ def generate(request: Request) -> GeneratedCore:
         **subscriber_files(_frames(system.subscribers), system.width),
         **publisher_files(_frames(system.publishers), system.width),
     }
+    sources: set[Path] = set()
     for accelerator in system.accelerator_types:
-        files |= _accelerator_files(accelerator, loaded.folder)
+        files |= _accelerator_files(accelerator, loaded.folder, sources)
     files[f"{system.entity}.vhd"] = GeneratedFile(render(SYSTEM_TEMPLATE, system_configuration(system)), VHDL)
     return GeneratedCore(f"System {system.name}", files)
 
@@ -85,18 +84,25 @@ def _frames(converters: Iterable[Converter]) -> list[Frame]:
     return list(dict.fromkeys(converter.frame for converter in converters))
 
 
-def _accelerator_files(type_: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:
-    """The user's VHDL, or the wrapper around the user's C++."""
+def _accelerator_files(type_: AcceleratorType, folder: Path, taken: set[Path]) -> dict[str, GeneratedFile]:
+    """The user's VHDL, or the wrapper around the user's C++.
+
+    `taken` are the sources that the core has already: a package of two accelerators must not be analysed twice.
+    """
     accelerator = type_.accelerator
     if accelerator.type == "HLS":
         return wrapper_file(type_)
-    return {
-        source_name(accelerator, source): GeneratedFile((folder / source).read_bytes(), VHDL)
-        for source in accelerator.sources
-    }
+    files: dict[str, GeneratedFile] = {}
+    for source in accelerator.sources:
+        path = (folder / source).resolve()
+        if path not in taken:
+            files[source_name(accelerator, source)] = GeneratedFile(path.read_bytes(), VHDL)
+            taken.add(path)
+    return files
 
 
 def source_name(accelerator: Accelerator, source: str) -> str:
     """Where a source file lies in the generated core: below a folder of its accelerator, as in the specification."""
-    parts = [part for part in PurePosixPath(source).parts if part not in ("..", "/", ".")]
-    return str(PurePosixPath(str(accelerator.name), *parts))
+    names = {"..": "above", "/": "root"}
+    parts = [names.get(part, part) for part in PurePosixPath(source).parts]
+    return str(PurePosixPath(identifier(accelerator.name), *parts))

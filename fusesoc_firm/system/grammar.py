@@ -1,7 +1,8 @@
 """Typed sections of a YAML file: what a key is called, takes and means is said once, at its dataclass field.
 
 `read` turns a node into a section and reports whatever does not fit, with the place and what is legal. It goes
-on behind a fault, so that all faults of a file come at once.
+on behind a fault: the section is there in any case, empty where nothing could be read, and says that it is not sound.
+So all faults of a file come at once, and who works on it can tell a fault from what only follows from one.
 """
 
 from __future__ import annotations
@@ -13,16 +14,17 @@ from typing import Any, TypeVar
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
-from fusesoc_firm.yaml_text import Text, YamlText, is_null, items
+from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind
 
 S = TypeVar("S", bound="Section")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Section:
-    """A mapping of the file; `source` is its place and no key."""
+    """A mapping of the file. Its place and whether all of it could be read are no keys."""
 
     source: SourceRef
+    is_sound: bool = True
 
 
 @dataclass(frozen=True)
@@ -59,8 +61,8 @@ def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
     }
 
 
-def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics, what: str) -> S | None:
-    """The section that a node of `file` holds, or None, with the faults noted, if too much of it is wrong.
+def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics, what: str) -> S:
+    """The section that a node of `file` holds, with all that is wrong in it noted.
 
     `what` names the section in messages: "a block".
     """
@@ -69,38 +71,45 @@ def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics,
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads the nodes of one file; whatever does not fit is noted, and read as None or left out."""
+    """Reads the nodes of one file; whatever does not fit is noted, and read as None."""
 
     file: YamlText
     faults: Diagnostics
 
-    def section(self, section: type[S], node: yaml.Node, what: str) -> S | None:
-        """A section with all keys that could be read; None without its required ones."""
+    def section(self, section: type[S], node: yaml.Node, what: str) -> S:
+        """A section with all keys that could be read, and empty values for required ones that could not."""
+        before = len(self.faults.found)
+        source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
-            self._error(f"{what} must be a mapping of keys to values, not {_kind(node)}", node)
-            return None
+            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node)
+            return _empty(section, source)
         known = keys_of(section)
         given = self._given(known, node, what)
-        for name, (_, entry) in known.items():
-            if entry.is_required and name not in given:
-                self._error(f"{what} needs the key '{name}': {entry.meaning}", node)
         values = {known[name][0]: self._value(known[name][1], value, name) for name, value in given.items()}
         found = {field: value for field, value in values.items() if value is not None}
-        is_whole = all(field in found for field, entry in known.values() if entry.is_required)
-        return section(source=self.file.source(node), **found) if is_whole else None
+        blanks = _blanks(section, source)
+        # What lies behind a fault of the file's form is not known.
+        is_sound = len(self.faults.found) == before and blanks.keys() <= found.keys() and not self.file.is_cut
+        return section(source=source, is_sound=is_sound, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
         """The nodes of the known keys that were given a value, by the key's own name."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
+        hints = []
         for text, key_node, value in items(self.file, node, self.faults):
             name = spellings.get(text)
             if name is None:
-                self._error(f"{what} has no key '{text}'", key_node, nearest(text, known))
+                hints.append(nearest(text, known))
+                self._error(f"{what} has no key '{text}'", key_node, hints[-1])
             elif name in given:
                 self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
-            elif known[name][1].is_required or not is_null(value):
+            elif not is_null(value) or (known[name][1].is_required and not self.file.is_cut):
                 given[name] = value
+        for name, (_, entry) in known.items():
+            # A key that is only misspelt is no second fault.
+            if entry.is_required and name not in given and not self.file.is_cut and not _names(hints, name):
+                self._error(f"{what} needs the key '{name}': {entry.meaning}", node)
         return given
 
     def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
@@ -112,30 +121,33 @@ class _Reader:
                 return self._sections(entry, node, name)
             case "texts":
                 nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
-                texts = [self._text(item, name) for item in nodes]
+                texts = [self._text(item, entry, name) for item in nodes]
+                if not texts:
+                    self._error(f"'{name}' is an empty list", node, entry.meaning)
                 return None if None in texts else tuple(texts)
             case "integer":
                 return self._chosen(entry, self._integer(node, name), node, name)
             case _:
-                return self._chosen(entry, self._text(node, name), node, name)
+                return self._chosen(entry, self._text(node, entry, name), node, name)
 
     def _sections(self, entry: Key, node: yaml.Node, name: str) -> tuple[Section, ...] | None:
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{name}' must be a list, one '- ' an item, not {_kind(node)}", node)
+            self._error(f"'{name}' must be a list, one '- ' an item, not {kind(node)}", node, entry.meaning)
             return None
-        found = [self.section(_section_type(entry), item, f"an item of '{name}'") for item in node.value]
-        return tuple(item for item in found if item is not None)
+        if not node.value and entry.is_required:
+            self._error(f"'{name}' is an empty list", node, entry.meaning)
+        return tuple(self.section(_section_type(entry), item, f"an item of '{name}'") for item in node.value)
 
-    def _text(self, node: yaml.Node, name: str) -> Text | None:
+    def _text(self, node: yaml.Node, entry: Key, name: str) -> Text | None:
         if isinstance(node, yaml.ScalarNode) and node.value and not is_null(node):
             return self.file.text(node)
-        self._error(f"'{name}' must be a word, not {_kind(node)}", node)
+        self._error(f"'{name}' must be a word, not {kind(node)}", node, entry.meaning)
         return None
 
     def _integer(self, node: yaml.Node, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
             return int(yaml.safe_load(node.value))
-        self._error(f"'{name}' must be an integer, not {_kind(node)}", node)
+        self._error(f"'{name}' must be an integer, not {kind(node)}", node)
         return None
 
     def _chosen(self, entry: Key, value: Any, node: yaml.Node, name: str) -> Any:
@@ -150,14 +162,33 @@ class _Reader:
         self.faults.error(message, self.file.source(node), hint)
 
 
+def _blanks(section: type[Section], source: SourceRef) -> dict[str, Any]:
+    """An empty value for each required field."""
+    blanks: dict[str, Any] = {}
+    for field, entry in keys_of(section).values():
+        if entry.is_required:
+            blanks[field] = _blank(entry, source)
+    return blanks
+
+
+def _blank(entry: Key, source: SourceRef) -> Any:
+    match entry.form:
+        case "section":
+            return _empty(_section_type(entry), source)
+        case "sections" | "texts":
+            return ()
+        case _:
+            return Text("", source)
+
+
+def _empty(section: type[S], source: SourceRef) -> S:
+    return section(source=source, is_sound=False, **_blanks(section, source))
+
+
+def _names(hints: list[str], name: str) -> bool:
+    return f"did you mean '{name}'?" in hints
+
+
 def _section_type(entry: Key) -> type[Section]:
     assert entry.section is not None, "a section's key names its type"
     return entry.section
-
-
-def _kind(node: yaml.Node) -> str:
-    if is_null(node):
-        return "nothing"
-    if isinstance(node, yaml.MappingNode):
-        return "a mapping"
-    return "a list" if isinstance(node, yaml.SequenceNode) else f"'{node.value}'"

@@ -17,9 +17,9 @@ from typing import Any
 
 from fusesoc_firm.converter.generator import VHDL
 from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.generation import GeneratedFile
-from fusesoc_firm.naming import distinct_identifiers
+from fusesoc_firm.naming import distinct_identifiers, identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.configuration import accelerator_entity, accelerator_ports, port_map
 from fusesoc_firm.system.derived import AcceleratorType, MessageSide
@@ -80,9 +80,9 @@ def wrapper_file(accelerator: AcceleratorType) -> dict[str, GeneratedFile]:
 
 
 def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:
-    """The function's inputs and outputs. Raises `InputError` for a field that no plain parameter can carry."""
-    inputs = [(side, field) for side in accelerator.inputs for field in _scalar_fields(accelerator, side)]
-    outputs = [(side, field) for side in accelerator.outputs for field in _scalar_fields(accelerator, side)]
+    """The function's inputs and outputs, of an accelerator that `check_kernel` has no fault to note in."""
+    inputs = [(side, field) for side in accelerator.inputs for field in field_ports(side.frame)]
+    outputs = [(side, field) for side in accelerator.outputs for field in field_ports(side.frame)]
     # `in_` gives `x_in`, and `in1_` gives `x_in1`.
     names = distinct_identifiers([(field.name, side.prefix) for side, field in inputs + outputs], _AP_PORTS)
     return _arguments(inputs, names), _arguments(outputs, names[len(inputs) :])
@@ -96,16 +96,24 @@ def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[
     return found
 
 
-def _scalar_fields(accelerator: AcceleratorType, side: MessageSide) -> Iterator[FieldPort]:
-    for port in field_ports(side.frame):
-        if port.field.is_array:
-            name = accelerator.accelerator.name
-            fail(
-                f"'{name}' is of type HLS, which takes single values; {side.frame.message} has {port.comment}",
-                name.source,
-                "write this accelerator in VHDL",
-            )
-        yield port
+def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
+    """Note what keeps an accelerator from being a function: its name, or messages that no plain parameters carry."""
+    name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
+    function = function_name(accelerator)
+    if identifier(function) != function:
+        hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+        message = f"the function is called after its file, and '{function}' cannot be its name"
+        faults.error(message, sources[0].source, hint)
+    if not accelerator.inputs or not accelerator.outputs:
+        faults.error(f"'{name}' is of type HLS, which needs at least one input and one output", name.source)
+    interface = accelerator.accelerator.interface
+    for side, item in zip(
+        (*accelerator.inputs, *accelerator.outputs), (*interface.input, *interface.output), strict=True
+    ):
+        for port in field_ports(side.frame):
+            if port.field.is_array:
+                message = f"'{name}' is of type HLS, which takes single values, not the array {port.comment}"
+                faults.error(message, item.message.source, "write this accelerator in VHDL")
 
 
 def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
@@ -139,10 +147,10 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
                 "result": f"result_{argument.port}",
                 "valid": f"valid_{argument.port}",
                 "bits": "(0)" if argument.field.width is None else "",
-                "type": vhdl_type(argument.bits),
             }
             for argument in outputs
         ],
+        "signals": _kernel_signals(inputs, outputs),
         "ports": port_map(_kernel_map(inputs, outputs)),
         "bits_in": [
             {"name": f"argument_{argument.port}", "signal": argument.signal}
@@ -150,6 +158,15 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
             if argument.field.width is None
         ],
     }
+
+
+def _kernel_signals(inputs: Sequence[Argument], outputs: Sequence[Argument]) -> list[Configuration]:
+    """What the kernel's ports need besides the accelerator's own: a vector for a single bit, and every result."""
+    declared = [(f"argument_{item.port}", vhdl_type(1)) for item in inputs if item.field.width is None]
+    for argument in outputs:
+        declared += [(f"result_{argument.port}", vhdl_type(argument.bits)), (f"valid_{argument.port}", vhdl_type(None))]
+    column = max((len(name) for name, _ in declared), default=0)
+    return [{"name": name.ljust(column), "type": type_} for name, type_ in declared]
 
 
 def _kernel_map(inputs: Sequence[Argument], outputs: Sequence[Argument]) -> Iterator[tuple[str, str]]:

@@ -6,17 +6,19 @@ stand at the field. What the sections say together (names that must be known, co
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fusesoc_firm.converter.configuration import WIDTHS
 from fusesoc_firm.diagnostics import Diagnostics, fail
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.grammar import Section, key, read
-from fusesoc_firm.yaml_text import Text, read_yaml
+from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
 MIDDLEWARES = {"ROS": RosVersion.ROS1, "ROS1": RosVersion.ROS1, "ROS2": RosVersion.ROS2}
-ACCELERATOR_TYPES = ("HLS", "VHDL")
+# The types of accelerators, each with the endings of its sources' names.
+SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
+ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 MODES = ("subscriber", "publisher")
 SCHEDULERS = ("fixed_priority",)
 
@@ -86,14 +88,17 @@ class Specification(Section):
     project: Project = key("what holds for the whole system", form="section", section=Project, is_required=True)
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
+    # The file stops being YAML somewhere, so there may be more of everything.
+    is_cut: bool = False
 
 
-def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification | None:
-    """The specification in a file, called `file` in messages; None if too much of it is wrong to go on.
+def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
+    """The specification in a file, called `file` in messages, with all that is wrong in it noted.
 
-    Raises `InputError` if the file cannot be read or is no YAML.
+    Raises `InputError` if the file cannot be read, is empty, or is no YAML from the start.
     """
-    text = read_yaml(path, file)
-    if text.root is None:
+    text = read_yaml(path, file, faults)
+    if text.root is None or is_null(text.root):
+        faults.raise_if_any()
         fail(f"{file} is empty; a specification needs the keys 'project' and 'blocks'")
-    return read(Specification, text.root, text, faults, "a specification")
+    return replace(read(Specification, text.root, text, faults, "a specification"), is_cut=text.is_cut)

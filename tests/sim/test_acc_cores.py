@@ -5,34 +5,36 @@ from __future__ import annotations
 import math
 import random
 import struct
-import subprocess
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
+from tests.sim.ghdl import Generic, Library, core_files
+
 ACC = Path(__file__).parents[2] / "cores" / "acc"
-CORDIC = ACC / "cordic"
-FLOAT64 = ACC / "float64"
 SEED = 1618
 PI = Fraction("3.14159265358979323846264338327950288")
 
 
-def ghdl(*arguments: str | Path, folder: Path) -> str:
-    result = subprocess.run(
-        ["ghdl", *map(str, arguments)], cwd=folder, capture_output=True, text=True, timeout=300, check=False
-    )
-    assert result.returncode == 0, result.stdout + result.stderr
-    return result.stdout + result.stderr
-
-
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("acc")
-    sources = [CORDIC / "rtl" / "firm_cordic_table.vhd", CORDIC / "rtl" / "firm_cordic_vectoring.vhd"]
-    ghdl("-a", "--std=93", "--work=firm", *sources, *sorted((FLOAT64 / "rtl").glob("*.vhd")), folder=folder)
-    ghdl("-a", "--std=93", *sorted(ACC.glob("*/tb/*.vhd")), folder=folder)
-    return folder
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """The library with the benches, beside `firm` in the same directory."""
+    directory = tmp_path_factory.mktemp("acc")
+    Library("firm", directory).analyse(core_files("acc/cordic/cordic", "acc/float64/float64"))
+    work = Library("work", directory)
+    work.analyse(sorted(ACC.glob("*/tb/*.vhd")))
+    return work
+
+
+def run(library: Library, bench: str, generics: dict[str, Generic]) -> None:
+    result = library.run(bench, generics)
+    assert result.exit_code == 0, result.output
+
+
+def files(folder: Path, *names: str) -> dict[str, Generic]:
+    """The generic of each file of a bench."""
+    return {name.upper(): str(folder / f"{name}.txt") for name in names}
 
 
 def binary(number: int, width: int) -> str:
@@ -51,7 +53,7 @@ def float_bits(number: float) -> str:
     ("width", "fraction", "iterations"),
     [(64, 60, 35), (16, 8, 8), (24, 16, 12), (40, 64, 64), (80, 62, 50), (33, 20, 2)],
 )
-def test_cordic(library: Path, tmp_path: Path, width: int, fraction: int, iterations: int) -> None:
+def test_cordic(library: Library, tmp_path: Path, width: int, fraction: int, iterations: int) -> None:
     print(f"seed {SEED}")
     generator = random.Random(SEED)
     # Twice a vector's length must have room.
@@ -61,9 +63,7 @@ def test_cordic(library: Path, tmp_path: Path, width: int, fraction: int, iterat
     vectors += [(generator.randint(-limit, limit), generator.randint(-limit, limit)) for _ in range(60)]
     (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, width)} {binary(y, width)}\n" for x, y in vectors))
     generics = {"WIDTH": width, "FRACTION": fraction, "ITERATIONS": iterations}
-    generics_and_files = [f"-g{name}={value}" for name, value in generics.items()]
-    generics_and_files += [f"-gVECTORS={tmp_path / 'vectors.txt'}", f"-gRESULTS={tmp_path / 'results.txt'}"]
-    ghdl("-r", "--std=93", "firm_cordic_vectoring_tb", *generics_and_files, folder=library)
+    run(library, "firm_cordic_vectoring_tb", {**generics, **files(tmp_path, "vectors", "results")})
     results = [line.split() for line in (tmp_path / "results.txt").read_text().splitlines()]
     assert len(results) == len(vectors)
 
@@ -82,7 +82,7 @@ def test_cordic(library: Path, tmp_path: Path, width: int, fraction: int, iterat
         assert abs(magnitude - length * gain) <= shortfall
 
 
-def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Path, tmp_path: Path) -> None:
+def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Library, tmp_path: Path) -> None:
     print(f"seed {SEED}")
     generator = random.Random(SEED)
     vectors = []
@@ -90,8 +90,7 @@ def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Path
         x, y = generator.randint(1, 2**60), generator.randint(1, 2**60)
         vectors += [(x, y), (-x, y), (-x, -y), (x, -y)]
     (tmp_path / "vectors.txt").write_text("".join(f"{binary(x, 64)} {binary(y, 64)}\n" for x, y in vectors))
-    files = [f"-gVECTORS={tmp_path / 'vectors.txt'}", f"-gRESULTS={tmp_path / 'results.txt'}"]
-    ghdl("-r", "--std=93", "firm_cordic_vectoring_tb", *files, folder=library)
+    run(library, "firm_cordic_vectoring_tb", files(tmp_path, "vectors", "results"))
     results = [tuple(map(signed, line.split())) for line in (tmp_path / "results.txt").read_text().splitlines()]
     for first, second, third, fourth in zip(*[iter(results)] * 4, strict=True):
         assert len({first[0], second[0], third[0], fourth[0]}) == 1
@@ -117,7 +116,7 @@ def block_of(numbers: list[float], fraction: int) -> tuple[list[int], int, bool,
 @pytest.mark.parametrize(
     ("count", "block_fraction", "fixed_fraction"), [(4, 60, 60), (1, 53, 0), (2, 62, 63), (5, 56, 512), (3, 61, 17)]
 )
-def test_float64(library: Path, tmp_path: Path, count: int, block_fraction: int, fixed_fraction: int) -> None:
+def test_float64(library: Library, tmp_path: Path, count: int, block_fraction: int, fixed_fraction: int) -> None:
     print(f"seed {SEED}")
     generator = random.Random(SEED)
     specials = (0.0, -0.0, 2.0**-1074, -(2.0**-1022), 1.7e308, -math.inf, math.nan, 1.0, -(1 - 2.0**-53))
@@ -137,10 +136,8 @@ def test_float64(library: Path, tmp_path: Path, count: int, block_fraction: int,
     (tmp_path / "fixed_vectors.txt").write_text("".join(f"{binary(value, 64)}\n" for value in fixed))
 
     generics = {"COUNT": count, "BLOCK_FRACTION": block_fraction, "FIXED_FRACTION": fixed_fraction}
-    options = [f"-g{name}={value}" for name, value in generics.items()]
-    for kind in ("block_vectors", "block_results", "fixed_vectors", "fixed_results"):
-        options.append(f"-g{kind.upper()}={tmp_path / kind}.txt")
-    ghdl("-r", "--std=93", "firm_float64_tb", *options, folder=library)
+    paths = files(tmp_path, "block_vectors", "block_results", "fixed_vectors", "fixed_results")
+    run(library, "firm_float64_tb", {**generics, **paths})
 
     block_results = (tmp_path / "block_results.txt").read_text().splitlines()
     assert len(block_results) == len(blocks)

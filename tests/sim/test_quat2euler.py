@@ -16,17 +16,12 @@ from types import ModuleType
 
 import pytest
 
+from tests.sim.ghdl import Library, core_files
+
 ROOT = Path(__file__).parents[2]
 SPEC = ROOT / "specs" / "quat2euler"
-CORDIC = ROOT / "cores" / "acc" / "cordic" / "rtl"
-FLOAT64 = ROOT / "cores" / "acc" / "float64" / "rtl"
-TABLE = CORDIC / "firm_cordic_table.vhd"
-FIRM_SOURCES = [
-    TABLE,
-    CORDIC / "firm_cordic_vectoring.vhd",
-    FLOAT64 / "firm_float64_to_block.vhd",
-    FLOAT64 / "firm_fixed_to_float64.vhd",
-]
+FIRM_SOURCES = core_files("acc/cordic/cordic", "acc/float64/float64")
+TABLE = FIRM_SOURCES[0]
 TOP = SPEC / "rtl" / "quat2euler.vhd"
 BENCH = SPEC / "tb" / "quat2euler_tb.vhd"
 VERILOG_BENCH = SPEC / "tb" / "quat2euler_netlist_tb.v"
@@ -48,24 +43,14 @@ def load_model() -> ModuleType:
 MODEL = load_model()
 
 
-def ghdl(*arguments: str | Path, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run ghdl in `folder`, where its libraries `work` and `firm` lie."""
-    command = ["ghdl", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300, check=False)
-
-
-def analyse(files: Sequence[Path], folder: Path, library: str = "work") -> None:
-    result = ghdl("-a", "--std=93", f"--work={library}", *files, folder=folder)
-    assert result.returncode == 0 and not result.stderr, result.stderr
-
-
 @pytest.fixture(scope="module")
-def rtl(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with everything analysed."""
-    folder = tmp_path_factory.mktemp("rtl")
-    analyse(FIRM_SOURCES, folder, library="firm")
-    analyse([TOP, BENCH], folder)
-    return folder
+def rtl(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """The library with the accelerator and its bench, beside `firm` in the same directory."""
+    directory = tmp_path_factory.mktemp("rtl")
+    Library("firm", directory).analyse(FIRM_SOURCES)
+    work = Library("work", directory)
+    work.analyse([TOP, BENCH])
+    return work
 
 
 def quaternions(count: int) -> list[Quaternion]:
@@ -107,27 +92,26 @@ def text(numbers: Sequence[float]) -> str:
     return "".join(struct.pack(">d", number).hex().upper() for number in numbers)
 
 
-def check_bench(folder: Path, vectors: Sequence[Quaternion], tmp_path: Path, **generics: int) -> str:
+def check_bench(work: Library, vectors: Sequence[Quaternion], tmp_path: Path, **generics: int) -> str:
     """Run the bench, compare every bit with the model; what the bench prints."""
     (tmp_path / "vectors.txt").write_text("".join(f"{text(vector)}\n" for vector in vectors))
-    options = [f"-g{name}={value}" for name, value in generics.items()]
-    files = [f"-gVECTORS={tmp_path / 'vectors.txt'}", f"-gRESULTS={tmp_path / 'results.txt'}"]
-    result = ghdl("-r", "--std=93", "quat2euler_tb", *options, *files, folder=folder)
-    print(result.stdout)
-    assert result.returncode == 0, result.stdout + result.stderr
+    files = {"VECTORS": str(tmp_path / "vectors.txt"), "RESULTS": str(tmp_path / "results.txt")}
+    result = work.run("quat2euler_tb", {**generics, **files})
+    print(result.output)
+    assert result.exit_code == 0, result.output
     results = (tmp_path / "results.txt").read_text().split()
     assert results == [text(MODEL.quaternion_to_euler(*vector)) for vector in vectors]
-    return result.stdout
+    return result.output
 
 
-def test_back_to_back_frames_never_wait(rtl: Path, tmp_path: Path) -> None:
+def test_back_to_back_frames_never_wait(rtl: Library, tmp_path: Path) -> None:
     """A message with every frame of a stream of 8 bits: at most 90 cycles latency, none taken late."""
     bounds = {"MAX_LATENCY": 90, "MAX_INTERVAL": FRAME_BYTES}
     report = check_bench(rtl, quaternions(400), tmp_path, SPACING=FRAME_BYTES, **bounds)
     assert "latency 88 to 88, longest interval 37 cycles" in report
 
 
-def test_full_throughput(rtl: Path, tmp_path: Path) -> None:
+def test_full_throughput(rtl: Library, tmp_path: Path) -> None:
     """A message is always waiting; it is taken early, so part of its latency is waiting inside."""
     report = check_bench(rtl, quaternions(400), tmp_path, MAX_INTERVAL=FRAME_BYTES)
     assert "longest interval 36 cycles" in report
@@ -136,7 +120,7 @@ def test_full_throughput(rtl: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("seed", "stall_in", "stall_out"), [(1, 50, 50), (2, 98, 0), (3, 0, 98), (4, 97, 97), (5, 90, 99)]
 )
-def test_random_stalls(rtl: Path, tmp_path: Path, seed: int, stall_in: int, stall_out: int) -> None:
+def test_random_stalls(rtl: Library, tmp_path: Path, seed: int, stall_in: int, stall_out: int) -> None:
     check_bench(rtl, quaternions(300), tmp_path, SEED=seed, STALL_IN=stall_in, STALL_OUT=stall_out)
 
 
@@ -148,25 +132,20 @@ def test_random_stalls(rtl: Path, tmp_path: Path, seed: int, stall_in: int, stal
     ],
 )
 def test_the_bench_fails_on_a_slow_accelerator(
-    rtl: Path, tmp_path: Path, generics: dict[str, int], message: str
+    rtl: Library, tmp_path: Path, generics: dict[str, int], message: str
 ) -> None:
     with pytest.raises(AssertionError, match=message):
         check_bench(rtl, quaternions(5)[:3], tmp_path, **{"SPACING": 100, **generics})
 
 
 @pytest.fixture(scope="module")
-def netlists(rtl: Path) -> dict[str, str]:
+def netlists(rtl: Library) -> dict[str, str]:
     """What `ghdl --synth` makes of the top, in VHDL and in Verilog."""
-    texts = {}
-    for language in ("vhdl", "verilog"):
-        result = ghdl("--synth", "--std=93", f"--out={language}", "quat2euler", folder=rtl)
-        assert result.returncode == 0, result.stderr
-        assert "latch" not in result.stderr.lower()
-        texts[language] = result.stdout
-    return texts
+    return {language: rtl.synthesise("quat2euler", language=language) for language in ("vhdl", "verilog")}
 
 
-def test_synthesis_makes_no_latch(netlists: dict[str, str]) -> None:
+def test_synthesis_makes_no_latch(rtl: Library, netlists: dict[str, str]) -> None:
+    assert rtl.latches("quat2euler") == []
     assert not [language for language, netlist in netlists.items() if "latch" in netlist.lower()]
 
 
@@ -180,9 +159,10 @@ def test_the_verilog_netlist_is_verilog(netlists: dict[str, str]) -> None:
 def test_the_netlist_is_the_model(netlists: dict[str, str], tmp_path: Path) -> None:
     (tmp_path / "netlist.vhd").write_text(netlists["vhdl"])
     # The netlist repeats the entity with its use clause.
-    analyse([TABLE], tmp_path, library="firm")
-    analyse([tmp_path / "netlist.vhd", BENCH], tmp_path)
-    check_bench(tmp_path, quaternions(60), tmp_path, SEED=6, STALL_IN=50, STALL_OUT=90)
+    Library("firm", tmp_path).analyse([TABLE])
+    work = Library("work", tmp_path)
+    work.analyse([tmp_path / "netlist.vhd", BENCH])
+    check_bench(work, quaternions(60), tmp_path, SEED=6, STALL_IN=50, STALL_OUT=90)
 
 
 @pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed")
@@ -242,8 +222,7 @@ def test_the_model_uses_the_same_angles() -> None:
         ("firm_fixed_to_float64", {"FRACTION": 513}, "FRACTION is 513, legal: 0 to 512"),
     ],
 )
-def test_illegal_generics(rtl: Path, entity: str, generics: dict[str, int], message: str) -> None:
-    options = [f"-g{name}={value}" for name, value in generics.items()]
-    result = ghdl("-r", "--std=93", "--work=firm", entity, *options, "--stop-time=1ns", folder=rtl)
-    assert result.returncode != 0
-    assert re.search(f"{entity}: {message}", result.stdout + result.stderr)
+def test_illegal_generics(rtl: Library, entity: str, generics: dict[str, int], message: str) -> None:
+    result = Library("firm", rtl.directory).run(entity, generics, options=["--stop-time=1ns"])
+    assert result.exit_code != 0
+    assert re.search(f"{entity}: {message}", result.output)

@@ -406,3 +406,9 @@ def test_a_wrong_number_of_sections(text: str, fault: str) -> None:
     diagnostics = Diagnostics()
     parse_sections(text, service_names(SERVICE, ROS2), ROS2, "Add.srv", diagnostics)
     assert [str(d).splitlines()[0] for d in diagnostics.found] == [fault]
+
+
+@pytest.mark.parametrize("ros", RosVersion)
+def test_a_size_of_thousands_of_digits_is_a_fault_like_any_other(ros: RosVersion) -> None:
+    digits = "9" * 5000
+    assert faults(f"uint8[{digits}] x", ros) == [f"1:7 '{digits}' is not a size"]

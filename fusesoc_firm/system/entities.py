@@ -1,0 +1,49 @@
+"""The design units of a system: a tool keeps one of each name, so no two may share one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.naming import identifier
+from fusesoc_firm.system.configuration import accelerator_entity
+from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.hls import function_name
+from fusesoc_firm.system.specification import Block
+
+
+def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
+    """Note every block and accelerator that cannot have the entities that its message, name or sources ask for."""
+    owners = {system.entity: "the system", f"{system.entity}_tb": "the system's test bench"}
+    frames: dict[str, Frame] = {}
+    for entity, block, frame in _converters(system):
+        if frames.setdefault(entity, frame) != frame:
+            message = f"'{block}' and {owners[entity]} need the entity '{entity}' for different messages"
+            hint = f"one system has a message in one ROS version: here ROS {int(frames[entity].ros)}"
+            faults.error(message, blocks[block].name.source, hint)
+        owners.setdefault(entity, f"converter '{block}'")
+    for accelerator in system.accelerator_types:
+        name = accelerator.accelerator.name
+        if accelerator.accelerator.type == "VHDL" and identifier(name) != name:
+            hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+            faults.error(f"no entity can be called '{name}'", name.source, hint)
+        for entity in _entities(accelerator):
+            if owner := owners.get(entity.lower()):
+                faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source)
+            owners[entity.lower()] = f"accelerator '{name}'"
+
+
+def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
+    """The entity of each converter, its block and its frame."""
+    for converter in system.subscribers:
+        yield subscriber_entity(converter.frame), converter.block, converter.frame
+    for converter in system.publishers:
+        yield publisher_entity(converter.frame), converter.block, converter.frame
+
+
+def _entities(accelerator: AcceleratorType) -> Iterator[str]:
+    yield accelerator_entity(accelerator)
+    if accelerator.accelerator.type == "HLS":
+        yield function_name(accelerator)

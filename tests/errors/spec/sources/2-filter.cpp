@@ -1,0 +1,1 @@
+// A source file that is there; nothing looks into it.

@@ -1,0 +1,91 @@
+-- geometry_msgs_point_to_axis: the fields of geometry_msgs/Point (ROS 1) to a frame.
+--
+-- The frame is id (1 byte), length (4 bytes), payload (24 bytes). segment_valid says that the fields hold;
+-- they must do so until msg_ready, which comes with the frame's last byte. Nothing is stored but the position.
+--
+-- Generated from the message's definition by robot:firm; changes belong there.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+
+entity geometry_msgs_point_to_axis is
+  generic (
+    -- the id that the host knows this publisher by: 0 to 255
+    ID : natural := 0
+  );
+  port (
+    clk              : in  std_logic;
+    rst_n            : in  std_logic;
+    -- the message
+    x                : in  std_logic_vector(63 downto 0); -- x: float64
+    y                : in  std_logic_vector(63 downto 0); -- y: float64
+    z                : in  std_logic_vector(63 downto 0); -- z: float64
+    -- its handshake
+    segment_valid    : in  std_logic_vector(0 downto 0);
+    msg_ready        : out std_logic;
+    -- the frame
+    m_axis_tdata     : out std_logic_vector(7 downto 0);
+    m_axis_tkeep     : out std_logic_vector(0 downto 0);
+    m_axis_tvalid    : out std_logic;
+    m_axis_tlast     : out std_logic;
+    m_axis_tready    : in  std_logic
+  );
+end entity;
+
+architecture rtl of geometry_msgs_point_to_axis is
+
+  constant FRAME_BYTES : natural := 29;
+
+  -- The whole frame, its first byte lowest.
+  signal frame         : std_logic_vector(231 downto 0);
+  -- The byte on m_axis.
+  signal position_r    : unsigned(4 downto 0) := (others => '0');
+  signal position_last : std_logic;
+
+begin
+
+  assert ID <= 255
+    report "geometry_msgs_point_to_axis: ID is " & integer'image(ID) & "; legal are 0 to 255"
+    severity failure;
+
+  frame(7 downto 0)     <= std_logic_vector(to_unsigned(ID, 8));
+  frame(39 downto 8)    <= x"00000018";
+  frame(103 downto 40)  <= x;
+  frame(167 downto 104) <= y;
+  frame(231 downto 168) <= z;
+
+  position_last <= '1' when position_r = FRAME_BYTES - 1 else '0';
+
+  u_select : entity firm.firm_axis_select
+    generic map (
+      WORDS => FRAME_BYTES,
+      WIDTH => 8
+    )
+    port map (
+      words_in => frame,
+      index    => std_logic_vector(position_r),
+      word     => m_axis_tdata
+    );
+
+  m_axis_tkeep  <= "1";
+  m_axis_tvalid <= segment_valid(0);
+  m_axis_tlast  <= position_last;
+  msg_ready     <= segment_valid(0) and m_axis_tready and position_last;
+
+  send : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        position_r <= (others => '0');
+      elsif segment_valid(0) = '1' and m_axis_tready = '1' then
+        if position_last = '1' then
+          position_r <= (others => '0');
+        else
+          position_r <= position_r + 1;
+        end if;
+      end if;
+    end if;
+  end process;
+
+end architecture;

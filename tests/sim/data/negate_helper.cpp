@@ -1,0 +1,9 @@
+#include "negate_helper.h"
+
+float opposite(float value) {
+    return -value;
+}
+
+double opposite(double value) {
+    return -value;
+}

@@ -1,0 +1,33 @@
+"""The rules of the two serialisations as tables: what a layout takes from them must be complete and consistent."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+
+from fusesoc_firm.frame.layout import RULES
+from fusesoc_firm.message.dialect import dialect_of
+from fusesoc_firm.message.model import RosVersion
+
+
+@pytest.mark.parametrize("ros", RosVersion)
+def test_every_primitive_of_the_version_has_a_wire_type(ros: RosVersion) -> None:
+    rules = RULES[ros]
+    assert rules.scalars.keys() | rules.compounds.keys() == dialect_of(ros).primitives
+    assert not rules.scalars.keys() & rules.compounds.keys()
+
+
+@pytest.mark.parametrize("ros", RosVersion)
+def test_sizes_are_those_of_the_codes(ros: RosVersion) -> None:
+    for name, kind in RULES[ros].scalars.items():
+        assert struct.calcsize(f"<{kind.code}") == kind.size, name
+        assert kind.bits == (1 if kind.name == "bool" else 8 * kind.size)
+
+
+@pytest.mark.parametrize(
+    ("offset", "size", "aligned"), [(0, 8, 0), (1, 8, 8), (8, 8, 8), (9, 4, 12), (3, 2, 4), (5, 1, 5)]
+)
+def test_alignment(offset: int, size: int, aligned: int) -> None:
+    assert RULES[RosVersion.ROS2].align(offset, size) == aligned
+    assert RULES[RosVersion.ROS1].align(offset, size) == offset

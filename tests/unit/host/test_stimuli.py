@@ -1,0 +1,219 @@
+"""Stimuli out of YAML: what a value may look like, and where each fault is shown."""
+
+from __future__ import annotations
+
+import math
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.host.stimuli import Stimulus, read_stimuli
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.derived import Converter
+
+LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+
+
+def frame(message: str, ros: RosVersion = RosVersion.ROS1) -> Frame:
+    name = parse_name(message)
+    return frame_of(name, LIBRARIES[ros].closure(name))
+
+
+SUBSCRIBERS = (
+    Converter("point", frame("geometry_msgs/Point"), 0),
+    Converter("byte", frame("std_msgs/UInt8"), 1),
+    Converter("long", frame("std_msgs/Int64"), 2),
+    Converter("single", frame("std_msgs/Float32"), 3),
+    Converter("flag", frame("std_msgs/Bool"), 4),
+    Converter("nothing", frame("std_msgs/Empty"), 5),
+    Converter("pose", frame("geometry_msgs/PoseWithCovariance"), 6),
+    Converter("state", frame("geometry_msgs/Pose", RosVersion.ROS2), 7),
+)
+
+
+def read(folder: Path, text: str) -> list[Stimulus]:
+    path = folder / "stimuli.yaml"
+    path.write_text(text, encoding="utf-8")
+    return read_stimuli(path, SUBSCRIBERS)
+
+
+def value(folder: Path, block: str, word: str) -> Any:
+    (stimulus,) = read(folder, f"- {block}: {{data: {word}}}\n")
+    return stimulus.message["data"]
+
+
+def faults(folder: Path, text: str) -> str:
+    with pytest.raises(InputError) as raised:
+        read(folder, text)
+    return str(raised.value).replace(f"{folder}/", "")
+
+
+def test_messages_come_in_order_with_their_payload(tmp_path: Path) -> None:
+    found = read(
+        tmp_path, "- point: {x: 1, y: 2.5, z: -3}\n- byte: {data: 7}\n- point: {z: 0, y: 0, x: 0}\n- nothing:\n"
+    )
+    assert [item.subscriber.block for item in found] == ["point", "byte", "point", "nothing"]
+    assert [item.payload for item in found] == [struct.pack("<3d", 1, 2.5, -3), b"\x07", bytes(24), b""]
+    assert found[0].message == {"x": 1.0, "y": 2.5, "z": -3.0}
+
+
+def test_ros2_has_its_header(tmp_path: Path) -> None:
+    text = "- state: {position: {x: 0, y: 0, z: 0}, orientation: {x: 0, y: 0, z: 0, w: 1}}\n"
+    (stimulus,) = read(tmp_path, text)
+    assert stimulus.payload == b"\0\1\0\0" + bytes(48) + struct.pack("<d", 1)
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"),
+    [
+        ("1e-3", 1e-3),  # text to PyYAML
+        ("1E3", 1000.0),
+        ("-4", -4.0),
+        ("+.5", 0.5),
+        ("5.", 5.0),
+        ("1_000.5", 1000.5),
+        (".inf", math.inf),
+        ("-.INF", -math.inf),
+        ("inf", math.inf),
+    ],
+)
+def test_floats(tmp_path: Path, word: str, expected: float) -> None:
+    (stimulus,) = read(tmp_path, f"- point: {{x: {word}, y: 0, z: 0}}\n")
+    assert stimulus.message["x"] == expected
+
+
+def test_a_float32_is_rounded(tmp_path: Path) -> None:
+    assert value(tmp_path, "single", "1e-1") == struct.unpack("<f", struct.pack("<f", 0.1))[0]
+
+
+@pytest.mark.parametrize("word", [".nan", ".NaN", "nan"])
+def test_not_a_number(tmp_path: Path, word: str) -> None:
+    (stimulus,) = read(tmp_path, f"- single: {{data: {word}}}\n")
+    assert stimulus.payload == b"\0\0\xc0\x7f"
+
+
+@pytest.mark.parametrize(
+    ("block", "word", "expected"),
+    [
+        ("byte", "0", 0),
+        ("byte", "255", 255),
+        ("byte", "0xff", 255),
+        ("byte", "0b101", 5),
+        ("long", "-9223372036854775808", -(2**63)),
+        ("long", "9_000", 9000),
+        ("flag", "true", True),
+        ("flag", "False", False),
+    ],
+)
+def test_integers_and_booleans(tmp_path: Path, block: str, word: str, expected: int) -> None:
+    assert value(tmp_path, block, word) == expected
+
+
+@pytest.mark.parametrize(
+    ("block", "word", "message", "hint"),
+    [
+        ("byte", "256", "'data' is a uint8, not '256'", "legal here: 0 to 255"),
+        ("byte", "-1", "'data' is a uint8, not '-1'", "legal here: 0 to 255"),
+        ("byte", "1.0", "'data' is a uint8, not '1.0'", "legal here: 0 to 255"),
+        ("byte", "017", "'data' is a uint8, not '017'", "legal here: 0 to 255"),
+        ("byte", "true", "'data' is a uint8, not 'true'", "legal here: 0 to 255"),
+        ("byte", "'7'", "'data' is a uint8, not '7'", ""),
+        ("byte", "[7]", "'data' is a uint8, not a list", ""),
+        ("byte", "", "'data' is a uint8, not nothing", ""),
+        ("long", "9223372036854775808", "'data' is a int64", "legal here: -9223372036854775808 to 9223372036854775807"),
+        ("single", "one", "'data' is a float32, not 'one'", "a number such as 1, -0.5, 1e-3, .inf, .nan"),
+        ("single", "1:30", "'data' is a float32, not '1:30'", "a number such as"),
+        ("single", "1e39", "'data' is a float32, not '1e39'", "it is too large; infinity is written .inf"),
+        ("flag", "yes", "'data' is a bool, not 'yes'", "legal here: true, false"),
+        ("flag", "1", "'data' is a bool, not '1'", "legal here: true, false"),
+    ],
+)
+def test_a_value_that_does_not_fit(tmp_path: Path, block: str, word: str, message: str, hint: str) -> None:
+    text = faults(tmp_path, f"- point: {{x: 0, y: 0, z: 0}}\n- {block}: {{data: {word}}}\n")
+    column = len(f"- {block}: {{data: ") + 1 if word else len(f"- {block}: {{data:") + 1
+    assert text.startswith(f"stimuli.yaml:2:{column}: error: {message}")
+    assert (f"\n      = {hint}" in text) is bool(hint)
+
+
+def test_a_float64_that_is_too_large(tmp_path: Path) -> None:
+    assert "it is too large" in faults(tmp_path, "- point: {x: 1e400, y: 0, z: 0}\n")
+
+
+def test_nested_values_and_arrays(tmp_path: Path) -> None:
+    covariance = ", ".join(f"{number}e-1" for number in range(36))
+    text = f"""\
+- pose:
+    pose: {{position: &zero {{x: 0, y: 0, z: 0}}, orientation: {{x: 0, y: 0, z: 0, w: 1}}}}
+    covariance: [{covariance}]
+- point: *zero
+"""
+    first, second = read(tmp_path, text)
+    assert first.message["covariance"][35] == 3.5
+    assert first.message["pose"]["orientation"]["w"] == 1.0
+    assert second.message == {"x": 0.0, "y": 0.0, "z": 0.0}
+
+
+def test_every_fault_of_a_file_is_shown_where_it_is(tmp_path: Path) -> None:
+    text = faults(
+        tmp_path,
+        """\
+- pont: {x: 0}
+- point: {x: 0, Y: zero, z: one}
+- pose:
+    pose: {position: [], orientation: {x: 0, y: 0, v: 0}}
+    covariance: [0, 0]
+- point: 5
+- point
+- point: {x: 0, x: 0, y: 0, z: 0}
+- {point: {}, byte: {}}
+- [point]: {}
+""",
+    )
+    assert [line for line in text.splitlines() if ": error: " in line] == [
+        "stimuli.yaml:1:3: error: no subscriber is called 'pont'",
+        "stimuli.yaml:2:17: error: a geometry_msgs/Point has no field 'Y'",
+        "stimuli.yaml:2:29: error: 'z' is a float64, not 'one'",
+        "stimuli.yaml:4:22: error: 'pose.position' is a mapping of its fields, not a list",
+        "stimuli.yaml:4:39: error: 'pose.orientation' needs a value for z, w",
+        "stimuli.yaml:4:52: error: 'pose.orientation' has no field 'v'",
+        "stimuli.yaml:5:17: error: 'covariance' is a list of 36, not of 2",
+        "stimuli.yaml:6:10: error: a geometry_msgs/Point is a mapping of its fields, not '5'",
+        "stimuli.yaml:7:3: error: a stimulus is one block with its message: '- <subscriber>: {...}'",
+        "stimuli.yaml:8:17: error: key 'x' is given twice",
+        "stimuli.yaml:9:3: error: a stimulus is one block with its message: '- <subscriber>: {...}'",
+        "stimuli.yaml:10:3: error: no subscriber is called a list",
+    ]
+    assert "did you mean 'point'?" in text
+    assert "did you mean 'y'?" in text
+
+
+def test_faults_of_form_and_of_content_come_together(tmp_path: Path) -> None:
+    text = faults(tmp_path, "- pint: {x: 0}\n- point: {x: 0\n- byte: {data: 0}\n")
+    assert "stimuli.yaml:1:3: error: no subscriber is called 'pint'" in text
+    assert "stimuli.yaml:3:7: error: this is not YAML: expected ',' or '}', but got ':'" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "error: stimuli.yaml holds no message for point, byte"),
+        ("[]", "error: stimuli.yaml holds no message for point, byte"),
+        ("point: {x: 0}", "stimuli.yaml:1:1: error: stimuli are a list, not a mapping"),
+        ("- &x {point: *x}", "stimuli.yaml:1:6: error: 'x' is a"),
+    ],
+)
+def test_no_list_of_messages(tmp_path: Path, text: str, message: str) -> None:
+    found = faults(tmp_path, text)
+    assert found.startswith(message) or "has no field 'point'" in found
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"error: there are no stimuli at .*nowhere\.yaml"):
+        read_stimuli(tmp_path / "nowhere.yaml", SUBSCRIBERS)
