@@ -17,6 +17,7 @@ from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.library_path import library_root
 
 if TYPE_CHECKING:
+    from fusesoc_firm.message.derived import Interface
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.message.model import MessageDefinition, MessageName
 
@@ -75,16 +76,22 @@ def _command(
 def _add_message(commands: Any) -> None:
     message = _command(commands, "message", "look at message definitions", "firm message show geometry_msgs/Pose")
     actions = message.add_subparsers(title="actions", metavar="ACTION", required=True)
-    listing = _command(actions, "list", "list the known messages", "firm message list 'sensor_msgs/*'", _list_messages)
+    listing = _command(
+        actions,
+        "list",
+        "list the known messages, services and actions",
+        "firm message list 'sensor_msgs/*'",
+        _list_messages,
+    )
     listing.add_argument("pattern", nargs="?", default="*", help="only names like this one, with * and ?")
     show = _command(
         actions,
         "show",
-        "print a message in any stage of its way to hardware",
+        "print a message, or those of a service or action, in any stage of the way to hardware",
         "firm message show geometry_msgs/Quaternion --ros 1 --stage vhdl",
         _show_message,
     )
-    show.add_argument("type", metavar="TYPE", help="the message's type, such as geometry_msgs/Quaternion")
+    show.add_argument("type", metavar="TYPE", help="its type, such as geometry_msgs/Quaternion")
     show.add_argument("--stage", choices=STAGES, default="tree", help="what to print (default: tree)")
     show.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
     for parser in (listing, show):
@@ -135,18 +142,37 @@ def _library(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
 
 def _list_messages(arguments: argparse.Namespace) -> None:
     library = _library(arguments, arguments.ros)
-    names = [name for name in library.names() if fnmatch.fnmatchcase(str(name), arguments.pattern)]
-    width = max((len(str(name)) for name in names), default=0)
+    origins = {str(name): library.origin(name) for name in library.names()}
+    origins |= {str(interface): str(file) for interface, file in library.interfaces().items()}
+    names = sorted(name for name in origins if fnmatch.fnmatchcase(name, arguments.pattern))
+    width = max((len(name) for name in names), default=0)
     for name in names:
-        print(f"{name!s:{width}}  {library.origin(name)}")
+        print(f"{name:{width}}  {origins[name]}")
 
 
 def _show_message(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.message.parser import parse_name
+    from fusesoc_firm.message.parser import parse_full_name
 
-    name = parse_name(arguments.type)
-    definitions = _library(arguments, arguments.ros).closure(name)
-    print(_stage(arguments.stage, name, definitions, arguments.width).rstrip("\n"))
+    library = _library(arguments, arguments.ros)
+    kind, name = parse_full_name(arguments.type)
+    interface = library.interface(name, kind)
+    names = interface.messages if interface else (name,)
+    definitions = library.joint_closure(names)
+    texts = [_stage(arguments.stage, each, definitions, arguments.width) for each in names]
+    if interface and arguments.stage == "message":
+        texts.insert(0, _title(interface, definitions))
+    separator = "\n---\n" if arguments.stage in ("frame", "config") else "\n\n"
+    print(separator.join(text.rstrip("\n") for text in texts))
+
+
+def _title(interface: Interface, definitions: dict[MessageName, MessageDefinition]) -> str:
+    """What stands above the messages of a service or an action."""
+    from fusesoc_firm.message.signature import signature
+
+    title = f"# {interface} (ROS {interface.ros})"
+    if not interface.has_signature:
+        return title
+    return f"{title}\n# signature: {signature(interface.name, definitions, interface.kind)}"
 
 
 def _stage(stage: str, name: MessageName, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
@@ -154,9 +180,10 @@ def _stage(stage: str, name: MessageName, definitions: dict[MessageName, Message
     from fusesoc_firm.frame import tree
     from fusesoc_firm.frame.layout import frame_of
     from fusesoc_firm.message.printer import to_text
+    from fusesoc_firm.message.signature import signature
 
     if stage == "message":
-        return to_text(definitions[name])
+        return to_text(definitions[name], signature(name, definitions))
     if stage == "tree":
         try:
             frame = frame_of(name, definitions)

@@ -1,4 +1,7 @@
-"""Where `.msg` files lie: in a package, a workspace of packages, a flat folder of packages, or an installed ROS."""
+"""Where `.msg`, `.srv` and `.action` files lie.
+
+In a package, a workspace of packages, a flat folder of packages, or an installed ROS.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +10,31 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
 
 # What catkin, colcon and ament leave out; colcon puts one into `build`, `install` and `log` itself.
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"})
 
-MessageFiles = dict[MessageName, list[Path]]
+# The suffix of a file and the usual name of its folder.
+_KINDS = tuple(InterfaceKind)
+
+InterfaceFiles = dict[InterfaceKind, dict[MessageName, list[Path]]]
 
 
-def message_files(folder: Path) -> MessageFiles:
-    """Every `.msg` file below a folder by the name of its message; several files where a name is given more than once.
+def interface_files(folder: Path) -> InterfaceFiles:
+    """Every file below a folder by kind and by the name that it defines; several where a name is given more than once.
 
     A file belongs to the package of the nearest `package.xml` above it. Without one, it belongs to the folder above
-    `msg/` or, in a flat layout, to the folder that it lies in. Folders that hide (`.git`) or carry an ignore marker
-    of a build tool are left out.
+    `msg/`, `srv/` or `action/` or, in a flat layout, to the folder that it lies in. Folders that hide (`.git`) or carry
+    an ignore marker of a build tool are left out.
     """
-    found: MessageFiles = {}
+    found: InterfaceFiles = {kind: {} for kind in _KINDS}
     packages: dict[Path, str] = {}
     for path in _walk(folder):
         if path.parent not in packages:
             packages[path.parent] = _package_name(path.parent, folder)
-        found.setdefault(MessageName(packages[path.parent], path.stem), []).append(path)
+        name = MessageName(packages[path.parent], path.stem)
+        found[InterfaceKind(path.suffix[1:])].setdefault(name, []).append(path)
     return found
 
 
@@ -44,7 +51,7 @@ def _entries(variable: str) -> list[Path]:
 
 
 def _walk(folder: Path) -> Iterator[Path]:
-    """The `.msg` files in a fixed order. Links are followed, as workspaces are made of them, but not in circles."""
+    """The files in a fixed order. Links are followed, as workspaces are made of them, but not in circles."""
     seen: set[str] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
         real = os.path.realpath(parent)
@@ -53,13 +60,13 @@ def _walk(folder: Path) -> Iterator[Path]:
             continue
         seen.add(real)
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        yield from (Path(parent, name) for name in sorted(files) if name.endswith(".msg"))
+        yield from (Path(parent, name) for name in sorted(files) if Path(name).suffix[1:] in _KINDS)
 
 
 def _package_name(parent: Path, folder: Path) -> str:
     """The package of the files in `parent`; the search for `package.xml` ends at the folder that the user named."""
     # A user may name the `msg` folder itself; its package is then still the folder above.
-    top = folder.resolve().parent if folder.resolve().name == "msg" else folder.resolve()
+    top = folder.resolve().parent if folder.resolve().name in _KINDS else folder.resolve()
     # Links stay (a linked package is named by where it is linked), but `..` goes, or `top` would not be met.
     start = Path(os.path.abspath(parent))  # noqa: PTH100
     for candidate in (start, *start.parents):
@@ -67,7 +74,7 @@ def _package_name(parent: Path, folder: Path) -> str:
             return name
         if candidate == top:
             break
-    return start.parent.name if start.name == "msg" else start.name
+    return start.parent.name if start.name in _KINDS else start.name
 
 
 def _declared_name(manifest: Path) -> str:

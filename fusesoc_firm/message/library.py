@@ -9,30 +9,41 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
+from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.dialect import dialect_of
-from fusesoc_firm.message.folders import environment_folders, message_files
+from fusesoc_firm.message.folders import InterfaceFiles, environment_folders, interface_files
 from fusesoc_firm.message.model import (
-    ArrayType,
-    Field,
+    InterfaceKind,
     MessageDefinition,
     MessageName,
-    MessageType,
     RosVersion,
-    SequenceType,
+    nested_message,
 )
 from fusesoc_firm.message.parser import parse_message
 from fusesoc_firm.message.stores import DistributionStore, distributions
 
+_WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
+
+
+@dataclass(frozen=True)
+class _Source:
+    """The files that define a message (more than one must be equal), and the service or action they are of, if any."""
+
+    paths: tuple[Path, ...]
+    interface: Interface | None = None
+
 
 class MessageLibrary:
-    """All messages that one version of ROS can name.
+    """All messages that one version of ROS can name, those of services and actions included.
 
     `paths` are folders in order of precedence. `environment` is a mapping like `os.environ`; None leaves an installed
     ROS aside. `store` names the distribution behind all others (`noetic`, `jazzy`, ...). A message is taken from the
-    first place that has it. Raises `InputError` for a folder that is missing or holds no `.msg` file.
+    first place that has it; in one place a `.msg` file goes before what a `.srv` or `.action` file implies. Raises
+    `InputError` for a folder that is missing or holds no such file.
     """
 
     def __init__(
@@ -45,17 +56,32 @@ class MessageLibrary:
         self.ros = ros
         self._store = DistributionStore(ros, store)
         self._folders = [*paths, *(environment_folders(ros, environment) if environment is not None else ())]
-        self._files: dict[MessageName, list[Path]] = {}
-        found = {folder: message_files(folder) for folder in self._folders}
-        _check_folders(path for path in paths if not found[path])
+        found = {folder: interface_files(folder) for folder in self._folders}
+        _check_folders(path for path in paths if not any(found[path].values()))
+        self._sources: dict[MessageName, _Source] = {}
+        self._interfaces: dict[Interface, Path] = {}
+        messages = {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
+        self._has_events = ros is RosVersion.ROS2 and EVENT_INFO in messages | self._store.names
         for folder in reversed(self._folders):
-            self._files.update(found[folder])
+            self._add(found[folder])
         # A definition or None, with the faults of its text: a faulty file is reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
 
     def names(self) -> list[MessageName]:
         """Every message there is, sorted."""
-        return sorted(self._store.names | self._files.keys())
+        return sorted(self._store.names | self._sources.keys())
+
+    def interfaces(self) -> dict[Interface, Path]:
+        """Every service and action there is, sorted by its full name, and its file."""
+        return dict(sorted(self._interfaces.items(), key=lambda item: str(item[0])))
+
+    def interface(self, name: MessageName, kind: InterfaceKind | None = None) -> Interface | None:
+        """The service or action of this name, if there is one; without a `kind`, a message goes before both."""
+        if kind is None and self._is_message(name):
+            return None
+        kinds = (InterfaceKind.SERVICE, InterfaceKind.ACTION) if kind is None else (kind,)
+        named = (Interface(name, kind, self.ros, self._has_events) for kind in kinds)
+        return next((interface for interface in named if interface in self._interfaces), None)
 
     def get(self, name: MessageName, source: SourceRef | None = None) -> MessageDefinition:
         """The definition of a message that `source` asks for; raises `InputError` with all faults of its file."""
@@ -69,11 +95,11 @@ class MessageLibrary:
         self, name: MessageName, diagnostics: Diagnostics, source: SourceRef | None = None
     ) -> MessageDefinition | None:
         """As `get`, but notes the faults and goes on: with the right part of a faulty definition, or None."""
-        if name not in self._files and name not in self._store.names:
+        if not self._is_message(name):
             diagnostics.error(f"unknown message '{name}'", source, self._hint(name))
             return None
         if name not in self._parsed:
-            self._parsed[name] = self._parse(name)
+            self._parse(name)
         definition, faults = self._parsed[name]
         for fault in faults.found:
             diagnostics.error(fault.message, fault.source, fault.hint)
@@ -84,40 +110,59 @@ class MessageLibrary:
 
         Raises `InputError` with every fault in every file, every unknown message and every cycle.
         """
+        return self.joint_closure((name,), source)
+
+    def joint_closure(
+        self, names: Iterable[MessageName], source: SourceRef | None = None
+    ) -> dict[MessageName, MessageDefinition]:
+        """As `closure`, of several messages, such as those of a service."""
         diagnostics = Diagnostics()
         closure: dict[MessageName, MessageDefinition] = {}
-        self._collect(name, source, (), closure, diagnostics)
+        for name in names:
+            self._collect(name, source, (), closure, diagnostics)
         diagnostics.raise_if_any()
         return closure
 
     def origin(self, name: MessageName) -> str:
         """The file of a known message, or the distribution that has it, for people to read."""
-        return str(self._files[name][0]) if name in self._files else self._store.title
+        return str(self._sources[name].paths[0]) if name in self._sources else self._store.title
 
     def files(self, names: Iterable[MessageName]) -> list[Path]:
         """The files that these messages are read from, in the order of names; messages of a distribution have none."""
-        return [self._files[name][0] for name in sorted(set(names)) if name in self._files]
+        paths = [self._sources[name].paths[0] for name in sorted(set(names)) if name in self._sources]
+        return list(dict.fromkeys(paths))  # the messages of a service share its file
 
-    def _parse(self, name: MessageName) -> tuple[MessageDefinition | None, Diagnostics]:
+    def _is_message(self, name: MessageName) -> bool:
+        return name in self._sources or name in self._store.names
+
+    def _add(self, files: InterfaceFiles) -> None:
+        """Take in what a folder holds; it goes before what is there."""
+        for kind in (InterfaceKind.ACTION, InterfaceKind.SERVICE):
+            for name, paths in files[kind].items():
+                interface = Interface(name, kind, self.ros, self._has_events)
+                self._interfaces[interface] = paths[0]
+                self._sources |= dict.fromkeys(interface.messages, _Source(tuple(paths), interface))
+        self._sources |= {name: _Source(tuple(paths)) for name, paths in files[InterfaceKind.MESSAGE].items()}
+
+    def _parse(self, name: MessageName) -> None:
+        """Read what defines a message into `_parsed`, together with the other messages of the same file."""
         faults = Diagnostics()
-        file, text = self._read(name, faults)
-        return (None if faults.found else parse_message(text, name, self.ros, file, faults)), faults
-
-    def _read(self, name: MessageName, faults: Diagnostics) -> tuple[str, str]:
-        if name not in self._files:
-            return self._store.file(name), self._store.text(name)
-        first, *others = self._files[name]
-        data = first.read_bytes()
-        for other in others:
-            if other.read_bytes() != data:
-                faults.error(f"'{name}' differs from {other}", SourceRef(str(first), 1, 1), "name the folder of one")
-        try:
-            return str(first), data.decode("utf-8")
-        except UnicodeDecodeError as fault:
-            line_start = data.rfind(b"\n", 0, fault.start) + 1
-            place = SourceRef(str(first), data.count(b"\n", 0, fault.start) + 1, fault.start - line_start + 1)
-            faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", place)
-            return str(first), ""
+        source = self._sources.get(name)
+        interface = source.interface if source else None
+        if source:
+            file, text = str(source.paths[0]), _read(str(interface or name), source.paths, faults)
+        else:
+            file, text = self._store.file(name), self._store.text(name)
+        found: dict[MessageName, MessageDefinition] = {}
+        if not faults.found:
+            if interface:
+                found = interface.parse(text, file, faults)
+            else:
+                found = {name: parse_message(text, name, self.ros, file, faults)}
+        for each in interface.messages if interface else (name,):
+            # One of a service's messages may come from a `.msg` file, which goes before the service.
+            if self._sources.get(each) is source:
+                self._parsed[each] = (found.get(each), faults)
 
     def _collect(
         self,
@@ -138,11 +183,13 @@ class MessageLibrary:
         if definition is None:
             return
         for field in definition.fields:
-            if nested := _nested_message(field):
+            if nested := nested_message(field.type):
                 self._collect(nested, field.source, (*above, name), closure, diagnostics)
         closure[name] = definition
 
     def _hint(self, name: MessageName) -> str:
+        if interface := self.interface(name):
+            return f"it is a {_WORDS[interface.kind]}; its messages are {', '.join(map(str, interface.messages))}"
         places = ", ".join([*(str(folder) for folder in self._folders), self._store.title])
         nearest = self._nearest(name)
         return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}"
@@ -154,7 +201,7 @@ class MessageLibrary:
             return str(same_type[0])
         builtin_types = dialect_of(self.ros).builtin_types
         primitives = difflib.get_close_matches(name.name, sorted(builtin_types), n=1, cutoff=0.8)
-        names = [str(known) for known in self.names()]
+        names = [str(known) for known in (*self.names(), *(interface.name for interface in self._interfaces))]
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
 
 
@@ -173,16 +220,26 @@ def libraries(
     }
 
 
+def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
+    """The text of the first file; it is a fault if another one differs, or if it is not UTF-8."""
+    first, *others = paths
+    data = first.read_bytes()
+    for other in others:
+        if other.read_bytes() != data:
+            faults.error(f"'{name}' differs from {other}", SourceRef(str(first), 1, 1), "name the folder of one")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as fault:
+        line_start = data.rfind(b"\n", 0, fault.start) + 1
+        place = SourceRef(str(first), data.count(b"\n", 0, fault.start) + 1, fault.start - line_start + 1)
+        faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", place)
+        return ""
+
+
 def _check_folders(empty: Iterable[Path]) -> None:
     """Raise `InputError` that names every one of the user's folders that gave nothing."""
     diagnostics = Diagnostics()
     for path in empty:
-        reason = "holds no .msg file" if path.is_dir() else "is not a folder"
+        reason = "holds no .msg, .srv or .action file" if path.is_dir() else "is not a folder"
         diagnostics.error(f"message path '{path}' {reason}", hint="give a package, a workspace or a folder of packages")
     diagnostics.raise_if_any()
-
-
-def _nested_message(field: Field) -> MessageName | None:
-    kind = field.type
-    element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
-    return element.name if isinstance(element, MessageType) else None

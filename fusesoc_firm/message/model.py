@@ -7,7 +7,7 @@ frozen, so a definition can be a dictionary key and can be shared.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 
 from fusesoc_firm.diagnostics import SourceRef
 
@@ -17,6 +17,14 @@ class RosVersion(IntEnum):
 
     ROS1 = 1
     ROS2 = 2
+
+
+class InterfaceKind(StrEnum):
+    """What a file defines, in ROS's own word: the file's suffix, its folder, and the middle of ROS 2's full names."""
+
+    MESSAGE = "msg"
+    SERVICE = "srv"
+    ACTION = "action"
 
 
 @dataclass(frozen=True, order=True)
@@ -88,6 +96,14 @@ class SequenceType:
 
 
 FieldType = ElementType | ArrayType | SequenceType
+
+
+def nested_message(kind: FieldType) -> MessageName | None:
+    """The message that a field of this type holds, once or as an array."""
+    element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
+    return element.name if isinstance(element, MessageType) else None
+
+
 Scalar = bool | int | float | str
 DefaultValue = Scalar | tuple[Scalar, ...]
 
@@ -104,20 +120,28 @@ class Field:
 
 @dataclass(frozen=True)
 class Constant:
-    """A named value of the definition; it is never sent."""
+    """A named value of the definition; it is never sent.
+
+    `text` is the value as its author wrote it, without the blanks around it: ROS 1's MD5 sum tells `1` from `+1`.
+    """
 
     name: str
     type: PrimitiveType | StringType
     value: Scalar
+    text: str
     source: SourceRef
 
 
 @dataclass(frozen=True)
 class MessageDefinition:
-    """A `.msg` file: its fields in wire order and its constants."""
+    """A `.msg` file, or a message that ROS derives from a `.srv` or `.action` file, as `kind` says.
+
+    `fields` are in wire order.
+    """
 
     name: MessageName
     ros: RosVersion
     fields: tuple[Field, ...]
     constants: tuple[Constant, ...]
     source: SourceRef
+    kind: InterfaceKind = InterfaceKind.MESSAGE

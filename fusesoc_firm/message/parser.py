@@ -25,6 +25,7 @@ from fusesoc_firm.message.model import (
     ElementType,
     Field,
     FieldType,
+    InterfaceKind,
     MessageDefinition,
     MessageName,
     MessageType,
@@ -37,16 +38,25 @@ from fusesoc_firm.message.piece import Piece, read_lines
 from fusesoc_firm.message.values import read_default, read_value
 
 _SEPARATOR = "---"
-_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:/msg)?/([A-Za-z][A-Za-z0-9_]*)")
+_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:/(msg|srv|action))?/([A-Za-z][A-Za-z0-9_]*)")
 _TYPE = re.compile(r"([^\[\]]+)(?:\[([^\[\]]*)\])?")
 
 
 def parse_name(text: str) -> MessageName:
-    """`pkg/Type` or `pkg/msg/Type` to a name; raises `InputError` for anything else."""
+    """`pkg/Type`, `pkg/msg/Type` or, for messages of services and actions, `pkg/srv/Type_Request` to a name.
+
+    Raises `InputError` for anything else.
+    """
+    return parse_full_name(text)[1]
+
+
+def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
+    """As `parse_name`, with the kind that the text names, if any."""
     match = _NAME.fullmatch(text.strip())
     if match is None:
         fail(f"'{text}' is not a message name", hint="write 'package/Type', like 'geometry_msgs/Quaternion'")
-    return MessageName(*match.groups())
+    package, kind, name = match.groups()
+    return InterfaceKind(kind) if kind else None, MessageName(package, name)
 
 
 def parse_message(
@@ -163,7 +173,7 @@ class _Reader:
             value = line.part(value.start).strip()
         scalar = read_value(value, constant_type, self._dialect, self._diagnostics)
         if scalar is not None and is_named:
-            self.constants.append(Constant(name.text, constant_type, scalar, kind.source))
+            self.constants.append(Constant(name.text, constant_type, scalar, value.text, kind.source))
 
     def _constant_type(self, kind: Piece) -> PrimitiveType | StringType | None:
         if kind.text in self._dialect.strings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fusesoc_firm.message.model import (
+    Constant,
     DefaultValue,
     MessageDefinition,
     RosVersion,
@@ -12,15 +13,18 @@ from fusesoc_firm.message.model import (
 )
 
 
-def to_text(definition: MessageDefinition) -> str:
-    """The definition as `.msg` text: constants, then fields in wire order; a comment names the message and version.
+def to_text(definition: MessageDefinition, signature: str = "") -> str:
+    """The definition as `.msg` text: constants, then fields in wire order.
+
+    A comment names the message, its version and, if given, its signature.
 
     Every value that the parser can deliver is written so that it reads back (ROS 2 has no way to write a `#`).
     """
     ros = definition.ros
-    constants = [(str(c.type), c.name, f"= {_constant(c.value, ros)}") for c in definition.constants]
+    constants = [(str(c.type), c.name, f"= {_constant(c, ros)}") for c in definition.constants]
     fields = [(str(f.type), f.name, _default(f.default)) for f in definition.fields]
-    blocks = [[f"# {definition.name} (ROS {ros})"], _aligned(constants), _aligned(fields)]
+    header = [f"# {definition.name} (ROS {ros})", *([f"# signature: {signature}"] if signature else [])]
+    blocks = [header, _aligned(constants), _aligned(fields)]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
 
 
@@ -29,10 +33,9 @@ def _aligned(rows: Sequence[tuple[str, str, str]]) -> list[str]:
     return [f"{kind:{widths[0]}} {name:{widths[1]}} {value}".rstrip() for kind, name, value in rows]
 
 
-def _constant(value: Scalar, ros: RosVersion) -> str:
-    if ros is RosVersion.ROS1:
-        return str(value)  # `True`; a string stands as it is up to the end of the line
-    return _scalar(value)
+def _constant(constant: Constant, ros: RosVersion) -> str:
+    # ROS 1's MD5 sum is one of the value's text, and must be the same for the printed message.
+    return constant.text if ros is RosVersion.ROS1 else _scalar(constant.value)
 
 
 def _default(value: DefaultValue | None) -> str:

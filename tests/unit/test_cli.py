@@ -92,6 +92,18 @@ def test_every_stage_is_printed(stage: str, capsys: Captured) -> None:
         assert all(isinstance(document, dict) for document in yaml.safe_load_all(text))
 
 
+@pytest.mark.parametrize(
+    ("ros", "signature"),
+    [
+        ("1", "4a842b65f413084dc2b10fb484ea7f17"),
+        ("2", "RIHS01_6963084842a9b04494d6b2941d11444708d892da2f4b09843b9c43f42a7f6881"),
+    ],
+)
+def test_a_message_is_printed_with_its_signature(ros: str, signature: str, capsys: Captured) -> None:
+    lines = out(capsys, "message", "show", "geometry_msgs/Point", "--ros", ros, "--stage", "message").splitlines()
+    assert lines[:3] == [f"# geometry_msgs/Point (ROS {ros})", f"# signature: {signature}", ""]
+
+
 def test_both_converters_are_printed(capsys: Captured) -> None:
     text = out(capsys, "message", "show", "geometry_msgs/Point", "--stage", "vhdl")
     assert text.count("\nend entity") == 2
@@ -105,6 +117,82 @@ def test_messages_of_a_folder(tmp_path: Path, capsys: Captured) -> None:
     listed = out(capsys, "message", "list", "my_msgs/*", "--path", str(tmp_path))
     assert listed.split() == ["my_msgs/Speed", str(folder / "Speed.msg")]
     assert "metres_per_second" in out(capsys, "message", "show", "my_msgs/Speed", "--path", str(tmp_path))
+
+
+@pytest.fixture
+def interfaces(tmp_path: Path) -> Path:
+    """A package with a service and an action."""
+    for kind, text in (("srv", "bool data\n---\n"), ("action", "uint8 a\n---\nuint8 b\n---\nuint8 c\n")):
+        folder = tmp_path / "my_msgs" / kind
+        folder.mkdir(parents=True)
+        (folder / f"Set.{kind}").write_text(text)
+    return tmp_path
+
+
+def test_services_and_actions_are_listed_with_their_messages(interfaces: Path, capsys: Captured) -> None:
+    listed = out(capsys, "message", "list", "my_msgs/*", "--path", str(interfaces), "--ros", "1")
+    package = interfaces / "my_msgs"
+    service, action = str(package / "srv" / "Set.srv"), str(package / "action" / "Set.action")
+    assert [tuple(line.split()) for line in listed.splitlines()] == [
+        ("my_msgs/SetAction", action),
+        ("my_msgs/SetActionFeedback", action),
+        ("my_msgs/SetActionGoal", action),
+        ("my_msgs/SetActionResult", action),
+        ("my_msgs/SetFeedback", action),
+        ("my_msgs/SetGoal", action),
+        ("my_msgs/SetRequest", service),
+        ("my_msgs/SetResponse", service),
+        ("my_msgs/SetResult", action),
+        ("my_msgs/action/Set", action),
+        ("my_msgs/srv/Set", service),
+    ]
+
+
+@pytest.mark.parametrize("name", ["my_msgs/Set", "my_msgs/srv/Set"])
+def test_a_service_is_printed_with_its_messages(name: str, interfaces: Path, capsys: Captured) -> None:
+    arguments = ("message", "show", name, "--path", str(interfaces), "--ros", "1", "--stage")
+    assert out(capsys, *arguments, "message") == (
+        "# my_msgs/srv/Set (ROS 1)\n"
+        "# signature: 8b94c1b53db61fb6aed406028ad6332a\n"
+        "\n"
+        "# my_msgs/SetRequest (ROS 1)\n"
+        "# signature: 8b94c1b53db61fb6aed406028ad6332a\n"
+        "\n"
+        "bool data\n"
+        "\n"
+        "# my_msgs/SetResponse (ROS 1)\n"
+        "# signature: d41d8cd98f00b204e9800998ecf8427e\n"
+    )
+    assert [tree.split()[4] for tree in out(capsys, *arguments, "tree").split("\n\n")] == [
+        "my_msgs/SetRequest",
+        "my_msgs/SetResponse",
+    ]
+    frames = list(yaml.safe_load_all(out(capsys, *arguments, "frame")))
+    assert [frame["message"] for frame in frames] == ["my_msgs/SetRequest", "my_msgs/SetResponse"]
+    assert len(list(yaml.safe_load_all(out(capsys, *arguments, "config")))) == 4
+
+
+def test_an_action_is_printed_with_its_messages(interfaces: Path, capsys: Captured) -> None:
+    text = out(capsys, "message", "show", "my_msgs/action/Set", "--path", str(interfaces), "--stage", "message")
+    titles = [line for line in text.splitlines() if line.endswith("(ROS 2)")]
+    assert titles[:2] == ["# my_msgs/action/Set (ROS 2)", "# my_msgs/Set_Goal (ROS 2)"]
+    assert len(titles) == 11
+    assert text.count("# signature: RIHS01_") == 11
+
+
+def test_one_message_of_a_service_is_printed(interfaces: Path, capsys: Captured) -> None:
+    for name in ("my_msgs/Set_Request", "my_msgs/srv/Set_Request"):
+        text = out(capsys, "message", "show", name, "--path", str(interfaces), "--stage", "message")
+        assert text.startswith("# my_msgs/Set_Request (ROS 2)\n")
+        assert text.endswith("\n\nbool data\n")
+
+
+def test_a_service_of_a_distribution_before_hashes_has_no_signature(
+    interfaces: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)  # a newer ROS 2 would bring the events along
+    arguments = ("message", "show", "my_msgs/srv/Set", "--path", str(interfaces), "--distro", "humble")
+    assert out(capsys, *arguments, "--stage", "message").startswith("# my_msgs/srv/Set (ROS 2)\n\n# my_msgs/Set_Req")
 
 
 def test_a_fault_in_a_message_is_shown_in_its_file(tmp_path: Path, capsys: Captured) -> None:

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef
-from fusesoc_firm.message.folders import message_files
+from fusesoc_firm.message.folders import interface_files
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, MessageType, PrimitiveType, RosVersion
+from fusesoc_firm.message.model import InterfaceKind, MessageName, MessageType, PrimitiveType, RosVersion
 from fusesoc_firm.message.stores import DistributionStore, distributions
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
@@ -113,7 +113,7 @@ def test_links_are_followed_but_not_in_circles(tmp_path: Path) -> None:
     workspace.mkdir()
     (workspace / "my_msgs").symlink_to(tmp_path / "elsewhere" / "my_msgs")
     (tmp_path / "elsewhere" / "my_msgs" / "back").symlink_to(workspace)
-    assert message_files(workspace) == {
+    assert interface_files(workspace)[InterfaceKind.MESSAGE] == {
         MessageName("my_msgs", "A"): [workspace / "my_msgs" / "msg" / "A.msg"],
     }
 
@@ -152,7 +152,7 @@ def test_every_bad_folder_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         MessageLibrary(ROS1, [tmp_path / "empty", tmp_path / "missing"])
     assert [diagnostic.message for diagnostic in caught.value.diagnostics] == [
-        f"message path '{tmp_path / 'empty'}' holds no .msg file",
+        f"message path '{tmp_path / 'empty'}' holds no .msg, .srv or .action file",
         f"message path '{tmp_path / 'missing'}' is not a folder",
     ]
 

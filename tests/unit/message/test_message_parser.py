@@ -8,6 +8,7 @@ from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
+    InterfaceKind,
     MessageDefinition,
     MessageName,
     MessageType,
@@ -19,6 +20,7 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.parser import (
     action_names,
+    parse_full_name,
     parse_message,
     parse_name,
     parse_sections,
@@ -27,6 +29,7 @@ from fusesoc_firm.message.parser import (
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 NAME = MessageName("my_msgs", "Mine")
+SERVICE = MessageName("my_msgs", "Add")
 
 
 def parse(text: str, ros: RosVersion) -> MessageDefinition:
@@ -202,6 +205,19 @@ def test_constants(line: str, ros: RosVersion, value: Scalar) -> None:
 
 
 @pytest.mark.parametrize(
+    ("line", "ros", "text"),
+    [
+        ("uint8 A= +07 # seven", ROS1, "+07"),
+        ("string A=  'a # b' ", ROS1, "'a # b'"),
+        ("uint8 A=0x1F", ROS2, "0x1F"),
+        ("string A = 'a' # b", ROS2, "'a'"),
+    ],
+)
+def test_a_constant_keeps_how_it_is_written(line: str, ros: RosVersion, text: str) -> None:
+    assert [constant.text for constant in parse(line, ros).constants] == [text]
+
+
+@pytest.mark.parametrize(
     ("line", "ros"),
     [
         ("uint8 A=256", ROS1),
@@ -337,13 +353,24 @@ def test_parse_name(text: str) -> None:
     assert parse_name(text) == MessageName("geometry_msgs", "Point")
 
 
-@pytest.mark.parametrize("text", ["", "Point", "a/b/Point", "a/", "/Point", "a/Po-int", "a/srv/Point", "1a/Point"])
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("my_msgs/Add", None),
+        ("my_msgs/msg/Add", InterfaceKind.MESSAGE),
+        ("my_msgs/srv/Add", InterfaceKind.SERVICE),
+        ("my_msgs/action/Add", InterfaceKind.ACTION),
+    ],
+)
+def test_a_full_name_has_a_kind(text: str, kind: InterfaceKind | None) -> None:
+    assert parse_full_name(text) == (kind, SERVICE)
+    assert parse_name(text) == SERVICE
+
+
+@pytest.mark.parametrize("text", ["", "Point", "a/b/Point", "a/", "/Point", "a/Po-int", "a/idl/Point", "1a/Point"])
 def test_parse_name_refuses(text: str) -> None:
     with pytest.raises(InputError, match="is not a message name"):
         parse_name(text)
-
-
-SERVICE = MessageName("my_msgs", "Add")
 
 
 def test_a_service_is_two_definitions_with_their_own_lines() -> None:

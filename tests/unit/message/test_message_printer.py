@@ -40,8 +40,12 @@ def parse(text: str, ros: RosVersion) -> MessageDefinition:
 
 
 def without_places(definition: MessageDefinition) -> MessageDefinition:
+    """Without sources, and without how a constant is written where that means nothing."""
     fields = tuple(replace(field, source=NOWHERE) for field in definition.fields)
-    constants = tuple(replace(constant, source=NOWHERE) for constant in definition.constants)
+    constants = tuple(
+        replace(c, source=NOWHERE, text=c.text if definition.ros is RosVersion.ROS1 else "")
+        for c in definition.constants
+    )
     return replace(definition, fields=fields, constants=constants, source=NOWHERE)
 
 
@@ -60,6 +64,15 @@ def test_ros1_text() -> None:
     )
 
 
+def test_a_value_of_ros1_stays_as_it_was_written() -> None:
+    text = "float32 A= +1.50 # one and a half\nint8 B=-07\nbool C=1"
+    assert to_text(parse(text, RosVersion.ROS1)).splitlines()[2:] == [
+        "float32 A = +1.50",
+        "int8    B = -07",
+        "bool    C = 1",
+    ]
+
+
 def test_ros2_text() -> None:
     text = "string<=5[<=2] names ['a', b]\nbool ok true\nint32 x\nstring NAME='say \"no\"'\nwstring w 'w'"
     assert to_text(parse(text, RosVersion.ROS2)) == (
@@ -76,6 +89,11 @@ def test_ros2_text() -> None:
 
 def test_an_empty_message_has_only_its_header() -> None:
     assert to_text(parse("", RosVersion.ROS1)) == "# my_msgs/Mine (ROS 1)\n"
+
+
+def test_a_signature_stands_in_the_header() -> None:
+    text = to_text(parse("uint8 x", RosVersion.ROS2), "RIHS01_12")
+    assert text == "# my_msgs/Mine (ROS 2)\n# signature: RIHS01_12\n\nuint8 x\n"
 
 
 SIZES = st.integers(1, 2**32 - 1)
@@ -152,7 +170,9 @@ def definitions(draw: st.DrawFn) -> MessageDefinition:
         word = draw(st.sampled_from(kinds))
         constant_type = StringType(word == "wstring") if word in dialect.strings else PrimitiveType(word)
         if name not in {field.name for field in fields}:
-            constants.append(Constant(name, constant_type, draw(values(constant_type, dialect)), NOWHERE))
+            value = draw(values(constant_type, dialect))
+            written = str(value) if ros is RosVersion.ROS1 else ""
+            constants.append(Constant(name, constant_type, value, written, NOWHERE))
     return MessageDefinition(NAME, ros, tuple(fields), tuple(constants), NOWHERE)
 
 

@@ -1,0 +1,99 @@
+"""The messages of services and actions: the sections of their files, and what ROS wraps around these.
+
+The wrapping messages of ROS 1 are those of actionlib_msgs' genaction.py, the ones of ROS 2 those of rosidl_parser's
+`Service` and `Action`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message.parser import action_names, parse_message, parse_sections, service_names
+
+# ROS 2 has events of services, and hashes, since the distribution (Iron) that brought this message.
+EVENT_INFO = MessageName("service_msgs", "ServiceEventInfo")
+
+# Suffix of a wrapping message and its text; `{0}` is the name of the service or action.
+_Wrappers = Mapping[str, str]
+
+_ROS1_ACTION: _Wrappers = {
+    "Action": "{0}ActionGoal action_goal\n{0}ActionResult action_result\n{0}ActionFeedback action_feedback",
+    "ActionGoal": "Header header\nactionlib_msgs/GoalID goal_id\n{0}Goal goal",
+    "ActionResult": "Header header\nactionlib_msgs/GoalStatus status\n{0}Result result",
+    "ActionFeedback": "Header header\nactionlib_msgs/GoalStatus status\n{0}Feedback feedback",
+}
+_ROS2_ACTION: _Wrappers = {
+    "_SendGoal_Request": "unique_identifier_msgs/UUID goal_id\n{0}_Goal goal",
+    "_SendGoal_Response": "bool accepted\nbuiltin_interfaces/Time stamp",
+    "_GetResult_Request": "unique_identifier_msgs/UUID goal_id",
+    "_GetResult_Response": "int8 status\n{0}_Result result",
+    "_FeedbackMessage": "unique_identifier_msgs/UUID goal_id\n{0}_Feedback feedback",
+}
+
+
+def _event(service: str) -> str:
+    return f"{EVENT_INFO} info\n{service}_Request[<=1] request\n{service}_Response[<=1] response"
+
+
+_ROS2_SERVICE_EVENT: _Wrappers = {"_Event": _event("{0}")}
+_ROS2_ACTION_EVENTS: _Wrappers = {
+    "_SendGoal_Event": _event("{0}_SendGoal"),
+    "_GetResult_Event": _event("{0}_GetResult"),
+}
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A service or an action. `has_events` adds the events of services in ROS 2, which hold an `EVENT_INFO`."""
+
+    name: MessageName
+    kind: InterfaceKind
+    ros: RosVersion
+    has_events: bool
+
+    def __str__(self) -> str:
+        """Its full name, such as `std_srvs/srv/SetBool`."""
+        return f"{self.name.package}/{self.kind}/{self.name.name}"
+
+    @property
+    def messages(self) -> tuple[MessageName, ...]:
+        """The names of its messages, those that its file defines first."""
+        return self._sections + tuple(self._suffixed(suffix) for suffix in self._wrappers)
+
+    @property
+    def has_signature(self) -> bool:
+        """Whether its version of ROS gives it one: ROS 2 knows no hashes before events."""
+        return self.ros is RosVersion.ROS1 or self.has_events
+
+    def parse(self, text: str, file: str, diagnostics: Diagnostics) -> dict[MessageName, MessageDefinition]:
+        """Its messages, by the text of its file; every fault goes to `diagnostics`, what is right to the result."""
+        sections = parse_sections(text, self._sections, self.ros, file, diagnostics)
+        wrappers = [self._wrapper(suffix, wrapper, file) for suffix, wrapper in self._wrappers.items()]
+        return {message.name: replace(message, kind=self.kind) for message in (*sections, *wrappers)}
+
+    @property
+    def _sections(self) -> tuple[MessageName, ...]:
+        names_of = service_names if self.kind is InterfaceKind.SERVICE else action_names
+        return names_of(self.name, self.ros)
+
+    @property
+    def _wrappers(self) -> _Wrappers:
+        is_action = self.kind is InterfaceKind.ACTION
+        if self.ros is RosVersion.ROS1:
+            return _ROS1_ACTION if is_action else {}
+        wrappers, events = (_ROS2_ACTION, _ROS2_ACTION_EVENTS) if is_action else ({}, _ROS2_SERVICE_EVENT)
+        return {**wrappers, **events} if self.has_events else wrappers
+
+    def _suffixed(self, suffix: str) -> MessageName:
+        return MessageName(self.name.package, self.name.name + suffix)
+
+    def _wrapper(self, suffix: str, text: str, file: str) -> MessageDefinition:
+        """A wrapping message; since no line of the file says its fields, they all point to the file's beginning."""
+        # The only fault there can be is the name's, which the sections report.
+        ignored = Diagnostics()
+        definition = parse_message(text.format(self.name.name), self._suffixed(suffix), self.ros, file, ignored)
+        fields = tuple(replace(field, source=definition.source) for field in definition.fields)
+        return replace(definition, fields=fields)
