@@ -100,13 +100,13 @@ def _check_size(frame: Frame) -> None:
 def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Configuration:
     ports = field_ports(frame)
     return {
-        "width": stream.width,
-        "data_high": stream.width - 1,
-        "keep_high": stream.lanes - 1,
         "entity": entity,
         "message": str(frame.message),
         "ros": int(frame.ros),
         "payload_bytes": frame.payload_bytes,
+        "width": stream.width,
+        "data_high": stream.width - 1,
+        "keep_high": stream.lanes - 1,
         "has_ports": bool(ports),
         "ports": _port_declarations(ports, direction),
     }
