@@ -165,6 +165,19 @@ def test_the_packer_keeps_every_byte(
         _pack(library, tmp_path, frames, {"WIDTH": width, "SEED": SEED, "PIECES": pieces, **stalls})
 
 
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_packer_makes_nothing_of_an_empty_frame(library: Library, tmp_path: Path, width: int) -> None:
+    frames = _write_frames(tmp_path, width)
+    for pieces in ("random", "full"):
+        _pack(library, tmp_path, frames, {"WIDTH": width, "SEED": SEED, "PIECES": pieces, "EMPTY_FRAMES": True})
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_packer_shows_a_beat_before_it_is_asked(library: Library, tmp_path: Path, width: int) -> None:
+    frames = _write_frames(tmp_path, width)
+    _pack(library, tmp_path, frames, {"WIDTH": width, "SEED": SEED, "LATE_READY": True})
+
+
 @pytest.mark.parametrize("pieces", ["random", "shifted", "full"])
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_never_holds_its_input_up(library: Library, tmp_path: Path, width: int, pieces: str) -> None:

@@ -21,8 +21,12 @@ entity firm_axis_pack_tb is
     SINK_STALL_PERCENT   : integer := 0;
     -- A piece has `random` (0 to all lanes) bytes, and the end may come without a byte; or it is `full`, up to a
     -- frame's last one; or it is full after a first one of a random number: `shifted`.
-    PIECES   : string  := "random";
-    WATCHDOG : integer := 1000);
+    PIECES : string := "random";
+    -- Before each frame comes one without any byte, which must leave nothing.
+    EMPTY_FRAMES : boolean := false;
+    -- The sink is ready only where it saw `tvalid`, which must not wait for it.
+    LATE_READY : boolean := false;
+    WATCHDOG   : integer := 1000);
 end entity firm_axis_pack_tb;
 
 architecture simulation of firm_axis_pack_tb is
@@ -88,6 +92,27 @@ begin
       return integer(floor(draw * real(highest + 1)));
     end function draw_to;
 
+    -- What `data` and `count` hold, until it is taken.
+    procedure offer(is_end : in boolean) is
+    begin
+      valid <= '1';
+      last  <= '0';
+      if is_end then
+        last <= '1';
+      end if;
+      loop
+        wait until rising_edge(clk);
+        exit when ready = '1';
+        waits := waits + 1;
+      end loop;
+      offers := offers + 1;
+      wait until falling_edge(clk);
+      valid <= '0';
+      data  <= (others => 'X');
+      count <= (others => 'X');
+      last  <= 'X';
+    end procedure offer;
+
   begin
     read_stimulus_file(STIMULUS_FILE, content);
     for cycle in 1 to 4 loop
@@ -98,6 +123,10 @@ begin
     while frame /= null loop
       place    := 0;
       is_ended := false;
+      if EMPTY_FRAMES then
+        count <= (others => '0');
+        offer(true);
+      end if;
       while not is_ended loop
         loop
           uniform(random_1, random_2, draw);
@@ -120,22 +149,7 @@ begin
         place    := place + size;
         is_ended := place = frame.size and (PIECES /= "random" or draw_to(2) > 0);
         count    <= std_logic_vector(to_unsigned(size, COUNT_BITS));
-        valid    <= '1';
-        last     <= '0';
-        if is_ended then
-          last <= '1';
-        end if;
-        loop
-          wait until rising_edge(clk);
-          exit when ready = '1';
-          waits := waits + 1;
-        end loop;
-        offers := offers + 1;
-        wait until falling_edge(clk);
-        valid <= '0';
-        data  <= (others => 'X');
-        count <= (others => 'X');
-        last  <= 'X';
+        offer(is_ended);
       end loop;
       frames_sent <= frames_sent + 1;
       frame := frame.next_frame;
@@ -164,7 +178,7 @@ begin
     while not (all_sent and frames = frames_sent) loop
       uniform(random_1, random_2, draw);
       tready <= '1';
-      if 100.0 * draw < real(SINK_STALL_PERCENT) then
+      if 100.0 * draw < real(SINK_STALL_PERCENT) or (LATE_READY and tvalid = '0') then
         tready <= '0';
       end if;
       wait until rising_edge(clk);

@@ -169,6 +169,7 @@ begin
 
     procedure finish_frame(mark : in character) is
     begin
+      assert finished < frames report "more frames than were sent" severity failure;
       write(taken, mark);
       writeline(lines, taken);
       finished := finished + 1;
