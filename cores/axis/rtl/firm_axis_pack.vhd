@@ -90,16 +90,16 @@ begin
       variable moved : std_logic_vector(WIDTH-1 downto 0);
       variable digit : std_logic_vector(1 downto 0);
 
-      -- Bits of a step of stage n, which moves by 0 to 3 steps.
-      function step_of(stage : natural) return positive is
+      -- Bits of a step of stage n, which moves by 0 to 3 of them. Yosys maps it best with the widest step first.
+      function step_of(stage : positive) return positive is
       begin
-        return 8 * 4**stage;
+        return 8 * max(1, LANES / 4**stage);
       end function step_of;
 
     begin
       moved := lanes_in;
-      for stage in 0 to SHIFT_BITS/2-1 loop
-        digit := std_logic_vector(shift(2*stage+1 downto 2*stage));
+      for stage in 1 to SHIFT_BITS/2 loop
+        digit := std_logic_vector(shift(SHIFT_BITS-2*stage+1 downto SHIFT_BITS-2*stage));
         if digit = "01" then
           moved := moved(WIDTH-1-step_of(stage) downto 0) & moved(WIDTH-1 downto WIDTH-step_of(stage));
         elsif digit = "10" then
@@ -109,8 +109,8 @@ begin
         end if;
       end loop;
       if SHIFT_BITS mod 2 = 1 then
-        if shift(SHIFT_BITS-1) = '1' then
-          moved := moved(WIDTH/2-1 downto 0) & moved(WIDTH-1 downto WIDTH/2);
+        if shift(0) = '1' then
+          moved := moved(WIDTH-9 downto 0) & moved(WIDTH-1 downto WIDTH-8);
         end if;
       end if;
       return moved;

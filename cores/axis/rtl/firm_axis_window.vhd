@@ -34,7 +34,7 @@ entity firm_axis_window is
     -- Takes the first `take` bytes, at most `available`. The frame is over when `is_last` and all were taken.
     take_valid : in std_logic;
     take       : in std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
-    -- One cycle of it drops the rest of the frame, in preference to `take`; where the window shows no frame, the next one.
+    -- One cycle of it drops the rest of the frame, in preference to `take`; where the window shows none, the next one.
     skip : in std_logic);
 end entity firm_axis_window;
 
@@ -243,8 +243,8 @@ begin
 
     taken   <= unsigned(take) when take_valid = '1' else (others => '0');
     move    <= '1' when filled_r = '0' or dropping = '1' or (take_valid = '1' and taken >= left_r) else '0';
-    uses_up <= '1' when filled_r = '1' and dropping = '0' and take_valid = '1' and ends_next = '1' and taken = joined else
-               '0';
+    uses_up <= '1' when filled_r = '1' and dropping = '0' and ends_next = '1' and take_valid = '1' and taken = joined
+               else '0';
 
     move_beat : process (clk)
     begin

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A window, whose bytes a packer joins again, between the simulation host's two streams. Without stalls the bytes go over
--- a whole window a cycle, and a source that never pauses must be passed on without a gap; else in random numbers.
+-- A window, whose bytes a packer joins again, between the simulation host's two streams. Without stalls the bytes go
+-- over a whole window a cycle, and a source that never pauses must be passed on without a gap; else in random numbers.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

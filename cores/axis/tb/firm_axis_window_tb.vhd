@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Frames from a file, of which the first VOID_LANES bytes are void, through the window to a reader that takes random numbers of bytes, stalls and skips. What it took
--- goes into a file, a line a frame: the bytes in hex, then `.` if the frame was taken to its end, `~` if it was skipped.
+-- Frames from a file, of which the first VOID_LANES bytes are void, through the window to a reader that takes random
+-- numbers of bytes, stalls and skips. What it took goes into a file, a line a frame: the bytes in hex, then `.` if the
+-- frame was taken to its end, `~` if it was skipped.
 -- Inputs change at the falling edge: beyond 8 bits no output may change before the next rising one.
 library ieee;
 use ieee.std_logic_1164.all;
@@ -22,8 +23,8 @@ entity firm_axis_window_tb is
     SOURCE_STALL_PERCENT : integer := 0;
     READER_STALL_PERCENT : integer := 0;
     SKIP_PERCENT         : integer := 0;
-    -- Each cycle the reader takes `random` (0 to what is available), `all` that is available, or `full`: a frame's first
-    -- bytes by a random number, then a whole window each time until the frame's last bytes.
+    -- Each cycle the reader takes `random` (0 to what is available), `all` that is available, or `full`: a frame's
+    -- first bytes by a random number, then a whole window each time until the frame's last bytes.
     TAKE     : string  := "random";
     WATCHDOG : integer := 1000);
 end entity firm_axis_window_tb;
