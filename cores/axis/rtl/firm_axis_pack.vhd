@@ -1,0 +1,191 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Makes full beats out of frames that come as any number of bytes a cycle. The last 1 to LANES bytes of a frame wait
+-- in `rest_r` until more come or the frame ends, so the end may be told later, with no byte. A rotation of radix 4
+-- brings arriving bytes behind the waiting ones; those beyond the beat are by then in the lanes where the next beat
+-- needs them. While a tail leaves, the next frame enters: only `m_axis_tready` ever holds the input up.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_axis_pack is
+  generic (
+    WIDTH : integer := 8);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- Lanes 0 to `count`-1 are appended to the frame. What stands here stays until `ready`.
+    data  : in  std_logic_vector(WIDTH-1 downto 0);
+    count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
+    -- The frame ends with these bytes, or without one with those before. A frame without any byte is none.
+    last  : in  std_logic;
+    valid : in  std_logic;
+    ready : out std_logic;
+
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic);
+end entity firm_axis_pack;
+
+architecture rtl of firm_axis_pack is
+
+  constant LANES      : natural  := WIDTH/8;
+  constant SHIFT_BITS : natural  := clog2(LANES);
+  constant COUNT_BITS : positive := index_bits(LANES+1);
+
+  subtype count_t is unsigned(COUNT_BITS-1 downto 0);
+
+  signal rest_r  : std_logic_vector(WIDTH-1 downto 0);
+  signal advance : std_logic;  -- the output takes what there is for it
+
+begin
+
+  assert is_stream_width(WIDTH)
+    report "firm_axis_pack: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+
+  -- The waiting byte is the output; it is shown as soon as the input tells whether it is the last one.
+  byte_wide : if WIDTH = 8 generate
+
+    signal waiting_r : std_logic;  -- rest_r holds a byte
+    signal ended_r   : std_logic;  -- and it is a frame's last one
+    signal shown     : std_logic;
+
+  begin
+
+    shown   <= waiting_r and (ended_r or (valid and (count(0) or last)));
+    advance <= m_axis_tready or not shown;
+
+    hold_byte : process (clk)
+    begin
+      if rising_edge(clk) then
+        if advance = '1' and valid = '1' and count(0) = '1' then
+          rest_r <= data;
+        end if;
+        if rst_n = '0' then
+          waiting_r <= '0';
+          ended_r   <= '0';
+        elsif advance = '1' then
+          waiting_r <= (valid and count(0)) or (waiting_r and not shown);
+          ended_r   <= valid and count(0) and last;
+        end if;
+      end if;
+    end process hold_byte;
+
+    m_axis_tdata  <= rest_r;
+    m_axis_tkeep  <= "1";
+    m_axis_tvalid <= shown;
+    m_axis_tlast  <= ended_r or not count(0);
+
+  end generate byte_wide;
+
+  wider : if WIDTH > 8 generate
+
+    -- Moves all lanes up by `shift`; the highest ones come in again at lane 0.
+    function rotated(lanes_in : std_logic_vector; shift : unsigned) return std_logic_vector is
+      variable moved : std_logic_vector(WIDTH-1 downto 0);
+      variable digit : std_logic_vector(1 downto 0);
+
+      -- Bits of a step of stage n, which moves by 0 to 3 of them. Yosys maps it best with the widest step first.
+      function step_of(stage : positive) return positive is
+      begin
+        return 8 * max(1, LANES / 4**stage);
+      end function step_of;
+
+    begin
+      moved := lanes_in;
+      for stage in 1 to SHIFT_BITS/2 loop
+        digit := std_logic_vector(shift(SHIFT_BITS-2*stage+1 downto SHIFT_BITS-2*stage));
+        if digit = "01" then
+          moved := moved(WIDTH-1-step_of(stage) downto 0) & moved(WIDTH-1 downto WIDTH-step_of(stage));
+        elsif digit = "10" then
+          moved := moved(WIDTH-1-2*step_of(stage) downto 0) & moved(WIDTH-1 downto WIDTH-2*step_of(stage));
+        elsif digit = "11" then
+          moved := moved(WIDTH-1-3*step_of(stage) downto 0) & moved(WIDTH-1 downto WIDTH-3*step_of(stage));
+        end if;
+      end loop;
+      if SHIFT_BITS mod 2 = 1 then
+        if shift(0) = '1' then
+          moved := moved(WIDTH-9 downto 0) & moved(WIDTH-1 downto WIDTH-8);
+        end if;
+      end if;
+      return moved;
+    end function rotated;
+
+    signal waiting_r : count_t;                          -- the bytes in rest_r, from lane 0 up
+    signal tail_r    : std_logic;                        -- they end a frame
+    signal shift_r   : unsigned(SHIFT_BITS-1 downto 0);  -- the lane that the next byte gets
+
+    signal turned   : std_logic_vector(WIDTH-1 downto 0);  -- the input in the lanes where it belongs
+    signal waits    : std_logic_vector(LANES-1 downto 0);  -- the lanes of rest_r that hold a byte
+    signal arriving : count_t;
+    signal filled   : unsigned(COUNT_BITS downto 0);       -- the bytes of the frame that arrives
+    signal overflow : std_logic;                           -- they are more than a beat
+
+    signal valid_r : std_logic;
+
+  begin
+
+    advance  <= m_axis_tready or not valid_r;
+    turned   <= rotated(data, shift_r);
+    arriving <= unsigned(count) when valid = '1' else (others => '0');
+    filled   <= resize(arriving, COUNT_BITS+1) when tail_r = '1' else
+                resize(arriving, COUNT_BITS+1) + waiting_r;
+    overflow <= not is_below(std_logic_vector(filled), LANES+1);
+
+    find_waiting : for lane in 0 to LANES-1 generate
+      waits(lane) <= not is_below(std_logic_vector(waiting_r), lane+1);
+    end generate find_waiting;
+
+    move_bytes : process (clk)
+    begin
+      if rising_edge(clk) and advance = '1' then
+        for lane in 0 to LANES-1 loop
+          if overflow = '1' or tail_r = '1' or waits(lane) = '0' then
+            rest_r(8*lane+7 downto 8*lane) <= turned(8*lane+7 downto 8*lane);
+          end if;
+          m_axis_tdata(8*lane+7 downto 8*lane) <= turned(8*lane+7 downto 8*lane);
+          if waits(lane) = '1' then
+            m_axis_tdata(8*lane+7 downto 8*lane) <= rest_r(8*lane+7 downto 8*lane);
+          end if;
+          m_axis_tkeep(lane) <= waits(lane) or not tail_r;
+        end loop;
+        m_axis_tlast <= tail_r;
+      end if;
+    end process move_bytes;
+
+    count_bytes : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          waiting_r <= (others => '0');
+          tail_r    <= '0';
+          shift_r   <= (others => '0');
+          valid_r   <= '0';
+        elsif advance = '1' then
+          valid_r   <= tail_r or overflow;
+          waiting_r <= filled(COUNT_BITS-1 downto 0);
+          if overflow = '1' then
+            waiting_r <= resize(filled - LANES, COUNT_BITS);
+          end if;
+          shift_r <= filled(SHIFT_BITS-1 downto 0);
+          tail_r  <= '0';
+          if valid = '1' and last = '1' and filled /= 0 then
+            shift_r <= (others => '0');
+            tail_r  <= '1';
+          end if;
+        end if;
+      end if;
+    end process count_bytes;
+
+    m_axis_tvalid <= valid_r;
+
+  end generate wider;
+
+  ready <= advance;
+
+end architecture rtl;

@@ -1,0 +1,286 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Shows the next bytes of a frame from wherever the last field ended, and takes any number of them a cycle. A register
+-- slice takes the beats in; behind it, `tdata_r` holds the beat in which the window begins and the slice's output the
+-- one after it. One shifter of radix 4 joins the two: nothing else lies between the registers and `window`, and no
+-- path leads from the stream to the window or from `take` to `s_axis_tready`. A beat a cycle enters, whatever the
+-- offset, as long as all that is available is taken. At 8 bits there is nothing to shift, and the window is the stream.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_axis_window is
+  generic (
+    WIDTH : integer := 8;
+    -- So many low lanes of a frame's first beat hold nothing, though `tkeep` has them: 0 to WIDTH/8-1.
+    VOID_LANES : integer := 0);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- The next bytes of the frame from lane 0 up; lanes beyond `available` are anything.
+    window    : out std_logic_vector(WIDTH-1 downto 0);
+    available : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
+    -- With the available bytes, which may be none, the frame ends.
+    is_last : out std_logic;
+
+    -- Takes the first `take` bytes, at most `available`. The frame is over when `is_last` and all were taken.
+    take_valid : in std_logic;
+    take       : in std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
+    -- One cycle of it drops the rest of the frame, in preference to `take`; where the window shows none, the next one.
+    skip : in std_logic);
+end entity firm_axis_window;
+
+architecture rtl of firm_axis_window is
+
+  constant LANES       : natural  := WIDTH/8;
+  constant OFFSET_BITS : natural  := clog2(LANES);
+  constant COUNT_BITS  : positive := index_bits(LANES+1);
+
+  subtype count_t is unsigned(COUNT_BITS-1 downto 0);
+
+  signal skipping_r : std_logic := '0';  -- the frame in the window is being dropped
+  signal dropping   : std_logic;
+
+begin
+
+  assert is_stream_width(WIDTH)
+    report "firm_axis_window: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+  assert VOID_LANES >= 0 and VOID_LANES < max(1, LANES)
+    report "firm_axis_window: VOID_LANES is " & integer'image(VOID_LANES) & "; legal: 0 to " & integer'image(LANES-1)
+    severity failure;
+
+  dropping <= skip or skipping_r;
+
+  byte_wide : if WIDTH = 8 generate
+
+    window        <= s_axis_tdata;
+    available(0)  <= s_axis_tvalid and not skipping_r;
+    is_last       <= s_axis_tvalid and s_axis_tlast and not skipping_r;
+    s_axis_tready <= dropping or (take_valid and take(0));
+
+    remember_skip : process (clk)
+    begin
+      if rising_edge(clk) then
+        skipping_r <= rst_n and dropping and not (s_axis_tvalid and s_axis_tlast);
+      end if;
+    end process remember_skip;
+
+  end generate byte_wide;
+
+  -- The slice has an assert of its own, which must not be the first to speak.
+  wider : if WIDTH > 8 and is_stream_width(WIDTH) generate
+
+    -- Stage n of the shifter moves by 0 to 3 times this number of lanes. The widest step comes first, so that few
+    -- lanes are carried on to the next stage.
+    function step_of(stage : positive) return positive is
+    begin
+      return max(1, LANES / 4**stage);
+    end function step_of;
+
+    -- The highest bit that stage n gives to the next one.
+    function top_of(stage : positive) return natural is
+    begin
+      return 8 * (LANES + step_of(stage) - 1) - 1;
+    end function top_of;
+
+    -- LANES bytes from lane `offset` of 2*LANES-1 lanes.
+    function bytes_from(lanes_in : std_logic_vector; offset : unsigned) return std_logic_vector is
+      variable moved : std_logic_vector(2*WIDTH-9 downto 0);
+      variable digit : std_logic_vector(1 downto 0);
+    begin
+      moved := lanes_in;
+      for stage in 1 to OFFSET_BITS/2 loop
+        digit := std_logic_vector(offset(OFFSET_BITS-2*stage+1 downto OFFSET_BITS-2*stage));
+        if digit = "01" then
+          moved(top_of(stage) downto 0) := moved(top_of(stage)+8*step_of(stage) downto 8*step_of(stage));
+        elsif digit = "10" then
+          moved(top_of(stage) downto 0) := moved(top_of(stage)+16*step_of(stage) downto 16*step_of(stage));
+        elsif digit = "11" then
+          moved(top_of(stage) downto 0) := moved(top_of(stage)+24*step_of(stage) downto 24*step_of(stage));
+        end if;
+      end loop;
+      if OFFSET_BITS mod 2 = 1 then
+        if offset(0) = '1' then
+          moved(WIDTH-1 downto 0) := moved(WIDTH+7 downto 8);
+        end if;
+      end if;
+      return moved(WIDTH-1 downto 0);
+    end function bytes_from;
+
+    -- The number of ones in a contiguous `keep`, found bit by bit from the highest.
+    function bytes_kept(keep : std_logic_vector(LANES-1 downto 0)) return count_t is
+      variable part  : std_logic_vector(LANES-1 downto 0);
+      variable count : count_t;
+    begin
+      part  := keep;
+      count := (others => '0');
+      if keep(LANES-1) = '1' then
+        return to_unsigned(LANES, COUNT_BITS);
+      end if;
+      for place in OFFSET_BITS-1 downto 0 loop
+        if part(2**place-1) = '1' then
+          count(place)              := '1';
+          part(2**place-1 downto 0) := part(2**(place+1)-1 downto 2**place);
+        end if;
+      end loop;
+      return count;
+    end function bytes_kept;
+
+    -- A legal number, that the assert above can speak first.
+    constant VOID : natural := max(0, VOID_LANES);
+
+    signal starting_r   : std_logic;  -- the next beat to enter is the first of a frame
+    signal entering     : count_t;    -- the bytes of the beat that enters
+    signal entering_tid : std_logic_vector(7 downto 0);
+
+    -- The beat behind the window's first one. The slice carries the number of its bytes, and whether it is the first
+    -- of a frame, as `tid`.
+    signal next_tdata  : std_logic_vector(WIDTH-1 downto 0);
+    signal next_tid    : std_logic_vector(7 downto 0);
+    signal next_tvalid : std_logic;
+    signal next_tlast  : std_logic;
+    signal next_first  : std_logic;
+    signal next_bytes  : count_t;
+
+    -- The beat in which the window begins.
+    signal filled_r : std_logic := '0';  -- it is there
+    signal tdata_r  : std_logic_vector(WIDTH-1 downto 0);
+    signal last_r   : std_logic := '0';
+    signal offset_r : unsigned(OFFSET_BITS-1 downto 0) := (others => '0');  -- the window's first lane
+    signal left_r   : count_t := (others => '0');                           -- its bytes from there on
+
+    signal both_beats : std_logic_vector(2*WIDTH-9 downto 0);
+    signal joined     : unsigned(COUNT_BITS downto 0);  -- the frame's bytes in both beats
+    signal overflow   : std_logic;                      -- they are more than the window shows
+    signal ends_next  : std_logic;                      -- the frame ends in the next beat, and within the window
+    signal taken      : count_t;
+    signal move       : std_logic;                      -- the next beat becomes the first
+    signal uses_up    : std_logic;                      -- its bytes are taken already
+
+    signal s_axis_tready_out : std_logic;
+
+  begin
+
+    count_entering : process (s_axis_tkeep, starting_r)
+      variable kept : count_t;
+    begin
+      kept     := bytes_kept(s_axis_tkeep);
+      entering <= kept;
+      if starting_r = '1' and VOID > 0 then
+        entering <= kept - VOID;
+        if is_below(std_logic_vector(kept), VOID) = '1' then
+          entering <= (others => '0');
+        end if;
+      end if;
+    end process count_entering;
+
+    mark_first : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          starting_r <= '1';
+        elsif s_axis_tvalid = '1' and s_axis_tready_out = '1' then
+          starting_r <= s_axis_tlast;
+        end if;
+      end if;
+    end process mark_first;
+
+    entering_tid  <= starting_r & std_logic_vector(resize(entering, 7));
+    s_axis_tready <= s_axis_tready_out;
+
+    u_slice : entity firm.firm_axis_register_slice
+      generic map (
+        WIDTH => WIDTH)
+      port map (
+        clk           => clk,
+        rst_n         => rst_n,
+        s_axis_tdata  => s_axis_tdata,
+        s_axis_tkeep  => s_axis_tkeep,
+        s_axis_tid    => entering_tid,
+        s_axis_tvalid => s_axis_tvalid,
+        s_axis_tlast  => s_axis_tlast,
+        s_axis_tready => s_axis_tready_out,
+        m_axis_tdata  => next_tdata,
+        m_axis_tkeep  => open,
+        m_axis_tid    => next_tid,
+        m_axis_tvalid => next_tvalid,
+        m_axis_tlast  => next_tlast,
+        m_axis_tready => move);
+
+    next_first <= next_tid(7);
+    next_bytes <= resize(unsigned(next_tid(6 downto 0)), COUNT_BITS);
+
+    both_beats <= next_tdata(WIDTH-9 downto 0) & tdata_r;
+    window     <= bytes_from(both_beats, offset_r);
+
+    joined <= resize(left_r, COUNT_BITS+1) + next_bytes when next_tvalid = '1' and last_r = '0' else
+              resize(left_r, COUNT_BITS+1);
+
+    overflow  <= not is_below(std_logic_vector(joined), LANES+1);
+    ends_next <= next_tvalid and next_tlast and not last_r and not overflow;
+
+    show_count : process (filled_r, skipping_r, joined, overflow, last_r, ends_next)
+    begin
+      available <= std_logic_vector(joined(COUNT_BITS-1 downto 0));
+      is_last   <= last_r or ends_next;
+      if overflow = '1' then
+        available <= std_logic_vector(to_unsigned(LANES, COUNT_BITS));
+      end if;
+      if filled_r = '0' or skipping_r = '1' then
+        available <= (others => '0');
+        is_last   <= '0';
+      end if;
+    end process show_count;
+
+    taken   <= unsigned(take) when take_valid = '1' else (others => '0');
+    move    <= '1' when filled_r = '0' or dropping = '1' or (take_valid = '1' and taken >= left_r) else '0';
+    uses_up <= '1' when filled_r = '1' and dropping = '0' and ends_next = '1' and take_valid = '1' and taken = joined
+               else '0';
+
+    move_beat : process (clk)
+    begin
+      if rising_edge(clk) and move = '1' then
+        tdata_r <= next_tdata;
+      end if;
+    end process move_beat;
+
+    move_window : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          filled_r   <= '0';
+          skipping_r <= '0';
+          last_r     <= '0';
+          offset_r   <= (others => '0');
+          left_r     <= (others => '0');
+        else
+          skipping_r <= dropping and not (filled_r and last_r);
+          offset_r   <= offset_r + taken(OFFSET_BITS-1 downto 0);
+          if move = '0' then
+            left_r <= left_r - taken;
+          elsif next_tvalid = '1' and next_first = '1' then
+            offset_r <= to_unsigned(VOID, OFFSET_BITS);
+            left_r   <= next_bytes;
+          else
+            left_r <= resize(joined - taken, COUNT_BITS);
+          end if;
+          if move = '1' then
+            filled_r <= next_tvalid and not uses_up;
+            last_r   <= next_tlast and next_tvalid;
+          end if;
+        end if;
+      end if;
+    end process move_window;
+
+  end generate wider;
+
+end architecture rtl;

@@ -1,0 +1,224 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Frames from a file, cut into random pieces, through the packer to a sink with random stalls. What comes out goes into
+-- a file, a line a frame in hex; form and stability of the stream are checked here.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use ieee.math_real.all;
+use std.textio.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sim_pkg.all;
+
+entity firm_axis_pack_tb is
+  generic (
+    WIDTH         : integer := 8;
+    STIMULUS_FILE : string  := "stimulus.txt";
+    PACKED_FILE   : string  := "packed.txt";
+    SEED          : integer := 1;
+    -- The chances, each cycle, that nothing is offered, and that the sink takes nothing.
+    SOURCE_STALL_PERCENT : integer := 0;
+    SINK_STALL_PERCENT   : integer := 0;
+    -- A piece has `random` (0 to all lanes) bytes, and the end may come without a byte; or it is `full`, up to a
+    -- frame's last one; or it is full after a first one of a random number: `shifted`.
+    PIECES : string := "random";
+    -- Before each frame comes one without any byte, which must leave nothing.
+    EMPTY_FRAMES : boolean := false;
+    -- The sink is ready only where it saw `tvalid`, which must not wait for it.
+    LATE_READY : boolean := false;
+    WATCHDOG   : integer := 1000);
+end entity firm_axis_pack_tb;
+
+architecture simulation of firm_axis_pack_tb is
+
+  constant LANES      : positive := WIDTH/8;
+  constant COUNT_BITS : positive := clog2(LANES+1);
+
+  signal clk   : std_logic := '0';
+  signal rst_n : std_logic := '0';
+
+  signal data  : std_logic_vector(WIDTH-1 downto 0);
+  signal count : std_logic_vector(COUNT_BITS-1 downto 0);
+  signal last  : std_logic;
+  signal valid : std_logic := '0';
+  signal ready : std_logic;
+
+  signal tdata  : std_logic_vector(WIDTH-1 downto 0);
+  signal tkeep  : std_logic_vector(LANES-1 downto 0);
+  signal tvalid : std_logic;
+  signal tlast  : std_logic;
+  signal tready : std_logic := '0';
+
+  signal frames_sent : natural := 0;
+  signal all_sent    : boolean := false;
+  signal is_done     : boolean := false;
+
+begin
+
+  clk <= not clk after 5 ns when not is_done else '0';
+
+  u_pack : entity firm.firm_axis_pack
+    generic map (
+      WIDTH => WIDTH)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      data          => data,
+      count         => count,
+      last          => last,
+      valid         => valid,
+      ready         => ready,
+      m_axis_tdata  => tdata,
+      m_axis_tkeep  => tkeep,
+      m_axis_tvalid => tvalid,
+      m_axis_tlast  => tlast,
+      m_axis_tready => tready);
+
+  send : process
+    variable content  : frame_file_t;
+    variable frame    : frame_ptr_t;
+    variable place    : natural;
+    variable size     : natural;
+    variable is_ended : boolean;
+    variable offers   : natural := 0;
+    variable waits    : natural := 0;
+    variable random_1 : positive := SEED;
+    variable random_2 : positive := 3;
+    variable draw     : real;
+
+    impure function draw_to(highest : natural) return natural is
+    begin
+      uniform(random_1, random_2, draw);
+      return integer(floor(draw * real(highest + 1)));
+    end function draw_to;
+
+    -- What `data` and `count` hold, until it is taken.
+    procedure offer(is_end : in boolean) is
+    begin
+      valid <= '1';
+      last  <= '0';
+      if is_end then
+        last <= '1';
+      end if;
+      loop
+        wait until rising_edge(clk);
+        exit when ready = '1';
+        waits := waits + 1;
+      end loop;
+      offers := offers + 1;
+      wait until falling_edge(clk);
+      valid <= '0';
+      data  <= (others => 'X');
+      count <= (others => 'X');
+      last  <= 'X';
+    end procedure offer;
+
+  begin
+    read_stimulus_file(STIMULUS_FILE, content);
+    for cycle in 1 to 4 loop
+      wait until falling_edge(clk);
+    end loop;
+    rst_n <= '1';
+    frame := content.first;
+    while frame /= null loop
+      place    := 0;
+      is_ended := false;
+      if EMPTY_FRAMES then
+        count <= (others => '0');
+        offer(true);
+      end if;
+      while not is_ended loop
+        loop
+          uniform(random_1, random_2, draw);
+          exit when 100.0 * draw >= real(SOURCE_STALL_PERCENT);
+          wait until falling_edge(clk);
+        end loop;
+        size := LANES;
+        if PIECES = "random" then
+          size := draw_to(LANES);
+        elsif PIECES = "shifted" and place = 0 then
+          size := 1 + draw_to(LANES-1);
+        end if;
+        if size > frame.size - place then
+          size := frame.size - place;
+        end if;
+        data <= (others => 'X');
+        for lane in 0 to size-1 loop
+          data(8*lane+7 downto 8*lane) <= to_byte(frame.bytes(place+lane+1));
+        end loop;
+        place    := place + size;
+        is_ended := place = frame.size and (PIECES /= "random" or draw_to(2) > 0);
+        count    <= std_logic_vector(to_unsigned(size, COUNT_BITS));
+        offer(is_ended);
+      end loop;
+      frames_sent <= frames_sent + 1;
+      frame := frame.next_frame;
+    end loop;
+    all_sent <= true;
+    print(integer'image(offers) & " pieces, " & integer'image(waits) & " waits");
+    wait;
+  end process send;
+
+  receive : process
+    file lines          : text open write_mode is PACKED_FILE;
+    variable bytes      : line;
+    variable frames     : natural := 0;  -- finished
+    variable beats      : natural := 0;
+    variable gaps       : natural := 0;  -- cycles without a beat between the first and the last one
+    variable new_gaps   : natural := 0;
+    variable watch      : natural := 0;
+    variable is_stalled : boolean := false;
+    variable stalled    : std_logic_vector(WIDTH+LANES+1 downto 0);
+    variable is_ending  : boolean;  -- lanes from here on hold nothing
+    variable random_1   : positive := SEED;
+    variable random_2   : positive := 5;
+    variable draw       : real;
+  begin
+    wait until rst_n = '1';
+    while not (all_sent and frames = frames_sent) loop
+      uniform(random_1, random_2, draw);
+      tready <= '1';
+      if 100.0 * draw < real(SINK_STALL_PERCENT) or (LATE_READY and tvalid = '0') then
+        tready <= '0';
+      end if;
+      wait until rising_edge(clk);
+      assert is_defined(tvalid & "") report "tvalid is undefined" severity failure;
+      assert not is_stalled or stalled = tvalid & tlast & tkeep & tdata
+        report "the stream changed during a stall" severity failure;
+      is_stalled := tvalid = '1' and tready = '0';
+      stalled    := tvalid & tlast & tkeep & tdata;
+      watch      := watch + 1;
+      assert watch < WATCHDOG report "nothing comes" severity failure;
+      if tvalid = '0' and beats > 0 then
+        new_gaps := new_gaps + 1;
+      elsif tvalid = '1' and tready = '1' then
+        watch    := 0;
+        beats    := beats + 1;
+        gaps     := gaps + new_gaps;
+        new_gaps := 0;
+        assert is_defined(tkeep) and is_defined(tlast & "") report "tkeep or tlast is undefined" severity failure;
+        assert tkeep(0) = '1' report "an empty beat" severity failure;
+        is_ending := false;
+        for lane in 0 to LANES-1 loop
+          if tkeep(lane) = '1' then
+            assert not is_ending report "tkeep is not contiguous" severity failure;
+            write(bytes, to_hex(tdata(8*lane+7 downto 8*lane)));
+          else
+            assert tlast = '1' report "a beat before the last is not full" severity failure;
+            is_ending := true;
+          end if;
+        end loop;
+        if tlast = '1' then
+          writeline(lines, bytes);
+          frames := frames + 1;
+        end if;
+      end if;
+      wait until falling_edge(clk);
+    end loop;
+    print(integer'image(beats) & " beats, " & integer'image(gaps) & " gaps");
+    print("PASS");
+    is_done <= true;
+    wait;
+  end process receive;
+
+end architecture simulation;
