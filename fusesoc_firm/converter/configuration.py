@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.converter.slices import Slice, slices_of, stored_offset, windows_of
 from fusesoc_firm.diagnostics import fail
@@ -35,6 +36,7 @@ def publisher_entity(frame: Frame) -> str:
 
 def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
+    check_fixed_size(frame)
     _check_width(width)
     _check_size(frame)
     windows = windows_of(frame)
@@ -66,6 +68,7 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
 
 def publisher_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
+    check_fixed_size(frame)
     _check_width(width)
     _check_size(frame)
     return {

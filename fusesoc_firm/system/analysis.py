@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
@@ -134,11 +135,13 @@ class _Analysis:
         try:
             name = parse_name(message)
             library.get(name, message.source)
-            return frame_of(name, library.closure(name))
+            frame = frame_of(name, library.closure(name))
+            check_fixed_size(frame)
         except InputError as error:
             for fault in error.diagnostics:
                 self.faults.error(fault.message, fault.source or message.source, fault.hint)
             return None
+        return frame
 
     # --- blocks ------------------------------------------------------------------------------------------------
 
