@@ -53,16 +53,23 @@ class Oracle:
         known = {str(name) for name in self._library.names()}
         return [name for name in sorted(known) if self._is_fixed(_long_name(name))]
 
+    def messages(self) -> list[str]:
+        """Every message of the distribution, sorted."""
+        return sorted(str(name) for name in self._library.names())
+
+    def closure(self, name: str) -> dict[MessageName, MessageDefinition]:
+        """Our own definitions of it and of all below it."""
+        if name in self._texts:
+            return parsed(self._texts, self.ros)
+        return self._library.closure(parse_name(name))
+
     def definition_text(self, name: str) -> str:
         """The message and all within it in one text, parted as ROS 1's `gendeps --cat` does."""
         return str(self._store.generate_msgdef(_long_name(name), ros_version=int(self.ros))[0])
 
     def frame(self, name: str) -> Frame:
         """Our own frame of it: what is judged."""
-        if name not in self._texts:
-            message = parse_name(name)
-            return frame_of(message, self._library.closure(message))
-        return frame_of(parse_name(name), parsed(self._texts, self.ros))
+        return frame_of(parse_name(name), self.closure(name))
 
     def random_value(self, name: str, source: random.Random) -> dict[str, Any]:
         """A value with an extreme one in about every fourth place."""
@@ -112,17 +119,22 @@ class Oracle:
     def _message(self, long_name: str, value: Mapping[str, Any]) -> object:
         arguments = {}
         for name, kind in self._fields(long_name):
-            is_half = self.ros is RosVersion.ROS1 and long_name in _ROS1_TIMES and name == "nanosec"
-            arguments[normalize_fieldname(name)] = self._argument(kind, value["nsec" if is_half else name])
+            if self.ros is RosVersion.ROS1 and long_name in _ROS1_TIMES:
+                # rosbags gives both halves the names and types of ROS 2: the same bits are other numbers there.
+                is_seconds = name == "sec"
+                half = value["sec" if is_seconds else "nsec"] % 2**32
+                arguments[name] = half - 2**32 if is_seconds and half > _LARGEST_SIGNED else half
+                continue
+            arguments[normalize_fieldname(name)] = self._argument(kind, value[name])
         return self._store.types[long_name](**arguments)
 
     def _argument(self, kind: Any, value: Any) -> Any:
         match kind:
             case (Nodetype.NAME, name):
                 return self._message(name, value)
-            case (Nodetype.ARRAY, ((Nodetype.BASE, (name, _)), _)):
-                return np.array(value, dtype=self._dtype(name))
-            case (Nodetype.ARRAY, (inner, _)):
+            case (Nodetype.ARRAY | Nodetype.SEQUENCE, ((Nodetype.BASE, (name, _)), _)) if name != "string":
+                return np.array(list(value), dtype=self._dtype(name))
+            case (Nodetype.ARRAY | Nodetype.SEQUENCE, (inner, _)):
                 return [self._argument(inner, element) for element in value]
             case (Nodetype.BASE, ("byte", _)) if value > _LARGEST_INT8:
                 # rosbags packs a lone `byte` as a signed number, also in ROS 2, where it is 0 to 255.
@@ -144,6 +156,11 @@ def parsed(texts: Mapping[str, str], ros: RosVersion) -> dict[MessageName, Messa
     }
     diagnostics.raise_if_any()
     return definitions
+
+
+def plain_text(definition: MessageDefinition) -> str:
+    """The fields in the way that every parser reads: without defaults and constants, which are not sent."""
+    return "".join(f"{field.type} {field.name}\n" for field in definition.fields)
 
 
 def is_same(left: Any, right: Any) -> bool:

@@ -1,0 +1,127 @@
+"""Messages of any size: our bytes, values and lengths against serialisers that are not ours.
+
+The judges are rosbags for both versions and genpy, ROS 1's own, where it is installed. Tried are a sample of a
+distribution's messages, definitions drawn at random, and all of the folder that the environment variable CORPUS names
+(`ros1/<package>/msg/*.msg`, `ros2/...`).
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.frame.codec import decode, encode, used_bytes
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import (
+    ArrayType,
+    FieldType,
+    MessageDefinition,
+    MessageName,
+    RosVersion,
+    SequenceType,
+    StringType,
+)
+from fusesoc_firm.message.parser import parse_name
+from tests.unit.frame.genpy_oracle import GenpyOracle, has_genpy
+from tests.unit.frame.oracle import Oracle, is_same, plain_text
+from tests.unit.frame.random_messages import random_texts
+from tests.unit.frame.stimuli import EMPTY, KINDS, Stimuli
+
+ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
+CORPUS = os.environ.get("CORPUS", "")
+SAMPLE = int(os.environ.get("FRAME_SAMPLE", "40"))
+RANDOM_DEFINITIONS = int(os.environ.get("FRAME_RANDOM", "80"))
+
+Serialise = Callable[[Mapping[str, Any]], bytes]
+needs_genpy = pytest.mark.skipif(not has_genpy, reason="genpy is not installed")
+needs_corpus = pytest.mark.skipif(not CORPUS, reason="CORPUS names no folder")
+
+
+def new_seed() -> random.Random:
+    seed = random.randrange(2**32)
+    print(f"seed {seed}")
+    return random.Random(seed)
+
+
+def check(frame: Frame, serialise: Serialise, value: Mapping[str, Any], kind: str) -> None:
+    """All that we say of a value and its bytes against the bytes of a judge."""
+    payload = serialise(value)
+    used = used_bytes(frame, payload)
+    told = f"{frame.message}: {value}"
+    assert encode(frame, value) == bytes(byte if use else 0 for byte, use in zip(payload, used, strict=True)), told
+    assert is_same(decode(frame, payload), value), told
+    length = length_of(frame)
+    assert length.of(value) == len(payload), told
+    assert length.minimum <= len(payload), told
+    assert length.maximum is None or len(payload) <= length.maximum, told
+    if kind == EMPTY:
+        assert length.minimum == len(payload), told
+    # Padding decides nothing.
+    garbage = bytes(byte if use else byte ^ 0xA5 for byte, use in zip(payload, used, strict=True))
+    assert is_same(decode(frame, garbage), value), told
+
+
+def check_all(
+    name: MessageName, definitions: Mapping[MessageName, MessageDefinition], serialise: Serialise, chance: random.Random
+) -> None:
+    ros = definitions[name].ros
+    frame = frame_of(name, definitions)
+    stimuli = Stimuli(definitions, ros, chance)
+    for kind in KINDS:
+        check(frame, serialise, stimuli.message(name, kind), kind)
+
+
+@pytest.mark.parametrize("ros", RosVersion)
+def test_a_sample_of_a_distribution_against_rosbags(ros: RosVersion) -> None:
+    chance = new_seed()
+    oracle = Oracle(ros)
+    for name in chance.sample(oracle.messages(), SAMPLE):
+        serialise = rosbags(oracle, name)
+        check_all(parse_name(name), oracle.closure(name), serialise, chance)
+
+
+@needs_genpy
+def test_a_sample_of_a_distribution_against_genpy() -> None:
+    chance = new_seed()
+    oracle = Oracle(ROS1)
+    for name in chance.sample(oracle.messages(), min(SAMPLE, 150)):
+        definitions = oracle.closure(name)
+        check_all(parse_name(name), definitions, GenpyOracle(parse_name(name), definitions).serialise, chance)
+
+
+@pytest.mark.parametrize("ros", RosVersion)
+def test_random_definitions_against_rosbags(ros: RosVersion) -> None:
+    chance = new_seed()
+    for _ in range(RANDOM_DEFINITIONS):
+        texts = random_texts(ros, chance)
+        oracle = Oracle(ros, texts)
+        name = list(texts)[-1]
+        try:
+            check_all(parse_name(name), oracle.closure(name), rosbags(oracle, name), chance)
+        except AssertionError:
+            print(texts)
+            raise
+
+
+@needs_genpy
+def test_random_definitions_against_genpy() -> None:
+    chance = new_seed()
+    for _ in range(RANDOM_DEFINITIONS // 4):
+        texts = random_texts(ROS1, chance)
+        name = parse_name(list(texts)[-1])
+        definitions = Oracle(ROS1, texts).closure(list(texts)[-1])
+        check_all(name, definitions, GenpyOracle(name, definitions).serialise, chance)
+
+
+def rosbags(oracle: Oracle, name: str) -> Serialise:
+    return lambda value: oracle.serialise(name, value)
