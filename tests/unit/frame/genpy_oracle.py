@@ -6,7 +6,10 @@ installed, `has_genpy` is false.
 
 from __future__ import annotations
 
+import contextlib
+import importlib
 import io
+import keyword
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -26,13 +29,13 @@ _DEBIAN = "/usr/lib/python3/dist-packages"
 if _DEBIAN not in sys.path:
     sys.path.append(_DEBIAN)
 
-try:
-    import genpy
-    from genpy.dynamic import generate_dynamic
-except ImportError:
-    genpy = None
+genpy: Any = None
+dynamic: Any = None
+with contextlib.suppress(ImportError):
+    genpy = importlib.import_module("genpy")
+    dynamic = importlib.import_module("genpy.dynamic")
 
-has_genpy = genpy is not None
+has_genpy = dynamic is not None
 
 
 class GenpyOracle:
@@ -44,7 +47,7 @@ class GenpyOracle:
         texts += [f"{'=' * 80}\nMSG: {definition.name}\n{plain_text(definition)}" for definition in others]
         self._name = name
         self._definitions = definitions
-        self._classes = generate_dynamic(str(name), "\n".join(texts))
+        self._classes = dynamic.generate_dynamic(str(name), "\n".join(texts))
 
     def serialise(self, value: Mapping[str, Any]) -> bytes:
         """The payload."""
@@ -55,7 +58,9 @@ class GenpyOracle:
     def _message(self, name: MessageName, value: Mapping[str, Any]) -> Any:
         message = self._classes[str(name)]()
         for field in self._definitions[name].fields:
-            setattr(message, field.name, self._argument(field.type, value[field.name]))
+            # genpy's way out of Python's own words.
+            attribute = f"{field.name}_" if keyword.iskeyword(field.name) else field.name
+            setattr(message, attribute, self._argument(field.type, value[field.name]))
         return message
 
     def _argument(self, type_: FieldType, value: Any) -> Any:

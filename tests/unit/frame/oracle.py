@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.base import normalize_fieldname
 
 from fusesoc_firm.diagnostics import Diagnostics
@@ -38,13 +38,16 @@ _LARGEST_INT8 = 127
 
 
 class Oracle:
-    """The messages of one ROS version's newest distribution, and any others by their text."""
+    """The messages of one distribution, the newest unless another is named, and any others by their text."""
 
-    def __init__(self, ros: RosVersion, texts: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, ros: RosVersion, texts: Mapping[str, str] | None = None, distribution: str | None = None
+    ) -> None:
         self.ros = ros
-        self._store = get_typestore(_STORES[ros])
+        store = Stores(f"ros{int(ros)}_{distribution}") if distribution else _STORES[ros]
+        self._store = get_typestore(store)
         self._texts = dict(texts or {})
-        self._library = MessageLibrary(ros, store=_STORES[ros].value.partition("_")[2])
+        self._library = MessageLibrary(ros, store=store.value.partition("_")[2])
         for name, text in self._texts.items():
             self._store.register(get_types_from_msg(text, _long_name(name)))
 
@@ -145,6 +148,26 @@ class Oracle:
         if name == "byte":
             return np.dtype("i1" if self.ros is RosVersion.ROS1 else "u1")
         return np.dtype({"char": "u1", "bool": "?"}.get(name, name))
+
+
+class DefinitionsOracle(Oracle):
+    """The messages of `definitions`, whatever distributions call by the same names.
+
+    `refused` are those that rosbags cannot read, each with its reason.
+    """
+
+    def __init__(self, ros: RosVersion, definitions: Mapping[MessageName, MessageDefinition]) -> None:
+        super().__init__(ros)
+        self._store = get_typestore(Stores.EMPTY)
+        self.refused: dict[MessageName, str] = {}
+        if ros is RosVersion.ROS1:
+            for long_name in _ROS1_TIMES:
+                self._store.register(get_types_from_msg("int32 sec\nuint32 nanosec\n", long_name))
+        for name, definition in definitions.items():
+            try:
+                self._store.register(get_types_from_msg(plain_text(definition), _long_name(str(name))))
+            except TypesysError as error:
+                self.refused[name] = str(error).splitlines()[-1]
 
 
 def parsed(texts: Mapping[str, str], ros: RosVersion) -> dict[MessageName, MessageDefinition]:

@@ -1,7 +1,7 @@
 """Messages of any size: our bytes, values and lengths against serialisers that are not ours.
 
-The judges are rosbags for both versions and genpy, ROS 1's own, where it is installed. Tried are a sample of a
-distribution's messages, definitions drawn at random, and all of the folder that the environment variable CORPUS names
+The judges are rosbags for both versions and genpy, ROS 1's own, where it is installed. Tried are all messages of all
+distributions, definitions drawn at random, and all of the folder that the environment variable CORPUS names
 (`ros1/<package>/msg/*.msg`, `ros2/...`).
 """
 
@@ -32,15 +32,15 @@ from fusesoc_firm.message.model import (
     StringType,
 )
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.message.stores import distributions
 from tests.unit.frame.genpy_oracle import GenpyOracle, has_genpy
-from tests.unit.frame.oracle import Oracle, is_same, plain_text
+from tests.unit.frame.oracle import DefinitionsOracle, Oracle, is_same
 from tests.unit.frame.random_messages import random_texts
 from tests.unit.frame.stimuli import EMPTY, KINDS, Stimuli
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
+ROS1 = RosVersion.ROS1
 CORPUS = os.environ.get("CORPUS", "")
-SAMPLE = int(os.environ.get("FRAME_SAMPLE", "40"))
-RANDOM_DEFINITIONS = int(os.environ.get("FRAME_RANDOM", "80"))
+RANDOM_DEFINITIONS = 80
 
 Serialise = Callable[[Mapping[str, Any]], bytes]
 needs_genpy = pytest.mark.skipif(not has_genpy, reason="genpy is not installed")
@@ -81,20 +81,20 @@ def check_all(
         check(frame, serialise, stimuli.message(name, kind), kind)
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_a_sample_of_a_distribution_against_rosbags(ros: RosVersion) -> None:
+@pytest.mark.parametrize(("ros", "distribution"), [(ros, name) for ros in RosVersion for name in distributions(ros)])
+def test_every_message_of_a_distribution_against_rosbags(ros: RosVersion, distribution: str) -> None:
     chance = new_seed()
-    oracle = Oracle(ros)
-    for name in chance.sample(oracle.messages(), SAMPLE):
-        serialise = rosbags(oracle, name)
-        check_all(parse_name(name), oracle.closure(name), serialise, chance)
+    oracle = Oracle(ros, distribution=distribution)
+    assert len(oracle.messages()) > 130
+    for name in oracle.messages():
+        check_all(parse_name(name), oracle.closure(name), rosbags(oracle, name), chance)
 
 
 @needs_genpy
-def test_a_sample_of_a_distribution_against_genpy() -> None:
+def test_every_message_of_a_distribution_against_genpy() -> None:
     chance = new_seed()
     oracle = Oracle(ROS1)
-    for name in chance.sample(oracle.messages(), min(SAMPLE, 150)):
+    for name in oracle.messages():
         definitions = oracle.closure(name)
         check_all(parse_name(name), definitions, GenpyOracle(parse_name(name), definitions).serialise, chance)
 
@@ -121,6 +121,74 @@ def test_random_definitions_against_genpy() -> None:
         name = parse_name(list(texts)[-1])
         definitions = Oracle(ROS1, texts).closure(list(texts)[-1])
         check_all(name, definitions, GenpyOracle(name, definitions).serialise, chance)
+
+
+# --- the corpus --------------------------------------------------------------------------------------------------
+
+
+def corpus(ros: RosVersion) -> Iterator[tuple[MessageName, dict[MessageName, MessageDefinition]]]:
+    """Every message whose parts are all known, with these."""
+    library = MessageLibrary(ros, [Path(CORPUS, f"ros{int(ros)}")])
+    unknown = Counter[str]()
+    for path in sorted(Path(CORPUS, f"ros{int(ros)}").glob("*/msg/*.msg")):
+        name = MessageName(path.parts[-3], path.stem)
+        try:
+            yield name, library.closure(name)
+        except InputError as error:
+            unknown[error.diagnostics[0].message] += 1
+    print(f"ROS {int(ros)}: left out, since the folder does not hold all they need: {dict(unknown)}")
+
+
+@needs_corpus
+@pytest.mark.parametrize("ros", RosVersion)
+def test_the_corpus_against_rosbags(ros: RosVersion) -> None:
+    chance = new_seed()
+    messages = dict(corpus(ros))
+    everything = {name: definition for closure in messages.values() for name, definition in closure.items()}
+    oracle = DefinitionsOracle(ros, everything)
+    wide = {name for name, closure in messages.items() if any(map(has_wstring, closure.values()))}
+    left_out = {name for name, closure in messages.items() if not oracle.refused.keys().isdisjoint(closure)} | wide
+    different = []
+    for name in messages.keys() - left_out:
+        try:
+            check_all(name, messages[name], rosbags(oracle, str(name)), chance)
+        except AssertionError as error:
+            different.append(f"{name}: {str(error)[:300]}")
+    print(f"ROS {int(ros)}: {len(messages) - len(left_out)} messages, {len(KINDS)} stimuli each")
+    print(f"left out: {len(wide)} with wstring, refused by rosbags: {oracle.refused}")
+    assert different == []
+    assert len(messages) > 1000 > 10 * len(left_out)
+
+
+@needs_corpus
+@needs_genpy
+def test_the_corpus_against_genpy() -> None:
+    chance = new_seed()
+    different, refused, compared = [], Counter[str](), 0
+    for name, definitions in corpus(ROS1):
+        try:
+            oracle = GenpyOracle(name, definitions)
+        except Exception as error:  # noqa: BLE001 - it refuses by exceptions of many types
+            refused[f"{type(error).__name__}: {error}"] += 1
+            continue
+        try:
+            check_all(name, definitions, oracle.serialise, chance)
+            compared += 1
+        except AssertionError as error:
+            different.append(f"{name}: {str(error)[:300]}")
+    print(f"ROS 1: {compared} messages, {len(KINDS)} stimuli each; refused by genpy: {dict(refused)}")
+    assert different == []
+    assert compared > 1000
+
+
+def has_wstring(definition: MessageDefinition) -> bool:
+    """rosbags knows no wstring."""
+
+    def is_wide(type_: FieldType) -> bool:
+        element = type_.element if isinstance(type_, ArrayType | SequenceType) else type_
+        return isinstance(element, StringType) and element.is_wide
+
+    return any(is_wide(field.type) for field in definition.fields)
 
 
 def rosbags(oracle: Oracle, name: str) -> Serialise:
