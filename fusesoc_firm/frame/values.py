@@ -114,8 +114,12 @@ def _member(value: Any, name: str) -> Any:
 
 def _default(part: FrameField | Data | Loop) -> Any:
     if part.default is None:
-        raise CodecError(f"no value for '{dotted(part.names)}'")
+        raise _no_value(part)
     return part.default
+
+
+def _no_value(part: FrameField | Data | Loop) -> CodecError:
+    return CodecError(f"no value for '{dotted(part.names)}'")
 
 
 def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
@@ -124,9 +128,11 @@ def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
         return
     step, rest = path[0], path[1:]
     inner = _member(value, step.name)
-    if inner is _MISSING and (not rest or step.count is not None):
-        # An array of messages has no default, be its elements made of defaults or not.
-        inner = _default(leaf) if not rest else _missing(leaf)
+    if inner is _MISSING and not rest:
+        inner = _default(leaf)
+    elif inner is _MISSING and step.count is not None:
+        # An array of messages has no default, even if its elements consist of defaults.
+        raise _no_value(leaf)
     if step.count is None:
         yield from _elements(inner, rest, leaf)
         return
@@ -138,10 +144,6 @@ def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
         return
     for element in inner:
         yield from _elements(element, rest, leaf)
-
-
-def _missing(leaf: FrameField) -> Any:
-    raise CodecError(f"no value for '{dotted(leaf.names)}'")
 
 
 def _unknown(value: Any, known: NameTree, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
