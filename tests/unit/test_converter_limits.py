@@ -25,8 +25,8 @@ def frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Frame:
     monkeypatch.chdir(tmp_path)
     folder = Path("my_msgs")
     folder.mkdir()
-    for name, text in TEXTS.items():
-        (folder / f"{name}.msg").write_text(text)
+    for stem, text in TEXTS.items():
+        (folder / f"{stem}.msg").write_text(text)
     name = MessageName("my_msgs", "Main")
     return frame_of(name, MessageLibrary(RosVersion.ROS2, [folder]).closure(name))
 
