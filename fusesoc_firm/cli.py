@@ -178,20 +178,17 @@ def _title(interface: Interface, definitions: dict[MessageName, MessageDefinitio
 def _stage(stage: str, name: MessageName, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
     """The text of a message in one of `STAGES`."""
     from fusesoc_firm.frame import tree
+    from fusesoc_firm.frame.description import description
     from fusesoc_firm.frame.layout import frame_of
     from fusesoc_firm.message.printer import to_text
     from fusesoc_firm.message.signature import signature
 
     if stage == "message":
         return to_text(definitions[name], signature(name, definitions))
-    if stage == "tree":
-        try:
-            frame = frame_of(name, definitions)
-        except InputError:
-            return tree.text(tree.rows(name, definitions, None))
-        return tree.text(tree.rows(name, definitions, frame))
     frame = frame_of(name, definitions)
-    return _yaml(frame.description()) if stage == "frame" else _converters(stage, frame, width)
+    if stage == "tree":
+        return tree.text(tree.rows(name, definitions, frame))
+    return _yaml(description(frame)) if stage == "frame" else _converters(stage, frame, width)
 
 
 def _converters(stage: str, frame: Any, width: int) -> str:

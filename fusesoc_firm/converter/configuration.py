@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
 from fusesoc_firm.converter.slices import Slice, slices_of, windows_of
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, ranges, stores_of
@@ -36,6 +37,7 @@ def publisher_entity(frame: Frame) -> str:
 
 def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
+    check_fixed_size(frame)
     _check_width(width)
     _check_size(frame)
     stream = Stream(width)
@@ -68,6 +70,7 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
 
 def publisher_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
+    check_fixed_size(frame)
     _check_width(width)
     _check_size(frame)
     stream = Stream(width)

@@ -1,7 +1,8 @@
 """ROS 2's serialisation: XCDR version 1 as DDS-XTYPES 1.3, section 7.4, defines it, little-endian.
 
 The header's first two bytes name the encoding and are checked; the other two are options that a receiver
-ignores. Writers round a payload up to a multiple of four, so up to three bytes may trail.
+ignores. Writers round a payload up to a multiple of four, so up to three bytes may trail. Nothing is padded
+between the count of an empty sequence and what follows.
 """
 
 from types import MappingProxyType
@@ -17,5 +18,6 @@ CDR_RULES = WireRules(
     prefix=b"\x00\x01\x00\x00",
     checked_prefix=2,
     empty_bytes=1,
+    string_terminator=1,
     trailing_bytes=3,
 )

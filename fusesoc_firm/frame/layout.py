@@ -2,107 +2,229 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.frame.cdr import CDR_RULES
-from fusesoc_firm.frame.model import Frame, FrameField, Run, Step, WireType
+from fusesoc_firm.frame.model import (
+    COUNT_BYTES,
+    Data,
+    DataKind,
+    Fixed,
+    Frame,
+    FrameField,
+    Loop,
+    Node,
+    Pad,
+    Path,
+    Run,
+    Step,
+    WireType,
+)
+from fusesoc_firm.frame.position import Position
 from fusesoc_firm.frame.ros1 import ROS1_RULES
-from fusesoc_firm.frame.rules import WireRules
+from fusesoc_firm.frame.rules import CHARACTER, WIDE_CHARACTER, WireRules
 from fusesoc_firm.message.model import (
     ArrayType,
+    DefaultValue,
+    ElementType,
     Field,
+    FieldType,
     MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,
     RosVersion,
+    SequenceType,
+    StringType,
 )
 
 RULES: Mapping[RosVersion, WireRules] = {RosVersion.ROS1: ROS1_RULES, RosVersion.ROS2: CDR_RULES}
+Definitions = Mapping[MessageName, MessageDefinition]
 
 
-def frame_of(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> Frame:
-    """The frame of message `name`; `definitions` holds it and every message below it.
-
-    Raises `InputError` that names every field of variable size: a frame of fixed size cannot hold one.
-    """
+def frame_of(name: MessageName, definitions: Definitions) -> Frame:
+    """The frame of message `name`; `definitions` holds it and every message below it."""
     definition = definitions[name]
     rules = RULES[definition.ros]
-    walk = _Walk(rules, definitions)
+    walk = _Walk(_Types(rules, definitions), Position(rules.max_alignment, frozenset({0})), size=len(rules.prefix))
     walk.message(definition, ())
-    walk.diagnostics.raise_if_any()
     return Frame(
         message=name,
         ros=definition.ros,
         prefix=rules.prefix,
         checked_prefix=rules.checked_prefix,
-        fields=tuple(FrameField(path, type_, tuple(runs)) for path, (type_, runs) in walk.leaves.items()),
-        payload_bytes=len(rules.prefix) + walk.cursor,
+        nodes=walk.finish(),
         trailing_bytes=rules.trailing_bytes,
     )
 
 
 @dataclass
-class _Walk:
-    """The cursor of one walk and what it found; `cursor` counts from behind the prefix, as alignment does."""
+class _Types:
+    """What the walk asks about types."""
 
     rules: WireRules
-    definitions: Mapping[MessageName, MessageDefinition]
-    cursor: int = 0
-    leaves: dict[tuple[Step, ...], tuple[WireType, list[Run]]] = field(default_factory=dict)
-    diagnostics: Diagnostics = field(default_factory=Diagnostics)
+    definitions: Definitions
+    _fixed: dict[MessageName, bool] = field(default_factory=dict)
 
-    def message(self, definition: MessageDefinition, path: tuple[Step, ...]) -> None:
+    def has_fixed_size(self, type_: FieldType) -> bool:
+        match type_:
+            case ArrayType(element, length):
+                # No strings take no bytes.
+                return length == 0 or self.has_fixed_size(element)
+            case MessageType(name):
+                if name not in self._fixed:
+                    fields = self.definitions[name].fields
+                    self._fixed[name] = all(self.has_fixed_size(member.type) for member in fields)
+                return self._fixed[name]
+        return isinstance(type_, PrimitiveType)
+
+
+@dataclass
+class _Leaf:
+    """A `FrameField` in the making."""
+
+    type: WireType
+    first: int
+    default: DefaultValue | None
+    runs: list[Run] = field(default_factory=list)
+
+    def add(self, run: Run) -> None:
+        """Join the run to the last one where they touch."""
+        last = self.runs[-1] if self.runs else None
+        if last and last.offset + last.count * self.type.size == run.offset:
+            self.runs[-1] = Run(last.offset, last.count + run.count)
+        else:
+            self.runs.append(run)
+
+
+@dataclass
+class _Walk:
+    """One walk through a message or the element of a loop: what is known of the position, and the nodes so far.
+
+    `size` and `leaves` are those of the `Fixed` that is not closed yet, `passed` counts the elements of a leaf.
+    """
+
+    types: _Types
+    position: Position
+    size: int = 0
+    nodes: list[Node] = field(default_factory=list)
+    leaves: dict[Path, _Leaf] = field(default_factory=dict)
+    passed: Counter[Path] = field(default_factory=Counter)
+
+    def message(self, definition: MessageDefinition, path: Path) -> None:
         if not definition.fields:
-            self.cursor += self.rules.empty_bytes
+            self.skip(self.types.rules.empty_bytes)
         for member in definition.fields:
             self.member(member, path)
 
-    def member(self, member: Field, path: tuple[Step, ...]) -> None:
-        is_array = isinstance(member.type, ArrayType)
-        element = member.type.element if isinstance(member.type, ArrayType) else member.type
-        count = member.type.length if isinstance(member.type, ArrayType) else None
-        here = (*path, Step(member.name, count))
-        if isinstance(element, MessageType):
-            for _ in range(count if is_array and count is not None else 1):
-                self.message(self.definitions[element.name], here)
-        elif isinstance(element, PrimitiveType):
-            self.primitive(element.name, here, count)
+    def finish(self) -> tuple[Node, ...]:
+        """The nodes, in the order of the wire."""
+        if self.size or self.leaves:
+            fields = (
+                FrameField(path, leaf.type, tuple(leaf.runs), leaf.first, leaf.default)
+                for path, leaf in self.leaves.items()
+            )
+            self.nodes.append(Fixed(self.size, tuple(fields)))
+            self.size, self.leaves = 0, {}
+        return tuple(self.nodes)
+
+    # --- one field, by its type --------------------------------------------------------------------------------
+
+    def member(self, member: Field, path: Path) -> None:
+        match member.type:
+            case SequenceType(PrimitiveType(name), bound) if name in self.types.rules.scalars:
+                here = (*path, Step(member.name))
+                self.data(DataKind.ARRAY, self.types.rules.scalars[name], here, bound, member)
+            case SequenceType(element, bound):
+                self.loop(element, path, None, bound, member)
+            case ArrayType(element, length) if not self.types.has_fixed_size(member.type):
+                self.loop(element, path, length, None, member)
+            case ArrayType(element, length):
+                self.element(element, (*path, Step(member.name, length)), length, member)
+            case element:
+                self.element(element, (*path, Step(member.name)), 1, member)
+
+    def element(self, element: ElementType, path: Path, count: int, member: Field) -> None:
+        """`count` elements side by side; a string only comes alone."""
+        match element:
+            case PrimitiveType(name) if name in self.types.rules.scalars:
+                self.values(self.types.rules.scalars[name], path, count, member.default)
+            case PrimitiveType(name):
+                for _ in range(count):
+                    for part, type_ in self.types.rules.compounds[name]:
+                        self.values(type_, (*path, Step(part)), 1, None)
+            case MessageType(name):
+                for _ in range(count):
+                    self.message(self.types.definitions[name], path)
+            case StringType(is_wide, bound) if count:
+                kind = DataKind.WSTRING if is_wide else DataKind.STRING
+                self.data(kind, WIDE_CHARACTER if is_wide else CHARACTER, path, bound, member)
+
+    # --- nodes -------------------------------------------------------------------------------------------------
+
+    def skip(self, size: int) -> None:
+        self.size += size
+        self.position = self.position.advanced(size)
+
+    def align(self, size: int) -> None:
+        """Go where a value of `size` bytes may start."""
+        alignment = self.types.rules.alignment(size)
+        padding = self.position.padding(alignment)
+        if padding is None:
+            self.append(Pad(alignment))
+            self.position = self.position.aligned(alignment)
         else:
-            self.variable(member, path)
+            self.skip(padding)
 
-    def primitive(self, name: str, path: tuple[Step, ...], count: int | None) -> None:
-        parts = self.rules.compounds.get(name)
-        if parts is None:
-            self.values(self.rules.scalars[name], path, 1 if count is None else count)
-            return
-        for _ in range(1 if count is None else count):
-            for part, type_ in parts:
-                self.values(type_, (*path, Step(part)), 1)
+    def append(self, node: Node) -> None:
+        self.finish()
+        self.nodes.append(node)
 
-    def values(self, type_: WireType, path: tuple[Step, ...], count: int) -> None:
-        """Note `count` values side by side at the cursor."""
-        runs = self.leaves.setdefault(path, (type_, []))[1]
-        if count == 0:
-            return
-        self.cursor = self.rules.align(self.cursor, type_.size)
-        offset = len(self.rules.prefix) + self.cursor
-        if runs and runs[-1].offset + runs[-1].count * type_.size == offset:
-            runs[-1] = Run(runs[-1].offset, runs[-1].count + count)
-        else:
-            runs.append(Run(offset, count))
-        self.cursor += count * type_.size
+    def values(self, type_: WireType, path: Path, count: int, default: DefaultValue | None) -> None:
+        """`count` values of a leaf side by side."""
+        if count:
+            self.align(type_.size)
+        leaf = self.leaves.setdefault(path, _Leaf(type_, self.passed[path], default))
+        if count:
+            leaf.add(Run(self.size, count))
+        self.passed[path] += count
+        self.skip(count * type_.size)
 
-    def variable(self, member: Field, path: tuple[Step, ...]) -> None:
-        name = ".".join([step.name for step in path] + [member.name])
-        self.diagnostics.error(
-            f"field '{name}' of type '{member.type}' has no fixed size",
-            _known(member.source),
-            "converters take messages of fixed size: numbers, time, duration, fixed arrays and messages of these",
+    def data(self, kind: DataKind, element: WireType, path: Path, bound: int | None, member: Field) -> None:
+        rules = self.types.rules
+        terminator = rules.string_terminator if kind is DataKind.STRING else 0
+        # The default of an array of strings is its loop's.
+        default = None if _is_array_of_texts(member.type) else member.default
+        self.align(COUNT_BYTES)
+        behind_count = self.position.advanced(COUNT_BYTES)
+        alignment = rules.alignment(element.size)
+        padding = behind_count.padding(alignment)
+        ros_type = str(member.type)
+        self.append(
+            Data(path, kind, element, ros_type, bound, terminator, alignment, padding, default, source=member.source)
         )
+        some = behind_count.aligned(alignment).repeated(element.size, bound)
+        self.position = behind_count.joined(some).advanced(terminator)
+
+    def loop(self, element: ElementType, path: Path, count: int | None, bound: int | None, member: Field) -> None:
+        here = (*path, Step(member.name))
+        if count is None:
+            self.align(COUNT_BYTES)
+        start = self.position.advanced(COUNT_BYTES if count is None else 0)
+        # An element starts where the count ends or where the one before it does: the smallest set that holds both.
+        known = start
+        while True:
+            walk = _Walk(self.types, known)
+            walk.element(element, here, 1, member)
+            body = walk.finish()
+            if known.joined(walk.position) == known:
+                break
+            known = known.joined(walk.position)
+        self.append(Loop(here, str(member.type), count, bound, body, member.default, source=member.source))
+        self.position = known if count is None else walk.position
 
 
-def _known(source: SourceRef) -> SourceRef | None:
-    return source if source.line else None
+def _is_array_of_texts(type_: FieldType) -> bool:
+    return isinstance(type_, ArrayType | SequenceType) and isinstance(type_.element, StringType)

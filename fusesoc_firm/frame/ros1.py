@@ -20,5 +20,6 @@ ROS1_RULES = WireRules(
     prefix=b"",
     checked_prefix=0,
     empty_bytes=0,
+    string_terminator=0,
     trailing_bytes=0,
 )

@@ -29,6 +29,10 @@ INTEGER_AND_FLOAT = MappingProxyType(
     }
 )
 
+# Texts are UTF-8 and UTF-16; a unit of the latter takes four bytes in ROS 2, as `wchar_t` does on Linux.
+CHARACTER = WireType("character", 1, "B")
+WIDE_CHARACTER = WireType("wide character", 4, "I")
+
 
 @dataclass(frozen=True)
 class WireRules:
@@ -36,7 +40,8 @@ class WireRules:
 
     `scalars` gives the wire type of every primitive of one value; `compounds` the named parts of a primitive
     that is sent as several values (ROS 1's `time`). `max_alignment` is 1 where nothing is aligned; offsets for
-    alignment count from behind `prefix`. `empty_bytes` is what a message without fields is sent as.
+    alignment count from behind `prefix`. `empty_bytes` is what a message without fields is sent as,
+    `string_terminator` how many zeros close a string and are part of its count (a wstring has none).
     """
 
     scalars: MappingProxyType[str, WireType]
@@ -45,9 +50,9 @@ class WireRules:
     prefix: bytes
     checked_prefix: int
     empty_bytes: int
+    string_terminator: int
     trailing_bytes: int
 
-    def align(self, offset: int, size: int) -> int:
-        """The first offset at or behind `offset` where a value of `size` bytes may start."""
-        alignment = min(size, self.max_alignment)
-        return offset + -offset % alignment
+    def alignment(self, size: int) -> int:
+        """What the offset of a value of `size` bytes is a multiple of."""
+        return min(size, self.max_alignment)

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from fusesoc_firm.frame.model import Frame, FrameField
+from fusesoc_firm.frame.model import Fixed, Frame, Pad, all_nodes
 from fusesoc_firm.message.model import ArrayType, MessageDefinition, MessageName, MessageType, SequenceType
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the tree; `bits` and `offset` (bytes from the payload's start) are None where they are not fixed."""
+    """A line of the tree; `bits` and `offset` (bytes from the payload's start) are None where they are not fixed.
+
+    Below an array that is no fixed part of the payload, `bits` are those of one element.
+    """
 
     depth: int
     name: str
@@ -20,17 +23,12 @@ class Row:
     offset: int | None = None
 
 
-def rows(name: MessageName, definitions: Mapping[MessageName, MessageDefinition], frame: Frame | None) -> Iterator[Row]:
-    """The rows of a message, outer ones first; `frame` is None for a message of variable size."""
-    leaves = list(frame.fields) if frame else []
-    yield Row(
-        0,
-        str(name),
-        f"ROS {int(definitions[name].ros)}",
-        8 * frame.payload_bytes if frame else None,
-        0 if frame else None,
-    )
-    yield from _fields(definitions[name], definitions, (), leaves)
+def rows(name: MessageName, definitions: Mapping[MessageName, MessageDefinition], frame: Frame) -> Iterator[Row]:
+    """The rows of a message, outer ones first."""
+    is_fixed = frame.is_fixed_size
+    title = f"ROS {int(frame.ros)}"
+    yield Row(0, str(name), title, 8 * frame.payload_bytes if is_fixed else None, 0 if is_fixed else None)
+    yield from _fields(definitions[name], definitions, (), _leaves(frame))
 
 
 def text(found: Iterator[Row]) -> str:
@@ -46,18 +44,44 @@ def text(found: Iterator[Row]) -> str:
     )
 
 
+@dataclass(frozen=True)
+class _Leaf:
+    """What is known of a leaf; `bits` is None for a variable part."""
+
+    names: tuple[str, ...]
+    bits: int | None
+    offset: int | None
+
+
+def _leaves(frame: Frame) -> list[_Leaf]:
+    """Only what lies in front of all that varies has an offset."""
+    leaves = []
+    first = frame.nodes[0] if frame.nodes else None
+    for node in all_nodes(frame.nodes):
+        if isinstance(node, Fixed):
+            for leaf in node.fields:
+                offset = min((run.offset for run in leaf.runs), default=None) if node is first else None
+                leaves.append(_Leaf(leaf.names, 8 * leaf.held * leaf.type.size, offset))
+        elif not isinstance(node, Pad):
+            leaves.append(_Leaf(node.names, None, None))
+    return leaves
+
+
 def _fields(
     definition: MessageDefinition,
     definitions: Mapping[MessageName, MessageDefinition],
     path: tuple[str, ...],
-    leaves: list[FrameField],
+    leaves: list[_Leaf],
 ) -> Iterator[Row]:
     for field in definition.fields:
         here = (*path, field.name)
         below = [leaf for leaf in leaves if leaf.names[: len(here)] == here]
-        offsets = [run.offset for leaf in below for run in leaf.runs]
-        bits = sum(8 * run.count * leaf.type.size for leaf in below for run in leaf.runs)
-        yield Row(len(here), field.name, str(field.type), bits if offsets else None, min(offsets, default=None))
+        bits = [leaf.bits for leaf in below]
+        known = [bit for bit in bits if bit is not None]
+        offset = min((leaf.offset for leaf in below if leaf.offset is not None), default=None)
+        yield Row(
+            len(here), field.name, str(field.type), sum(known) if any(known) and None not in bits else None, offset
+        )
         element = field.type.element if isinstance(field.type, ArrayType | SequenceType) else field.type
         if isinstance(element, MessageType):
             yield from _fields(definitions[element.name], definitions, here, below)

@@ -30,7 +30,7 @@ def expected_text(responses: Iterable[Response]) -> str:
     for response in responses:
         publisher = response.publisher
         lines.append(f"< @{response.cause} {_label(publisher, response.message)}")
-        used = b"\1" * (ID_BYTES + LENGTH_BYTES) + used_bytes(publisher.frame)
+        used = b"\1" * (ID_BYTES + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
         lines += _hex_lines(pack_frame(publisher.id, response.payload), used)
     return "\n".join(lines) + "\n"
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
@@ -153,18 +154,19 @@ class _Analysis:
         try:
             name = parse_name(message)
             library.get(name, message.source)
-            definitions = library.closure(name)
+            frame = frame_of(name, library.closure(name))
         except InputError as error:
             for fault in error.diagnostics:
                 self.faults.error(fault.message, fault.source or message.source, fault.hint)
             return None
         try:
-            return frame_of(name, definitions)
+            check_fixed_size(frame)
         except InputError as error:
             reasons = "; ".join(fault.message for fault in error.diagnostics)
             hint = error.diagnostics[0].hint
             self.faults.error(f"{name} cannot be converted: {reasons}", message.source, hint)
             return None
+        return frame
 
     # --- blocks ------------------------------------------------------------------------------------------------
 

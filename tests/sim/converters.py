@@ -178,8 +178,10 @@ class Pair:
 
     def _answer(self, sent: Sent) -> bytes:
         """The publisher's frame: without the bytes behind the last field, zeros where the layout leaves a gap."""
-        used = used_bytes(self.frame)
-        payload = bytes(byte if is_used else 0 for byte, is_used in zip(sent.body[LENGTH_BYTES:], used, strict=False))
+        sent_payload = sent.body[LENGTH_BYTES:]
+        used = used_bytes(self.frame, sent_payload)
+        payload = bytes(byte if is_used else 0 for byte, is_used in zip(sent_payload, used, strict=True))
+        payload = payload[: self._size]
         payload = self._with_bools_of_one(payload)
         assert len(payload) == self._size
         return bytes([PUBLISHER]) + self._size.to_bytes(LENGTH_BYTES, "little") + self._with_whole_prefix(payload)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.base import normalize_fieldname
 
 from fusesoc_firm.diagnostics import Diagnostics
@@ -38,13 +38,16 @@ _LARGEST_INT8 = 127
 
 
 class Oracle:
-    """The messages of one ROS version's newest distribution, and any others by their text."""
+    """The messages of one distribution, the newest unless another is named, and any others by their text."""
 
-    def __init__(self, ros: RosVersion, texts: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, ros: RosVersion, texts: Mapping[str, str] | None = None, distribution: str | None = None
+    ) -> None:
         self.ros = ros
-        self._store = get_typestore(_STORES[ros])
+        store = Stores(f"ros{int(ros)}_{distribution}") if distribution else _STORES[ros]
+        self._store = get_typestore(store)
         self._texts = dict(texts or {})
-        self._library = MessageLibrary(ros, store=_STORES[ros].value.partition("_")[2])
+        self._library = MessageLibrary(ros, store=store.value.partition("_")[2])
         for name, text in self._texts.items():
             self._store.register(get_types_from_msg(text, _long_name(name)))
 
@@ -53,16 +56,23 @@ class Oracle:
         known = {str(name) for name in self._library.names()}
         return [name for name in sorted(known) if self._is_fixed(_long_name(name))]
 
+    def messages(self) -> list[str]:
+        """Every message of the distribution, sorted."""
+        return sorted(str(name) for name in self._library.names())
+
+    def closure(self, name: str) -> dict[MessageName, MessageDefinition]:
+        """Our own definitions of it and of all below it."""
+        if name in self._texts:
+            return parsed(self._texts, self.ros)
+        return self._library.closure(parse_name(name))
+
     def definition_text(self, name: str) -> str:
         """The message and all within it in one text, parted as ROS 1's `gendeps --cat` does."""
         return str(self._store.generate_msgdef(_long_name(name), ros_version=int(self.ros))[0])
 
     def frame(self, name: str) -> Frame:
         """Our own frame of it: what is judged."""
-        if name not in self._texts:
-            message = parse_name(name)
-            return frame_of(message, self._library.closure(message))
-        return frame_of(parse_name(name), parsed(self._texts, self.ros))
+        return frame_of(parse_name(name), self.closure(name))
 
     def random_value(self, name: str, source: random.Random) -> dict[str, Any]:
         """A value with an extreme one in about every fourth place."""
@@ -112,17 +122,22 @@ class Oracle:
     def _message(self, long_name: str, value: Mapping[str, Any]) -> object:
         arguments = {}
         for name, kind in self._fields(long_name):
-            is_half = self.ros is RosVersion.ROS1 and long_name in _ROS1_TIMES and name == "nanosec"
-            arguments[normalize_fieldname(name)] = self._argument(kind, value["nsec" if is_half else name])
+            if self.ros is RosVersion.ROS1 and long_name in _ROS1_TIMES:
+                # rosbags gives both halves the names and types of ROS 2: the same bits are other numbers there.
+                is_seconds = name == "sec"
+                half = value["sec" if is_seconds else "nsec"] % 2**32
+                arguments[name] = half - 2**32 if is_seconds and half > _LARGEST_SIGNED else half
+                continue
+            arguments[normalize_fieldname(name)] = self._argument(kind, value[name])
         return self._store.types[long_name](**arguments)
 
     def _argument(self, kind: Any, value: Any) -> Any:
         match kind:
             case (Nodetype.NAME, name):
                 return self._message(name, value)
-            case (Nodetype.ARRAY, ((Nodetype.BASE, (name, _)), _)):
-                return np.array(value, dtype=self._dtype(name))
-            case (Nodetype.ARRAY, (inner, _)):
+            case (Nodetype.ARRAY | Nodetype.SEQUENCE, ((Nodetype.BASE, (name, _)), _)) if name != "string":
+                return np.array(list(value), dtype=self._dtype(name))
+            case (Nodetype.ARRAY | Nodetype.SEQUENCE, (inner, _)):
                 return [self._argument(inner, element) for element in value]
             case (Nodetype.BASE, ("byte", _)) if value > _LARGEST_INT8:
                 # rosbags packs a lone `byte` as a signed number, also in ROS 2, where it is 0 to 255.
@@ -135,6 +150,26 @@ class Oracle:
         return np.dtype({"char": "u1", "bool": "?"}.get(name, name))
 
 
+class DefinitionsOracle(Oracle):
+    """The messages of `definitions`, whatever distributions call by the same names.
+
+    `refused` are those that rosbags cannot read, each with its reason.
+    """
+
+    def __init__(self, ros: RosVersion, definitions: Mapping[MessageName, MessageDefinition]) -> None:
+        super().__init__(ros)
+        self._store = get_typestore(Stores.EMPTY)
+        self.refused: dict[MessageName, str] = {}
+        if ros is RosVersion.ROS1:
+            for long_name in _ROS1_TIMES:
+                self._store.register(get_types_from_msg("int32 sec\nuint32 nanosec\n", long_name))
+        for name, definition in definitions.items():
+            try:
+                self._store.register(get_types_from_msg(plain_text(definition), _long_name(str(name))))
+            except TypesysError as error:
+                self.refused[name] = str(error).splitlines()[-1]
+
+
 def parsed(texts: Mapping[str, str], ros: RosVersion) -> dict[MessageName, MessageDefinition]:
     """The definitions in `texts`, by name; raises `InputError` for a fault in one."""
     diagnostics = Diagnostics()
@@ -144,6 +179,11 @@ def parsed(texts: Mapping[str, str], ros: RosVersion) -> dict[MessageName, Messa
     }
     diagnostics.raise_if_any()
     return definitions
+
+
+def plain_text(definition: MessageDefinition) -> str:
+    """The fields in the way that every parser reads: without defaults and constants, which are not sent."""
+    return "".join(f"{field.type} {field.name}\n" for field in definition.fields)
 
 
 def is_same(left: Any, right: Any) -> bool:

@@ -25,7 +25,7 @@ def test_bytes_by_hand(frame: Frame) -> None:
     payload = encode(frame, GOOD)
     assert payload.hex(" ") == "00 01 00 00 01 00 fe ff 00 00 03 00 00 00 00 3f 00 00 00 40 07"
     assert decode(frame, payload) == GOOD
-    assert used_bytes(frame).hex(" ") == "01 01 01 01 01 00 01 01 01 00 01 01 01 01 01 01 01 01 01 01 01"
+    assert used_bytes(frame, payload).hex(" ") == "01 01 01 01 01 00 01 01 01 00 01 01 01 01 01 01 01 01 01 01 01"
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import struct
 import pytest
 
 from fusesoc_firm.frame.layout import RULES
+from fusesoc_firm.frame.position import Position
 from fusesoc_firm.message.dialect import dialect_of
 from fusesoc_firm.message.model import RosVersion
 
@@ -29,5 +30,6 @@ def test_sizes_are_those_of_the_codes(ros: RosVersion) -> None:
     ("offset", "size", "aligned"), [(0, 8, 0), (1, 8, 8), (8, 8, 8), (9, 4, 12), (3, 2, 4), (5, 1, 5)]
 )
 def test_alignment(offset: int, size: int, aligned: int) -> None:
-    assert RULES[RosVersion.ROS2].align(offset, size) == aligned
-    assert RULES[RosVersion.ROS1].align(offset, size) == offset
+    position = Position(RULES[RosVersion.ROS2].max_alignment, frozenset({offset % 8}))
+    assert position.padding(min(size, RULES[RosVersion.ROS2].max_alignment)) == aligned - offset
+    assert RULES[RosVersion.ROS1].max_alignment == 1

@@ -1,0 +1,29 @@
+"""What no converter is made for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.frame.model import Data, Frame, Loop, Node
+
+
+def check_fixed_size(frame: Frame) -> None:
+    """Raise `InputError` that names every field of variable size."""
+    faults = Diagnostics()
+    for part in _variable_parts(frame.nodes):
+        faults.error(
+            f"field '{'.'.join(part.names)}' of type '{part.ros_type}' has no fixed size",
+            part.source if part.source and part.source.line else None,
+            "converters take messages of fixed size: numbers, time, duration, fixed arrays and messages of these",
+        )
+    faults.raise_if_any()
+
+
+def _variable_parts(nodes: Sequence[Node]) -> Iterator[Data | Loop]:
+    """The parts whose own length varies; a fixed array is one only by what it holds."""
+    for node in nodes:
+        if isinstance(node, Loop) and node.count is not None:
+            yield from _variable_parts(node.body)
+        elif isinstance(node, Data | Loop):
+            yield node

@@ -1,0 +1,132 @@
+"""Payload bytes -> a message as nested dictionaries and lists, and which of the bytes hold it."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Path
+from fusesoc_firm.frame.values import CodecError, check_bound, dotted, put, put_leaf, text_of
+
+
+def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
+    """The message of a payload; numbers are Python numbers, arrays lists, but `bytes` for a variable one of `uint8`.
+
+    Raises:
+        CodecError: the payload is too short or too long, of another encoding, or holds what no message can.
+    """
+    return _read(frame, payload)[0]
+
+
+def used_bytes(frame: Frame, payload: bytes) -> bytes:
+    """One byte for each byte of the payload: 1 where a value, a count or the prefix lies, 0 where only padding does.
+
+    Raises `CodecError` as `decode` does.
+    """
+    used = bytearray(len(payload))
+    for first, end in _read(frame, payload)[1]:
+        used[first:end] = b"\1" * (end - first)
+    return bytes(used)
+
+
+def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int]]]:
+    """The message, and the parts of the payload (first, end) that hold it."""
+    if frame.is_fixed_size and not 0 <= len(payload) - frame.payload_bytes <= frame.trailing_bytes:
+        raise CodecError(f"{frame.message} takes {frame.payload_bytes} bytes, not {len(payload)}")
+    checked = payload[: frame.checked_prefix]
+    if checked != frame.prefix[: frame.checked_prefix]:
+        raise CodecError(f"unknown encoding {checked.hex()} of {frame.message}")
+    reader = _Reader(frame, payload)
+    message = reader.read(frame.nodes, 0)
+    if len(payload) - reader.position > frame.trailing_bytes:
+        raise CodecError(f"{frame.message} ends after {reader.position} bytes, but the payload has {len(payload)}")
+    return message, reader.used
+
+
+class _Reader:
+    """The next byte's `position` in the payload; `used` are the parts (first, end) that hold something."""
+
+    def __init__(self, frame: Frame, payload: bytes) -> None:
+        self.position = 0
+        self.used = [(0, len(frame.prefix))]
+        self._frame = frame
+        self._payload = payload
+
+    def read(self, nodes: Sequence[Node], depth: int) -> Any:
+        """The message, or the element of a loop, that `nodes` hold; `depth` names lead to it."""
+        message: dict[str, Any] = {}
+        leaves: dict[Path, list[Any]] = {}
+        for node in nodes:
+            match node:
+                case Fixed():
+                    self._fixed(node, leaves)
+                case Pad(alignment):
+                    self._align(alignment)
+                case Data() | Loop():
+                    # What came before is put first, so that a message has its fields in wire order.
+                    _put_leaves(message, leaves, depth)
+                    value = self._data(node) if isinstance(node, Data) else self._loop(node)
+                    if len(node.path) == depth:
+                        return value  # the element is a string
+                    put(message, node.path[depth:], value)
+        _put_leaves(message, leaves, depth)
+        return message
+
+    def _fixed(self, node: Fixed, leaves: dict[Path, list[Any]]) -> None:
+        start = self.position
+        for leaf in node.fields:
+            elements = leaves.setdefault(leaf.path, [])
+            for run in leaf.runs:
+                self.position = start + run.offset
+                elements += self._numbers(leaf, run.count)
+        self.position = start + node.size
+        if self.position > len(self._payload):
+            self._fail("")
+
+    def _numbers(self, leaf: FrameField, count: int) -> Sequence[Any]:
+        return struct.unpack(f"<{count}{leaf.type.code}", self._take(count * leaf.type.size, leaf.names))
+
+    def _align(self, alignment: int) -> None:
+        self.position += (len(self._frame.prefix) - self.position) % alignment
+
+    def _data(self, node: Data) -> Any:
+        count = self._count(node) - node.terminator
+        if count < 0:
+            raise CodecError(f"'{dotted(node.names)}' has no terminator")
+        check_bound(node, count)
+        if count and node.padding is None:
+            self._align(node.alignment)
+        elif count and node.padding:
+            self.position += node.padding
+        units = self._take(count * node.element.size, node.names)
+        if any(self._take(node.terminator, node.names)):
+            raise CodecError(f"'{dotted(node.names)}' does not end with a zero")
+        if node.kind is not DataKind.ARRAY:
+            return text_of(node, units)
+        return units if node.element.code == "B" else list(struct.unpack(f"<{count}{node.element.code}", units))
+
+    def _loop(self, node: Loop) -> list[Any]:
+        count = self._count(node) if node.count is None else node.count
+        check_bound(node, count)
+        return [self.read(node.body, len(node.path)) for _ in range(count)]
+
+    def _count(self, node: Data | Loop) -> int:
+        return int.from_bytes(self._take(COUNT_BYTES, node.names), "little")
+
+    def _take(self, size: int, names: tuple[str, ...]) -> bytes:
+        first, self.position = self.position, self.position + size
+        if self.position > len(self._payload):
+            self._fail(f" within '{dotted(names)}'")
+        self.used.append((first, self.position))
+        return self._payload[first : self.position]
+
+    def _fail(self, where: str) -> None:
+        raise CodecError(f"the payload of {self._frame.message} ends{where} after {len(self._payload)} bytes")
+
+
+def _put_leaves(message: dict[str, Any], leaves: dict[Path, list[Any]], depth: int) -> None:
+    """Put the leaves' elements into the message, and forget them."""
+    for path, elements in leaves.items():
+        put_leaf(message, path[depth:], iter(elements))
+    leaves.clear()

@@ -1,0 +1,172 @@
+"""Message values: nested dictionaries and lists, how the paths of a Frame lead through them, and texts as units.
+
+A text is a `str`. Bytes that are no UTF-8, and UTF-16 units that are no pair, are kept as lone surrogates.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from reprlib import Repr
+from typing import Any
+
+from fusesoc_firm.frame.model import Data, DataKind, Frame, FrameField, Loop, NameTree, Path
+
+MessageValue = Mapping[str, Any]
+BytesLike = bytes | bytearray | memoryview
+_MISSING = object()
+
+_repr = Repr()
+_repr.maxstring = _repr.maxother = _repr.maxlong = 60
+
+
+class CodecError(ValueError):
+    """A value that does not fit its message, or bytes that do not fit their frame."""
+
+
+def shown(value: object) -> str:
+    """The value for an error's text: a long one is cut."""
+    return _repr.repr(value)
+
+
+def dotted(names: tuple[str, ...]) -> str:
+    """The names as people write a path."""
+    return ".".join(names)
+
+
+def part_of(value: Any, part: Data | Loop, depth: int) -> Any:
+    """What `value` has for `part`, or its default; the first `depth` names of the path lead to `value` itself."""
+    for step in part.path[depth:]:
+        value = _member(value, step.name)
+        if value is _MISSING:
+            return _default(part)
+    return value
+
+
+def leaf_of(value: Any, leaf: FrameField, depth: int) -> list[Any]:
+    """Every element that `value` has for `leaf`, in wire order."""
+    return list(_elements(value, leaf.path[depth:], leaf))
+
+
+def put(message: dict[str, Any], path: Path, value: Any) -> None:
+    """Put a value where `path`, without arrays on it, leads to."""
+    for step in path[:-1]:
+        message = message.setdefault(step.name, {})
+    message[path[-1].name] = value
+
+
+def put_leaf(message: dict[str, Any], path: Path, elements: Iterator[Any]) -> None:
+    """Put all elements of a leaf, in wire order, where `path` leads to."""
+    step, rest = path[0], path[1:]
+    if not rest:
+        message[step.name] = next(elements) if step.count is None else [next(elements) for _ in range(step.count)]
+    elif step.count is None:
+        put_leaf(message.setdefault(step.name, {}), rest, elements)
+    else:
+        for element in message.setdefault(step.name, [{} for _ in range(step.count)]):
+            put_leaf(element, rest, elements)
+
+
+def reject_unknown(frame: Frame, message: MessageValue) -> None:
+    """Raise `CodecError` for a name that the message has not, unless nothing lies below it."""
+    for names in _unknown(message, frame.names, ()):
+        raise CodecError(f"{frame.message} has no field '{dotted(names)}'")
+
+
+def units_of(data: Data, text: object) -> BytesLike:
+    """The text as sent, without count and terminator. Raises `CodecError` if it is no text."""
+    if not isinstance(text, str):
+        raise CodecError(f"'{dotted(data.names)}' takes a {data.kind.value}, not {shown(text)}")
+    try:
+        if data.kind is DataKind.STRING:
+            return text.encode("utf-8", "surrogateescape")
+        units = text.encode("utf-16-le", "surrogatepass")
+    except UnicodeEncodeError as error:
+        raise CodecError(f"'{dotted(data.names)}' takes no lone surrogate: {shown(text)}") from error
+    count = len(units) // 2
+    return struct.pack(f"<{count}I", *struct.unpack(f"<{count}H", units))
+
+
+def text_of(data: Data, units: bytes) -> str:
+    """The text that was sent as `units`."""
+    if data.kind is DataKind.STRING:
+        return units.decode("utf-8", "surrogateescape")
+    count = len(units) // data.element.size
+    numbers = struct.unpack(f"<{count}{data.element.code}", units)
+    try:
+        return struct.pack(f"<{count}H", *numbers).decode("utf-16-le", "surrogatepass")
+    except struct.error:
+        raise CodecError(f"'{dotted(data.names)}' holds a unit that is not UTF-16: {max(numbers):#x}") from None
+
+
+def check_bound(part: Data | Loop, count: int) -> None:
+    """Raise `CodecError` if `count` is more than the definition allows."""
+    if part.bound is not None and count > part.bound:
+        raise CodecError(f"'{dotted(part.names)}' holds at most {part.bound}, not {count}")
+
+
+def _member(value: Any, name: str) -> Any:
+    """A message that is missing is one without any member: it may consist of defaults."""
+    if value is _MISSING or not isinstance(value, Mapping):
+        return _MISSING
+    return value.get(name, _MISSING)
+
+
+def _default(part: FrameField | Data | Loop) -> Any:
+    if part.default is None:
+        raise _no_value(part)
+    return part.default
+
+
+def _no_value(part: FrameField | Data | Loop) -> CodecError:
+    return CodecError(f"no value for '{dotted(part.names)}'")
+
+
+def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
+    if not path:
+        yield value
+        return
+    step, rest = path[0], path[1:]
+    inner = _member(value, step.name)
+    if inner is _MISSING and not rest:
+        inner = _default(leaf)
+    elif inner is _MISSING and step.count is not None:
+        # An array of messages has no default, even if its elements consist of defaults.
+        raise _no_value(leaf)
+    if step.count is None:
+        yield from _elements(inner, rest, leaf)
+        return
+    is_array = isinstance(inner, list | tuple) or (not rest and leaf.type.code == "B" and isinstance(inner, BytesLike))
+    if not is_array or len(inner) != step.count:
+        raise CodecError(f"'{step.name}' takes a list of {step.count}, not {shown(inner)}")
+    if not rest:
+        yield from inner
+        return
+    for element in inner:
+        yield from _elements(element, rest, leaf)
+
+
+def _unknown(value: Any, known: NameTree, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """The names of what lies outside `known`; a leaf's own value is not looked into."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            here = (*names, str(name))
+            if name not in known:
+                yield from _leaves(inner, here)
+            elif known[name]:
+                yield from _unknown(inner, known[name], here)
+    elif isinstance(value, list | tuple):
+        for inner in value:
+            yield from _unknown(inner, known, names)
+
+
+def _leaves(value: Any, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """The names of all that holds a value: an empty message and an array of no elements do not."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _leaves(inner, (*names, str(name)))
+    elif isinstance(value, list | tuple) and (not value or isinstance(value[0], Mapping)):
+        for inner in value:
+            yield from _leaves(inner, names)
+    else:
+        yield names
