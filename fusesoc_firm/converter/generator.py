@@ -20,6 +20,7 @@ from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.render import render
 
 VHDL = "vhdlSource-93"
@@ -42,7 +43,8 @@ def inputs(request: Request) -> list[Path]:
 def generate(request: Request) -> GeneratedCore:
     """The converters in the direction that the request names. Raises `InputError`."""
     library, name = _message(request)
-    frame = frame_of(name, library.closure(name))
+    definitions = library.closure(name)
+    frame = frame_of(name, definitions)
     direction, width = request.parameters["direction"], request.parameters["width"]
     assert isinstance(width, int)
     directions = ("subscriber", "publisher") if direction == "both" else (direction,)
@@ -51,7 +53,7 @@ def generate(request: Request) -> GeneratedCore:
         files |= subscriber_files([frame], width)
     if "publisher" in directions:
         files |= publisher_files([frame], width)
-    return GeneratedCore(f"Converters of {name} (ROS {int(library.ros)})", files)
+    return GeneratedCore(f"Converters of {name} (ROS {int(library.ros)}, {signature(name, definitions)})", files)
 
 
 def subscriber_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
