@@ -1,11 +1,7 @@
-"""Every bad `.msg` file beside its exact message: `<name>.msg` and `<name>.expected`, a folder for each version.
-
-`UPDATE_EXPECTED=1` writes the messages anew; read them before you commit them.
-"""
+"""Every bad `.msg` file beside its exact message: `<name>.msg` and `<name>.expected`, a folder for each version."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -13,6 +9,7 @@ import pytest
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
+from tests.expected import check_expected
 
 HERE = Path(__file__).parent / "msg"
 FILES = sorted(HERE.glob("ros[12]/*.msg"))
@@ -25,10 +22,7 @@ def test_message_error(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     library = MessageLibrary(RosVersion(int(folder[-1])), [Path(folder)])
     with pytest.raises(InputError) as caught:
         library.closure(MessageName(folder, path.stem))
-    expected = path.with_suffix(".expected")
-    if os.environ.get("UPDATE_EXPECTED"):
-        expected.write_text(f"{caught.value}\n", encoding="utf-8")
-    assert f"{caught.value}\n" == expected.read_text(encoding="utf-8")
+    check_expected(path.with_suffix(".expected"), f"{caught.value}\n")
 
 
 def test_every_expected_message_has_its_file() -> None:

@@ -1,11 +1,7 @@
-"""Bad specifications and what a user is told: NAME.yaml and, word for word, NAME.expected.
-
-After a change of wording, `REFRESH=1 pytest tests/errors/test_spec_errors.py` writes the expected files anew.
-"""
+"""Bad specifications and what a user is told: NAME.yaml and, word for word, NAME.expected."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -15,6 +11,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.analysis import derive
 from fusesoc_firm.system.specification import read_specification
+from tests.expected import check_expected
 
 FOLDER = Path(__file__).parent / "spec"
 SPECIFICATIONS = sorted(FOLDER.glob("*.yaml"))
@@ -30,10 +27,7 @@ def test_a_bad_specification_is_explained(path: Path, libraries: dict[RosVersion
     faults = Diagnostics()
     with pytest.raises(InputError) as raised:
         derive(read_specification(path, path.name, faults), path.parent, libraries, faults)
-    expected = path.with_suffix(".expected")
-    if os.environ.get("REFRESH"):
-        expected.write_text(f"{raised.value}\n", encoding="utf-8")
-    assert f"{raised.value}\n" == expected.read_text(encoding="utf-8")
+    check_expected(path.with_suffix(".expected"), f"{raised.value}\n")
 
 
 def test_every_expected_file_has_its_specification() -> None:

@@ -9,7 +9,6 @@ import sys
 import sysconfig
 import venv
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -19,8 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 # One worker does them all, so that each kind is installed once.
 pytestmark = pytest.mark.xdist_group("installation")
 
-needs_cores = pytest.mark.skipif(not (ROOT / "cores" / "manager").is_dir(), reason="needs the reusable cores")
-needs_converter = pytest.mark.skipif(not find_spec("fusesoc_firm.converter"), reason="needs the converter")
 
 PROJECT_CORE = """\
 CAPI=2:
@@ -61,7 +58,7 @@ class Installation:
         return self._run(self.environment / "bin" / "fusesoc", *arguments, cwd=cwd, check=False)
 
     def library(self) -> Path:
-        return Path(self.python("-c", "from fusesoc_firm.library_path import library_root; print(library_root())"))
+        return Path(self._run(self.environment / "bin" / "firm", "path", cwd=self.environment).stdout.strip())
 
     def _run(self, *command: str | Path, cwd: Path, check: bool = True) -> subprocess.CompletedProcess[str]:
         home = self.environment.parent / "home"
@@ -172,7 +169,6 @@ def test_the_checkout_itself_is_a_project(installation: Installation) -> None:
     assert "Replacing" not in done.stderr
 
 
-@needs_cores
 def test_a_fault_in_another_projects_core_is_shown_there(installation: Installation, project: Path) -> None:
     core = project / "robot" / "robot.core"
     core.write_text(PROJECT_CORE.format(ros="ros: 3"))
@@ -182,8 +178,6 @@ def test_a_fault_in_another_projects_core_is_shown_there(installation: Installat
     assert "Traceback" not in done.stderr
 
 
-@needs_cores
-@needs_converter
 def test_another_projects_core_calls_a_generator(installation: Installation, project: Path) -> None:
     (project / "robot" / "robot.core").write_text(PROJECT_CORE.format(ros="ros: 1"))
     done = installation.fusesoc("run", "--setup", "me:proj:robot", cwd=project)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from itertools import groupby
+from pathlib import Path
 
 import pytest
 
 from fusesoc_firm.converter.generator import publisher_files, subscriber_files
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import RosVersion
-from tests.golden_files import check_golden
+from tests.expected import check_expected
 from tests.unit.frame.oracle import Oracle
 from tests.unit.frame.samples import AWKWARD
 
@@ -22,6 +23,7 @@ MESSAGES = [
     for name in [*oracle.fixed_size_messages(), *AWKWARD[ros]]
 ]
 LONGEST_LINE = 120
+GOLDEN = Path(__file__).parents[2] / "golden"
 
 
 def texts(frame: Frame, width: int = 8) -> dict[str, str]:
@@ -42,12 +44,12 @@ def texts(frame: Frame, width: int = 8) -> dict[str, str]:
     ],
 )
 def test_golden_files(ros: RosVersion, name: str, file: str) -> None:
-    check_golden(f"ros{int(ros)}_{file}", texts(ORACLES[ros].frame(name))[file])
+    check_expected(GOLDEN / f"ros{int(ros)}_{file}", texts(ORACLES[ros].frame(name))[file])
 
 
 @pytest.mark.parametrize("file", ["axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"])
 def test_golden_files_of_a_wide_stream(file: str) -> None:
-    check_golden(f"ros2_64_{file}", texts(ORACLES[ROS2].frame("geometry_msgs/Quaternion"), 64)[file])
+    check_expected(GOLDEN / f"ros2_64_{file}", texts(ORACLES[ROS2].frame("geometry_msgs/Quaternion"), 64)[file])
 
 
 @pytest.mark.parametrize("width", [8, 64])
