@@ -1,6 +1,6 @@
 """Files that hold what a test expects: generated text, or what a user is told, word for word.
 
-After a wanted change, `UPDATE_EXPECTED=1 python -m pytest ...` writes them anew; read the difference before committing it.
+After a wanted change, `UPDATE_EXPECTED=1 python -m pytest ...` writes them anew; read the difference before a commit.
 """
 
 from __future__ import annotations
