@@ -64,7 +64,7 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
         "length_beats": _length_beats(frame, stream),
         "has_encoding": frame.checked_prefix > 0,
         "prefix_checks": [_byte_check(stream, *item) for item in _prefix_bytes(frame, stream)],
-        "ends": [_end(stream, number, byte, len(ends)) for number, byte in enumerate(ends)],
+        "ends": [_end(stream, number, byte) for number, byte in enumerate(ends)],
     }
 
 
@@ -182,12 +182,11 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
     }
 
 
-def _end(stream: Stream, number: int, last_byte: int, count: int) -> Configuration:
+def _end(stream: Stream, number: int, last_byte: int) -> Configuration:
     """Where a frame ends of which bit `number` of `match` tells the length."""
     lane = stream.lane(last_byte)
     return {
         "number": number,
-        "condition": "if" if number == 0 else "elsif",
         "position": stream.beat(last_byte),
         "lane": lane,
         "is_kept": stream.lanes > 1,
