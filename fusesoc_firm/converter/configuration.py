@@ -59,7 +59,6 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
         "store_signals": _store_signals(stores),
         "assignments": _subscriber_assignments(frame, stream, stores),
         "has_trailing": frame.trailing_bytes > 0,
-        "trailing_bytes": frame.trailing_bytes,
         "match_high": frame.trailing_bytes,
         "length_beats": _length_beats(frame, stream),
         "has_encoding": frame.checked_prefix > 0,
@@ -210,7 +209,6 @@ def _store(store: Store, suffix: str) -> Configuration:
     return {
         "store": f"store{suffix}",
         "register": register,
-        "high": store.bits - 1,
         "data": [
             {"piece": piece, "joint": joint} for piece, joint in zip(data, _joints(len(data), " &", ";"), strict=True)
         ],

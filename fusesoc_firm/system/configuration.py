@@ -88,7 +88,7 @@ def system_configuration(system: DerivedSystem) -> Configuration:
 
 def test_bench_configuration(system: DerivedSystem, seed: int, stall_percent: int) -> Configuration:
     """The configuration of the test bench: the simulated host beside the system."""
-    return {**_dimensions(system), "name": system.name, "seed": seed, "stall_percent": stall_percent}
+    return {**_dimensions(system), "seed": seed, "stall_percent": stall_percent}
 
 
 def _dimensions(system: DerivedSystem) -> Configuration:
