@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fusesoc_firm.frame.model import Frame, FrameField
+from fusesoc_firm.frame.model import Frame, FrameField, Path
 from fusesoc_firm.naming import distinct_identifiers
 
 # What the templates declare or use by name: a field of that name gets another port name.
@@ -37,7 +37,7 @@ class FieldPort:
     @property
     def comment(self) -> str:
         """The ROS name and type, so that a port can be traced back: `pose.position.x: float64`."""
-        return f"{_ros_path(self.field)}: {self.field.type.name}"
+        return f"{ros_path(self.field.path)}: {self.field.type.name}"
 
 
 def vhdl_type(width: int | None) -> str:
@@ -49,13 +49,15 @@ def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
     """A port for every leaf that has a value, in wire order."""
     fields = [field for field in frame.fields if field.count]
     names = distinct_identifiers((field.names for field in fields), reserved=_TAKEN)
-    return tuple(FieldPort(name, _width(field), field) for name, field in zip(names, fields, strict=True))
+    return tuple(FieldPort(name, port_width(field), field) for name, field in zip(names, fields, strict=True))
 
 
-def _width(field: FrameField) -> int | None:
+def port_width(field: FrameField) -> int | None:
+    """Bits of a leaf's port; None for a lone bool."""
     is_bit = field.type.bits == 1 and not field.is_array
     return None if is_bit else field.count * field.type.bits
 
 
-def _ros_path(field: FrameField) -> str:
-    return ".".join(step.name if step.count is None else f"{step.name}[{step.count}]" for step in field.path)
+def ros_path(path: Path) -> str:
+    """A path as a definition's reader knows it, with the sizes of fixed arrays: `pose.covariance[36]`."""
+    return ".".join(step.name if step.count is None else f"{step.name}[{step.count}]" for step in path)

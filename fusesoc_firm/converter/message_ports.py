@@ -1,0 +1,245 @@
+"""The message side of a converter: every port of a message, of fixed or of variable size.
+
+A subscriber and the publisher of a message have the same ports in opposite directions. Fields are as in `ports`; a
+message of variable size adds, besides its `payload_length`, by the name `f` of the part:
+
+    string, array of numbers    f_length, f_axis_tdata/tkeep/tvalid/tlast/tready
+    array of messages           f_length, the ports of an element, f_valid/last/ready
+                                and f_segment_valid where an element has segments of its own
+
+In an array of strings `f` is the array, and `f_element` one of its strings.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from fusesoc_firm.converter.ports import FieldPort, field_ports, port_width, ros_path, vhdl_type
+from fusesoc_firm.converter.program import Program, Scope, subscriber_program
+from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
+from fusesoc_firm.naming import identifier
+
+LENGTH_BITS = 32
+
+# What the templates of variable size declare or use by name, beside numbered signals such as `store_3_r`.
+_TAKEN = frozenset(
+    """
+    clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
+    m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
+    segment_valid msg_valid msg_ready frame_error frame_error_code payload_length id
+    rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural positive integer boolean
+    to_unsigned to_integer resize shift_left shift_right rising_edge failure true false
+    firm_axis_select firm_axis_window firm_axis_pack firm_axis_trim firm_axis_pkg
+    """.split()
+)
+_NUMBERED = re.compile(r".*_r|(store|word|left|fault|step|count|beat|want|take|next|code)_?\d*", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class MessagePort:
+    """A port of the message side; `is_reverse` marks what goes against the message: a `ready`."""
+
+    name: str
+    width: int | None
+    comment: str = ""
+    is_reverse: bool = False
+
+    @property
+    def vhdl_type(self) -> str:
+        """The port's type in VHDL."""
+        return vhdl_type(self.width)
+
+
+@dataclass(frozen=True)
+class StreamPorts:
+    """The ports of a string or an array of numbers."""
+
+    part: Data
+    name: str
+
+    @property
+    def length(self) -> str:
+        """Elements; bytes of a string and units of a wstring, without what closes it."""
+        return f"{self.name}_length"
+
+    def axis(self, signal: str) -> str:
+        """The stream's `tdata`, `tkeep`, `tvalid`, `tlast` or `tready`."""
+        return f"{self.name}_axis_{signal}"
+
+
+@dataclass(frozen=True)
+class ElementPorts:
+    """The ports of an array of messages or strings: `segments` is None where an element comes in one piece."""
+
+    loop: Loop
+    name: str
+    segments: int | None
+
+    @property
+    def length(self) -> str:
+        """Elements; an array of fixed size has no such port."""
+        return f"{self.name}_length"
+
+    @property
+    def valid(self) -> str:
+        """An element is there, the streams in it are over."""
+        return f"{self.name}_valid"
+
+    @property
+    def last(self) -> str:
+        """It is the last one."""
+        return f"{self.name}_last"
+
+    @property
+    def ready(self) -> str:
+        """It is taken."""
+        return f"{self.name}_ready"
+
+    @property
+    def segment_valid(self) -> str:
+        """Which segments of the element are there."""
+        return f"{self.name}_segment_valid"
+
+
+@dataclass(frozen=True)
+class MessageSide:
+    """The ports of the used fields and parts of a message of variable size, in wire order, and where each is found.
+
+    `segments` is the width of `segment_valid`.
+    """
+
+    segments: int
+    parts: tuple[FieldPort | StreamPorts | ElementPorts, ...]
+    by_path: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(compare=False, repr=False)
+
+    def field(self, leaf: FrameField) -> FieldPort:
+        """The port of a leaf, of any of its pieces."""
+        found = self.by_path["field", leaf.path]
+        assert isinstance(found, FieldPort)
+        return found
+
+    def stream(self, part: Data) -> StreamPorts:
+        """The ports of a string or an array of numbers."""
+        found = self.by_path["data", part.path]
+        assert isinstance(found, StreamPorts)
+        return found
+
+    def element(self, loop: Loop) -> ElementPorts:
+        """The ports of an array of messages or strings."""
+        found = self.by_path["loop", loop.path]
+        assert isinstance(found, ElementPorts)
+        return found
+
+    def length(self, part: Data | Loop) -> str:
+        """The port with a part's number of elements."""
+        return self.stream(part).length if isinstance(part, Data) else self.element(part).length
+
+
+def message_side(frame: Frame) -> MessageSide:
+    """The ports of a message of variable size."""
+    program = subscriber_program(frame)
+    naming = _Naming(program)
+    naming.nodes(frame.nodes, ())
+    return MessageSide(program.segments(), tuple(naming.parts.values()), naming.parts)
+
+
+def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
+    """Every port of the message side but the handshake, in the order of declaration; streams are of `width` bits."""
+    if frame.is_fixed_size:
+        return tuple(MessagePort(port.name, port.width, port.comment) for port in field_ports(frame))
+    found = [MessagePort("payload_length", LENGTH_BITS, "bytes of the payload")]
+    side = message_side(frame)
+    found += _ports(side, frame.nodes, width, set())
+    return tuple(found)
+
+
+def segment_count(frame: Frame) -> int:
+    """The width of `segment_valid`."""
+    return 1 if frame.is_fixed_size else subscriber_program(frame).segments()
+
+
+@dataclass
+class _Naming:
+    """Gives out names so that no two ports have the same one, in wire order."""
+
+    program: Program
+    parts: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=lambda: set(_TAKEN))
+
+    def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
+        for node in nodes:
+            match node:
+                case Fixed(fields=fields):
+                    for leaf in fields:
+                        self.leaf(leaf)
+                case Data() if node.is_used:
+                    names = (*node.names, "element") if scope and scope[-1].path == node.path else node.names
+                    self.parts["data", node.path] = StreamPorts(node, self.name(names, _STREAM))
+                case Loop() if node.is_used:
+                    inner = (*scope, node)
+                    segments = self.program.segments(inner) if _has_parts(node) else None
+                    self.parts["loop", node.path] = ElementPorts(
+                        node, self.name(node.names, _ELEMENT), segments or None
+                    )
+                    self.nodes(node.body, inner)
+
+    def leaf(self, leaf: FrameField) -> None:
+        if leaf.count and leaf.is_used and ("field", leaf.path) not in self.parts:
+            self.parts["field", leaf.path] = FieldPort(self.name(leaf.names, ("",)), port_width(leaf), leaf)
+
+    def name(self, names: Sequence[str], suffixes: Sequence[str]) -> str:
+        """The first of `a_b`, `a_b_2`, `a_b_3`, ... with which no port gets a name that is taken."""
+        base = identifier(*names)
+        candidate, number = base, 2
+        while any(self.is_taken(candidate + suffix) for suffix in suffixes):
+            candidate, number = f"{base}_{number}", number + 1
+        self.taken |= {(candidate + suffix).lower() for suffix in suffixes}
+        return candidate
+
+    def is_taken(self, name: str) -> bool:
+        return name.lower() in self.taken or _NUMBERED.fullmatch(name) is not None
+
+
+_AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
+_STREAM = ("_length", *(f"_axis_{signal}" for signal in _AXIS))
+_ELEMENT = ("_length", "_valid", "_last", "_ready", "_segment_valid")
+
+
+def _has_parts(loop: Loop) -> bool:
+    return any(isinstance(node, Data | Loop) and node.is_used for node in loop.body)
+
+
+def _ports(side: MessageSide, nodes: Sequence[Node], width: int, done: set[Path]) -> Iterator[MessagePort]:
+    for node in nodes:
+        match node:
+            case Fixed(fields=fields):
+                for leaf in fields:
+                    if leaf.count and leaf.is_used and leaf.path not in done:
+                        port = side.field(leaf)
+                        yield MessagePort(port.name, port.width, port.comment)
+                        done.add(leaf.path)
+            case Data() if node.is_used:
+                yield from _stream_ports(side.stream(node), width)
+            case Loop() if node.is_used:
+                ports = side.element(node)
+                words = f"{ros_path(node.path)}: {node.ros_type}"
+                if node.count is None:
+                    yield MessagePort(ports.length, LENGTH_BITS, f"{words}, its elements")
+                yield from _ports(side, node.body, width, done)
+                if ports.segments is not None:
+                    yield MessagePort(ports.segment_valid, ports.segments, f"{words}, segments of an element")
+                yield MessagePort(ports.valid, None, f"{words}, an element")
+                yield MessagePort(ports.last, None)
+                yield MessagePort(ports.ready, None, is_reverse=True)
+
+
+def _stream_ports(ports: StreamPorts, width: int) -> Iterator[MessagePort]:
+    words = f"{ros_path(ports.part.path)}: {ports.part.ros_type}"
+    yield MessagePort(ports.length, LENGTH_BITS, f"{words}, its length")
+    yield MessagePort(ports.axis("tdata"), width, words)
+    yield MessagePort(ports.axis("tkeep"), width // 8)
+    yield MessagePort(ports.axis("tvalid"), None)
+    yield MessagePort(ports.axis("tlast"), None)
+    yield MessagePort(ports.axis("tready"), None, is_reverse=True)

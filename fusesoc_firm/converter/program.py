@@ -1,0 +1,416 @@
+"""What a converter does for a message of variable size: a program of steps in wire order.
+
+A subscriber takes the bytes of a frame step by step, a publisher puts them there; both work off the same steps:
+
+    Header              the payload's length
+    Block               bytes of known arrangement
+    Pad                 padding that depends on the position
+    Count, Guard, Open  a part's number of elements; whether its padding is there; its beginning
+    Stream              the elements of a string or an array of numbers
+    Close               the end of an element of an array of messages or strings
+    Tail                whatever is left, since nothing of it is used
+    End                 the end of the message
+
+A step is known by its place in the list. It is followed by the next one, but for `Guard` and `Open` of an empty part
+and for `Close`, which `Program` leads elsewhere.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Run
+from fusesoc_firm.frame.values import dotted, units_of
+
+# The loops around a step, the outermost first.
+Scope = tuple[Loop, ...]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Values that become valid together: number `number` of a message or of a loop's element, counted from 0.
+
+    It is a run of fields of fixed size with the length of the variable part behind it, as far as they are used. The first
+    one of a message is always there: it has the payload's length. Others exist if they hold a value.
+    """
+
+    scope: Scope
+    number: int
+
+
+@dataclass(frozen=True)
+class Header:
+    """The payload's length; `completes` is segment 0 where nothing more belongs to it."""
+
+    completes: Segment | None = None
+    segment: Segment | None = None
+
+
+@dataclass(frozen=True)
+class Block:
+    """`size` bytes. The runs of `fields`, and `constants`, count from its first byte.
+
+    A constant is (offset, bytes): what a publisher sends there. A subscriber compares those in `checks`, given alike.
+    All other bytes are padding or are not used. `completes` is the segment that it is the last of, unless a `Count` or
+    an `Open` follows, which then completes it.
+    """
+
+    scope: Scope
+    size: int
+    fields: tuple[FrameField, ...] = ()
+    constants: tuple[tuple[int, bytes], ...] = ()
+    checks: tuple[tuple[int, bytes], ...] = ()
+    segment: Segment | None = None
+    completes: Segment | None = None
+
+
+@dataclass(frozen=True)
+class Padding:
+    """Up to a multiple of `alignment`, counted from behind the prefix."""
+
+    scope: Scope
+    alignment: int
+
+
+@dataclass(frozen=True)
+class Count:
+    """The number of elements of a part on the wire: four bytes."""
+
+    scope: Scope
+    part: Data | Loop
+    segment: Segment | None = None
+
+
+@dataclass(frozen=True)
+class Guard:
+    """Where the part is empty, `Open` follows at once: there is no padding in front of no elements."""
+
+    scope: Scope
+    part: Data | Loop
+
+
+@dataclass(frozen=True)
+class Open:
+    """The beginning of a part, whose number of elements is known; an empty one is passed by. Completes a segment."""
+
+    scope: Scope
+    part: Data | Loop
+    completes: Segment | None = None
+
+
+@dataclass(frozen=True)
+class Stream:
+    """The elements of a string or of an array of numbers."""
+
+    scope: Scope
+    part: Data
+
+
+@dataclass(frozen=True)
+class Close:
+    """The end of an element of `loop`; `scope` is that of the element, the loop included."""
+
+    scope: Scope
+    loop: Loop
+
+
+@dataclass(frozen=True)
+class Tail:
+    """All that is left of the payload."""
+
+
+@dataclass(frozen=True)
+class End:
+    """The end of the message."""
+
+
+Step = Header | Block | Padding | Count | Guard | Open | Stream | Close | Tail | End
+
+
+@dataclass(frozen=True)
+class Program:
+    """The steps of a converter of `frame`."""
+
+    frame: Frame
+    steps: tuple[Step, ...]
+
+    @property
+    def loops(self) -> tuple[Loop, ...]:
+        """Every loop whose elements are gone through, in wire order."""
+        return tuple(step.part for step in self.steps if isinstance(step, Open) and isinstance(step.part, Loop))
+
+    @property
+    def streams(self) -> tuple[Data, ...]:
+        """Every string and array of numbers, in wire order."""
+        return tuple(step.part for step in self.steps if isinstance(step, Stream))
+
+    def segments(self, scope: Scope = ()) -> int:
+        """How many segments the message has, or the element of the innermost loop of `scope`."""
+        return len([found for found in self._completed if found.scope == scope])
+
+    @cached_property
+    def _completed(self) -> tuple[Segment, ...]:
+        steps = (step for step in self.steps if isinstance(step, Header | Block | Open))
+        return tuple(step.completes for step in steps if step.completes)
+
+    def behind_guard(self, number: int) -> int:
+        """Where a `Guard` leads if its part is empty: to its `Open`."""
+        guard = self.steps[number]
+        assert isinstance(guard, Guard)
+        return next(
+            place
+            for place, step in enumerate(self.steps)
+            if place > number and isinstance(step, Open) and step.part is guard.part
+        )
+
+    def behind(self, number: int) -> int:
+        """Where an `Open` leads if its part is empty."""
+        opening = self.steps[number]
+        assert isinstance(opening, Open)
+        if isinstance(opening.part, Data):
+            return number + 2
+        closing = (
+            p for p, s in enumerate(self.steps) if isinstance(s, Close) and s.loop is opening.part and p > number
+        )
+        return next(closing, number) + 1
+
+    def body(self, number: int) -> int:
+        """Where a `Close` leads if another element follows."""
+        closing = self.steps[number]
+        assert isinstance(closing, Close)
+        opening = (p for p, s in enumerate(self.steps) if isinstance(s, Open) and s.part is closing.loop and p < number)
+        return next(opening) + 1
+
+
+def subscriber_program(frame: Frame) -> Program:
+    """What a subscriber does; what is not used is skipped."""
+    builder = _Builder()
+    builder.header(frame)
+    builder.nodes(frame.nodes)
+    return Program(frame, _cut_behind_last_use(builder.finish()))
+
+
+def publisher_program(frame: Frame) -> Program:
+    """What a publisher does; what is not used is sent as its default, or as zeros, or as an empty array."""
+    builder = _Builder(is_publisher=True)
+    builder.header(frame)
+    builder.nodes(frame.nodes)
+    return Program(frame, builder.finish())
+
+
+@dataclass
+class _Builder:
+    """One walk through the nodes of a message.
+
+    `block` is not closed yet. `open_steps` are the places of the steps of the segment that is not closed yet, and
+    `is_valued` says whether it holds a value; `numbers` are those of the segments, of each scope around, so far.
+    """
+
+    is_publisher: bool = False
+    scope: Scope = ()
+    steps: list[Step] = field(default_factory=list)
+    block: Block = Block((), 0)
+    open_steps: list[int] = field(default_factory=list)
+    is_valued: bool = False
+    numbers: list[int] = field(default_factory=lambda: [0])
+
+    def header(self, frame: Frame) -> None:
+        self._append(Header())
+        self.is_valued = True
+        if frame.prefix:
+            checked = frame.prefix[: frame.checked_prefix]
+            self.block = replace(self.block, constants=((0, frame.prefix),), checks=((0, checked),))
+
+    def finish(self) -> tuple[Step, ...]:
+        self._close_segment()
+        self.steps.append(End())
+        return tuple(self.steps)
+
+    def nodes(self, nodes: Iterable[Node]) -> None:
+        for node in nodes:
+            match node:
+                case Fixed():
+                    self._fixed(node)
+                case Pad(alignment):
+                    self._flush()
+                    self._append(Padding(self.scope, alignment))
+                case Data() if node.is_used or not self.is_publisher:
+                    self._data(node)
+                case Loop() if node.is_used or not self.is_publisher:
+                    self._loop(node)
+                case Data() | Loop():
+                    self._constant(node, node.default)
+
+    # --- what the message has -----------------------------------------------------------------------------------
+
+    def _fixed(self, node: Fixed) -> None:
+        start = self.block.size
+        for leaf in node.fields:
+            if leaf.is_used and leaf.held:
+                runs = tuple(Run(start + run.offset, run.count) for run in leaf.runs)
+                self.block = replace(self.block, fields=(*self.block.fields, replace(leaf, runs=runs)))
+                self.is_valued = True
+            elif leaf.default is not None:
+                self._put_default(leaf, start)
+        self.block = replace(self.block, size=start + node.size)
+
+    def _put_default(self, leaf: FrameField, start: int) -> None:
+        values = leaf.default if isinstance(leaf.default, tuple | list) else [leaf.default]
+        number = leaf.first
+        for run in leaf.runs:
+            data = struct.pack(f"<{run.count}{leaf.type.code}", *values[number : number + run.count])
+            self.block = replace(self.block, constants=(*self.block.constants, (start + run.offset, data)))
+            number += run.count
+
+    def _data(self, node: Data) -> None:
+        self._count(node)
+        if node.padding != 0:
+            self._append(Guard(self.scope, node))
+            if node.padding is None:
+                self._append(Padding(self.scope, node.alignment))
+            else:
+                self.block = replace(self.block, size=node.padding)
+                self._flush()
+        self._open(node)
+        self._append(Stream(self.scope, node), in_segment=False)
+        if node.terminator:
+            zeros = ((0, bytes(node.terminator)),)
+            self.block = replace(self.block, size=node.terminator, constants=zeros, checks=zeros)
+
+    def _loop(self, node: Loop) -> None:
+        if node.count is None:
+            self._count(node)
+        self._open(node)
+        if not node.body:
+            return
+        # The segment around a loop that is not used goes on behind it.
+        outer = self.scope, self.open_steps, self.is_valued
+        self.scope, self.open_steps, self.is_valued = (*self.scope, node), [], False
+        self.block = Block(self.scope, 0)
+        self.numbers.append(0)
+        self.nodes(node.body)
+        self._close_segment()
+        self._append(Close(self.scope, node), in_segment=False)
+        self.numbers.pop()
+        self.scope, self.open_steps, self.is_valued = outer
+        self.block = Block(self.scope, 0)
+
+    def _count(self, part: Data | Loop) -> None:
+        self._flush()
+        self._append(Count(self.scope, part))
+        self.is_valued |= part.is_used
+
+    def _open(self, part: Data | Loop) -> None:
+        self._flush()
+        self._append(Open(self.scope, part))
+        if part.is_used:
+            self._close_segment()
+
+    # --- what a publisher sends for what it has no ports for ----------------------------------------------------
+
+    def _constant(self, node: Data | Loop, value: Any) -> None:
+        if isinstance(node, Data):
+            self._constant_data(node, value)
+            return
+        elements = list(value or [None] * (node.count or 0))
+        if node.count is None:
+            self._constant_bytes(len(elements).to_bytes(COUNT_BYTES, "little"))
+        for element in elements:
+            for inner in node.body:
+                if isinstance(inner, Data | Loop):
+                    self._constant(inner, inner.default if element is None else element)
+                else:
+                    self.nodes([inner])
+
+    def _constant_data(self, node: Data, value: Any) -> None:
+        if node.kind is DataKind.ARRAY:
+            data = struct.pack(f"<{len(value or ())}{node.element.code}", *(value or ()))
+        else:
+            data = bytes(units_of(node, value or ""))
+        count = len(data) // node.element.size + node.terminator
+        self._constant_bytes(count.to_bytes(COUNT_BYTES, "little"))
+        if data and node.padding is None:
+            self._flush()
+            self._append(Padding(self.scope, node.alignment))
+        elif data:
+            self._constant_bytes(bytes(node.padding or 0))
+        self._constant_bytes(data + bytes(node.terminator))
+
+    def _constant_bytes(self, data: bytes) -> None:
+        constants = (*self.block.constants, (self.block.size, data)) if data else self.block.constants
+        self.block = replace(self.block, size=self.block.size + len(data), constants=constants)
+
+    # --- blocks and segments ------------------------------------------------------------------------------------
+
+    def _append(self, step: Step, *, in_segment: bool = True) -> None:
+        if in_segment:
+            self.open_steps.append(len(self.steps))
+        self.steps.append(step)
+
+    def _flush(self) -> None:
+        if self.block.size:
+            self._append(self.block)
+        self.block = Block(self.scope, 0)
+
+    def _close_segment(self) -> None:
+        """Tell the steps since the last segment which one they belong to, if it holds a value."""
+        self._flush()
+        if self.is_valued:
+            segment = Segment(self.scope, self.numbers[-1])
+            self.numbers[-1] += 1
+            completing = [p for p in self.open_steps if isinstance(self.steps[p], Header | Block | Open)][-1:]
+            for place in self.open_steps:
+                step = self.steps[place]
+                if isinstance(step, Header | Block | Count):
+                    self.steps[place] = step = replace(step, segment=segment)
+                if place in completing and isinstance(step, Header | Block | Open):
+                    self.steps[place] = replace(step, completes=segment)
+        self.open_steps = []
+        self.is_valued = False
+
+
+def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
+    """A `Tail` in place of what follows the last step that is used, if that is more than what closes a text."""
+    last = max(place for place, step in enumerate(steps) if _is_used(step))
+    # A loop is gone through to its end.
+    closings = {step.loop.path: place for place, step in enumerate(steps) if isinstance(step, Close)}
+    scope: Scope = getattr(steps[last], "scope", ())
+    if scope:
+        last = closings[scope[0].path]
+    rest = steps[last + 1 : -1]
+    if not any(isinstance(step, Count | Open) or (isinstance(step, Block) and not step.checks) for step in rest):
+        return tuple(steps)
+    return (*steps[: last + 1], Tail(), steps[-1])
+
+
+def _is_used(step: Step) -> bool:
+    match step:
+        case Header():
+            return True
+        case Block(fields=fields, completes=completes):
+            return bool(fields) or completes is not None
+        case Open(part=part, completes=completes):
+            return part.is_used or completes is not None
+        case Stream(part=part):
+            return part.is_used
+    return False
+
+
+def comment(step: Step) -> str:
+    """What a step is about, in a few words: for the list of steps in generated VHDL."""
+    match step:
+        case Header():
+            return "the payload's length"
+        case Block(fields=fields):
+            return ", ".join(dict.fromkeys(dotted(leaf.names) for leaf in fields)) or "no value"
+        case Padding(alignment=alignment):
+            return f"padding to a multiple of {alignment}"
+        case Count(part=part) | Guard(part=part) | Open(part=part) | Stream(part=part):
+            return dotted(part.names)
+        case Close(loop=loop):
+            return dotted(loop.names)
+    return ""
