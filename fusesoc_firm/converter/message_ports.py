@@ -29,8 +29,8 @@ _TAKEN = frozenset(
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
     segment_valid msg_valid msg_ready frame_error frame_error_code payload_length id
-    rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural positive integer boolean
-    to_unsigned to_integer resize shift_left shift_right rising_edge failure true false
+    rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural positive integer
+    boolean to_unsigned to_integer resize shift_left shift_right rising_edge failure true false
     firm_axis_select firm_axis_window firm_axis_pack firm_axis_trim firm_axis_pkg
     """.split()
 )

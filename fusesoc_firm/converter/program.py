@@ -34,8 +34,8 @@ Scope = tuple[Loop, ...]
 class Segment:
     """Values that become valid together: number `number` of a message or of a loop's element, counted from 0.
 
-    It is a run of fields of fixed size with the length of the variable part behind it, as far as they are used. The first
-    one of a message is always there: it has the payload's length. Others exist if they hold a value.
+    It is a run of fields of fixed size with the length of the variable part behind it, as far as they are used. The
+    first one of a message is always there: it has the payload's length. Others exist if they hold a value.
     """
 
     scope: Scope
