@@ -32,9 +32,14 @@ _TAKEN = frozenset(
     rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural positive integer
     boolean to_unsigned to_integer resize shift_left shift_right rising_edge failure true false
     firm_axis_select firm_axis_window firm_axis_pack firm_axis_trim firm_axis_pkg
+    step_number step_next beat_last want want_some want_over want_shown beat beat_over step_done take room size gap
+    word is_fixed is_stream is_rest is_count is_padding aligns_to_2 aligns_to_4 is_open is_text closes_text opens_data
+    has_2 has_4 has_8 last_beat last_bytes no_fault bad_length short_frame long_frame bad_encoding bad_count
+    u_window show_lanes window shown shown_last take_valid skip taken fault stopped sink_ready steps lanes numbers_t code_t steps_t count_t
+    counted empty too_many demand judge finish advance receive stream_keep stream_valid stream_last phase_next
     """.split()
 )
-_NUMBERED = re.compile(r".*_r|(store|word|left|fault|step|count|beat|want|take|next|code)_?\d*", re.IGNORECASE)
+_NUMBERED = re.compile(r".*_r|closing_\d+", re.IGNORECASE)
 
 
 @dataclass(frozen=True)

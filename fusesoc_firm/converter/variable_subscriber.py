@@ -1,0 +1,597 @@
+"""Frame -> configuration of the subscriber of a message of variable size: its program as tables and registers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from fusesoc_firm.converter.message_ports import (
+    ElementPorts,
+    MessagePort,
+    MessageSide,
+    StreamPorts,
+    message_ports,
+    message_side,
+)
+from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.program import (
+    Block,
+    Close,
+    Count,
+    End,
+    Guard,
+    Header,
+    Open,
+    Padding,
+    Program,
+    Scope,
+    Segment,
+    Step,
+    Stream as StreamStep,
+    Tail,
+    comment,
+    subscriber_program,
+)
+from fusesoc_firm.converter.slices import Slice, slices_of
+from fusesoc_firm.converter.stream import Store, StoreMap, Stream, ranges, stores_of
+from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, Loop
+from fusesoc_firm.frame.values import dotted
+
+Configuration = dict[str, Any]
+
+VARIABLE_SUBSCRIBER_TEMPLATE = "vhdl/variable_subscriber.vhd"
+
+_DIGITS = 64
+_NUMBERS = 16
+_LARGEST_NATURAL = 2**31 - 1
+
+
+class _Window(Stream):
+    """The bytes of a block as the window shows them: from the lowest lane up."""
+
+    @property
+    def payload_start(self) -> int:
+        return 0
+
+
+def variable_subscriber_configuration(frame: Frame, width: int, entity: str) -> Configuration:
+    """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
+    made = _Subscriber(subscriber_program(frame), message_side(frame), _Window(width))
+    return {"entity": entity, **made.configuration()}
+
+
+@dataclass(frozen=True)
+class _Subscriber:
+    program: Program
+    side: MessageSide
+    window: _Window
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        return self.program.steps
+
+    @property
+    def lanes(self) -> int:
+        return self.window.lanes
+
+    @property
+    def frame(self) -> Frame:
+        return self.program.frame
+
+    def configuration(self) -> Configuration:
+        end = len(self.steps) - 1
+        return {
+            "message": str(self.frame.message),
+            "ros": int(self.frame.ros),
+            "width": self.window.width,
+            "lanes": self.lanes,
+            "data_high": self.window.width - 1,
+            "keep_high": self.lanes - 1,
+            "count_high": self.lanes.bit_length() - 1,
+            "is_byte_wide": self.lanes == 1,
+            "is_narrow": self.lanes < 8,
+            "void_lanes": 0 if self.lanes == 1 else ID_BYTES,
+            "ports": port_declarations(message_ports(self.frame, self.window.width), "out"),
+            "segment_high": self.side.segments - 1,
+            "steps": step_list(self.steps),
+            "step_count": len(self.steps),
+            "step_high": end.bit_length() - 1,
+            "end_step": end,
+            "trailing_bytes": self.frame.trailing_bytes,
+            "has_encoding": self.frame.checked_prefix > 0,
+            "has_bad_count": bool(self._count_checks()) or any(map(_closes_text, self.steps)),
+            "has_padding": self._has(Padding),
+            "has_streams": any(step.part.is_used for step in self.steps if isinstance(step, StreamStep)),
+            "has_data": self._has(StreamStep),
+            "has_opens": any(map(_is_counted, self.steps)),
+            "has_text": any(map(_is_text, self.steps)),
+            "step_sets": self._step_sets(),
+            **self._tables(),
+            **self._lengths(),
+            **self._fields(),
+            **self._flow(),
+            **self._updates(),
+        }
+
+    def _has(self, kind: type[Step]) -> bool:
+        return any(isinstance(step, kind) for step in self.steps)
+
+    def _places(self, is_meant: Callable[[Step], bool]) -> list[int]:
+        return [place for place, step in enumerate(self.steps) if is_meant(step)]
+
+    # --- tables -------------------------------------------------------------------------------------------------
+
+    def _step_sets(self) -> list[Configuration]:
+        sizes = {size: self._places(lambda step, size=size: _size(step) == size) for size in (2, 4, 8)}  # type: ignore[misc]
+        aligned = {to: self._places(lambda step, to=to: _alignment(step) == to) for to in (2, 4)}  # type: ignore[misc]
+        wanted = [
+            ("IS_FIXED", "Takes a known number of bytes.", self._places(_is_fixed)),
+            ("IS_STREAM", "Hands bytes on.", self._places(lambda step: isinstance(step, StreamStep))),
+            ("IS_REST", "Takes what is left of the payload.", self._places(lambda step: isinstance(step, Tail | End))),
+        ]
+        optional = [
+            ("IS_COUNT", "Takes a count.", self._places(lambda step: isinstance(step, Count))),
+            ("IS_PADDING", "Takes padding.", self._places(lambda step: isinstance(step, Padding))),
+            ("ALIGNS_TO_2", "Padding up to a multiple of 2.", aligned[2]),
+            ("ALIGNS_TO_4", "Padding up to a multiple of 4.", aligned[4]),
+            ("IS_OPEN", "Knows a count.", self._places(_is_counted)),
+            ("IS_TEXT", "Its count includes a closing zero.", self._places(_is_text)),
+            ("CLOSES_TEXT", "Begins with that zero.", self._places(_closes_text)),
+            ("OPENS_DATA", "A stream follows.", self._places(_opens_data)),
+            *((f"HAS_{size}", f"Its elements have {size} bytes.", places) for size, places in sizes.items()),
+        ]
+        sets = [*wanted, *(found for found in optional if found[2])]
+        return [{"name": name, "about": about, "rows": self._rows(places)} for name, about, places in sets]
+
+    def _rows(self, places: Sequence[int]) -> list[Configuration]:
+        digits = "".join("1" if place in set(places) else "0" for place in range(len(self.steps)))
+        rows = [digits[start : start + _DIGITS] for start in range(0, len(digits), _DIGITS)]
+        return [{"digits": row, "joint": joint} for row, joint in zip(rows, joints(len(rows), " &", ";"), strict=True)]
+
+    def _tables(self) -> Configuration:
+        sizes = [_fixed_size(step) for step in self.steps]
+        last_beats = [max(0, -(-size // self.lanes) - 1) for size in sizes]
+        last_bytes = [size - self.lanes * beat for size, beat in zip(sizes, last_beats, strict=True)]
+        return {
+            "largest_number": max(*last_beats, *last_bytes),
+            "beat_high": max(1, max(last_beats).bit_length()) - 1,
+            "last_beats": number_rows(last_beats),
+            "last_bytes": number_rows(last_bytes),
+        }
+
+    def _lengths(self) -> Configuration:
+        """What a count means: bytes of a stream, and how many elements there is room for."""
+        sizes = [size for size in (2, 4, 8) if any(_size(step) == size for step in self.steps)]
+        shifts = {2: 1, 4: 2, 8: 3}
+        rooms = [f"shift_right(remaining_r, {shifts[size]}) when HAS_{size}(step_number) = '1' else" for size in sizes]
+        bytes_ = [f"shift_left(counted, {shifts[size]}) when HAS_{size}(step_number) = '1' else" for size in sizes]
+        masks = {2: "001", 4: "011"}
+        gaps = [(masks[to], f" when ALIGNS_TO_{to}(step_number) = '1' else") for to in (2, 4) if self._aligned(to)]
+        gaps.append(("111", ";"))
+        width = self.window.width
+        is_whole = width >= 8 * COUNT_BYTES
+        word = "window(31 downto 0)" if is_whole else "window"
+        return {
+            "rooms": _values([*rooms, "remaining_r;"]),
+            "sizes": _values([*bytes_, "counted;"]),
+            "gaps": [{"mask": mask, "joint": joint} for mask, joint in gaps],
+            "header_word": f"unsigned({word})" + ("" if is_whole else f" & remaining_r(31 downto {width})"),
+            "payload_length_word": word + ("" if is_whole else f" & payload_length_r(31 downto {width})"),
+            "count_word": f"unsigned({word})" + ("" if is_whole else f" & left_r(31 downto {width})"),
+            "first_phase": -len(self.frame.prefix) % 8,
+        }
+
+    def _aligned(self, alignment: int) -> bool:
+        return any(_alignment(step) == alignment for step in self.steps)
+
+    # --- fields -------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _stores(self) -> list[tuple[int, Block, list[tuple[str, Store]]]]:
+        """The stores of each block that holds used fields, by name."""
+        found = []
+        number = 0
+        for place, step in enumerate(self.steps):
+            if isinstance(step, Block) and step.fields:
+                named = []
+                for store in stores_of(self.window, _windows(step)):
+                    named.append((f"store_{number}_r", store))
+                    number += 1
+                found.append((place, step, named))
+        return found
+
+    def _fields(self) -> Configuration:
+        pairs = [("payload_length", "payload_length_r")]
+        for part in self.side.parts:
+            pairs += self._length_pairs(part)
+        for _, block, named in self._stores:
+            pairs += self._field_pairs(block, named)
+        column = max(len(target) for target, _ in pairs)
+        streams = [(place, step) for place, step in enumerate(self.steps) if isinstance(step, StreamStep)]
+        return {
+            "assignments": [{"target": target.ljust(column), "value": value} for target, value in pairs],
+            "streams": [
+                {"name": self.side.stream(step.part).name, "step": place} for place, step in streams if step.part.is_used
+            ],
+            "stores": [
+                store for place, block, named in self._stores for store in self._store_updates(place, block, named)
+            ],
+        }
+
+    def _length_pairs(self, part: object) -> list[tuple[str, str]]:
+        match part:
+            case StreamPorts():
+                return [(part.length, f"std_logic_vector({self._length_register(part.part)})")]
+            case ElementPorts():
+                number = self._number(part.loop)
+                pairs = [(part.valid, f"valid_{number}_r"), (part.last, f"last_{number}_r")]
+                if part.segments is not None:
+                    pairs.append((part.segment_valid, f"segment_valid_{number}_r"))
+                if part.loop.count is None:
+                    pairs.insert(0, (part.length, f"std_logic_vector({self._length_register(part.loop)})"))
+                return pairs
+        return []
+
+    def _field_pairs(self, block: Block, named: Sequence[tuple[str, Store]]) -> list[tuple[str, str]]:
+        places = StoreMap(self.window, [store for _, store in named])
+        pairs: list[tuple[str, str]] = []
+        for leaf in block.fields:
+            port = replace(self.side.field(leaf), field=leaf)
+            for piece in slices_of(port):
+                low = piece.low + leaf.first * leaf.type.bits
+                for stored in places.pieces(piece.offset, piece.bytes):
+                    bits = f"{named[stored.store][0]}({stored.high} downto {stored.low})"
+                    if leaf.type.bits == 1:
+                        # As roscpp and rospy read a bool: whatever is not zero is true.
+                        pairs.append((_target(replace(piece, low=low)), f"'0' when {bits} = x\"00\" else '1'"))
+                    else:
+                        pairs.append((_target(replace(piece, low=low, width=8 * stored.count)), bits))
+                    low += 8 * stored.count
+        return pairs
+
+    def _store_updates(self, place: int, block: Block, named: Sequence[tuple[str, Store]]) -> list[Configuration]:
+        return [
+            {
+                "step": place,
+                "register": name,
+                "windows": _window_condition(store, -(-block.size // self.lanes)),
+                "data": _store_data(name, store),
+            }
+            for name, store in named
+        ]
+
+    # --- flow ---------------------------------------------------------------------------------------------------
+
+    def _flow(self) -> Configuration:
+        jumps = self._jumps()
+        elements = [f"({self._register('valid', ports.loop)} and not {ports.ready})" for ports in self._elements]
+        closings = [place for place, step in enumerate(self.steps) if isinstance(step, Close)]
+        return {
+            "stopped": " or ".join(elements) or "'0'",
+            "sinks": _values(self._sinks()),
+            "has_checks": bool(self._checks()),
+            "checks": self._checks(),
+            "count_checks": self._count_checks(),
+            "closes": [self._close(place) for place in closings],
+            "closing_sensitivity": "".join(
+                f", closing_{self._number(loop)}, {self._register('left', loop)}" for loop in self._closed_loops
+            ),
+            "has_jumps": bool(jumps),
+            "jumps": [
+                {"word": "if" if not number else "elsif", "condition": condition, "target": target}
+                for number, (condition, target) in enumerate(jumps)
+            ],
+            "paddings": [
+                {"step": place, "high": step.alignment.bit_length() - 2, "behind": place + 1}
+                for place, step in enumerate(self.steps)
+                if isinstance(step, Padding)
+            ],
+        }
+
+    def _sinks(self) -> list[str]:
+        """Whether the sink of the step's stream takes a beat; what nobody reads is always taken."""
+        streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, StreamStep)]
+        used = [(place, part) for place, part in streams if part.is_used]
+        found = [f"{self.side.stream(part).axis('tready')} when step_r = {place} else" for place, part in used]
+        return [*found, "'1';"]
+
+    def _checks(self) -> list[Configuration]:
+        found = []
+        if self.frame.checked_prefix:
+            value = self.frame.prefix[: self.frame.checked_prefix]
+            for beat in range(-(-len(value) // self.lanes)):
+                data = value[beat * self.lanes : (beat + 1) * self.lanes]
+                bits = "window" if self.lanes == 1 else f"window({8 * len(data) - 1} downto 0)"
+                condition = f'step_r = 1 and beat_r = {beat} and {bits} /= x"{data[::-1].hex()}"'
+                found.append({"condition": condition, "code": "BAD_ENCODING"})
+        if any(map(_closes_text, self.steps)):
+            condition = "CLOSES_TEXT(step_number) = '1' and beat_r = 0 and window(7 downto 0) /= x\"00\""
+            found.append({"condition": condition, "code": "BAD_COUNT"})
+        return found
+
+    def _count_checks(self) -> list[Configuration]:
+        found = ["IS_TEXT(step_number) = '1' and left_r = 0"] if any(map(_is_text, self.steps)) else []
+        for place, step in enumerate(self.steps):
+            if isinstance(step, Open) and step.part.bound is not None:
+                most = step.part.bound + _terminator(step.part)
+                if most < _LARGEST_NATURAL:
+                    found.append(f"step_r = {place} and left_r > {most}")
+        return [{"condition": condition} for condition in found]
+
+    def _close(self, place: int) -> Configuration:
+        """An element ends with its last bytes; where the part at its end is empty, or an array, in a cycle of its own."""
+        step = self.steps[place]
+        assert isinstance(step, Close)
+        is_joined = isinstance(self.steps[place - 1], Block | StreamStep)
+        return {
+            "number": self._number(step.loop),
+            "about": dotted(step.loop.names),
+            "condition": f"step_r = {place}" + (f" or step_r = {place - 1}" if is_joined else ""),
+        }
+
+    def _jumps(self) -> list[tuple[str, int]]:
+        jumps: list[tuple[str, int]] = []
+        for place, step in enumerate(self.steps):
+            match step:
+                case Guard():
+                    jumps.append((f"step_r = {place} and left_r = 0", self.program.behind_guard(place)))
+                case Open(part=part) if _is_counted(step) and self.program.behind(place) != place + 1:
+                    jumps.append((f"step_r = {place} and empty = '1'", self.program.behind(place)))
+                case Close(loop=loop):
+                    closing = f"closing_{self._number(loop)} = '1'"
+                    jumps.append((f"{closing} and {self._register('left', loop)} = 1", place + 1))
+                    jumps.append((closing, self.program.body(place)))
+                case End():
+                    jumps.append((f"step_r = {place}", place))
+        return jumps
+
+    # --- registers ----------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _elements(self) -> list[ElementPorts]:
+        """Of every loop whose elements somebody takes."""
+        loops = self._closed_loops
+        return [ports for ports in self.side.parts if isinstance(ports, ElementPorts) and ports.loop in loops]
+
+    @cached_property
+    def _closed_loops(self) -> list[Loop]:
+        return [step.loop for step in self.steps if isinstance(step, Close)]
+
+    def _number(self, part: Data | Loop) -> int:
+        """Parts are numbered in wire order for the names of their registers."""
+        paths = [(type(step.part), step.part.path) for step in self.steps if isinstance(step, Open)]
+        return paths.index((type(part), part.path))
+
+    def _register(self, what: str, part: Data | Loop) -> str:
+        return f"{what}_{self._number(part)}_r"
+
+    def _length_register(self, part: Data | Loop) -> str:
+        return self._register("length", part)
+
+    def _segment_bit(self, segment: Segment) -> str:
+        if not segment.scope:
+            return f"segment_valid_r({segment.number})"
+        loop = segment.scope[-1]
+        if self.side.element(loop).segments is None:
+            return ""
+        return f"{self._register('segment_valid', loop)}({segment.number})"
+
+    def _updates(self) -> Configuration:
+        zeros, zero = "(others => '0')", "'0'"
+        registers = [
+            ("segment_valid_r", f"{vhdl_type(self.side.segments)} := {zeros}"),
+            ("payload_length_r", vhdl_type(32)),
+        ]
+        resets = [("segment_valid_r", zeros)]
+        for step in self.steps:
+            if isinstance(step, Open) and step.part.is_used and _is_counted(step):
+                registers.append((self._length_register(step.part), "unsigned(31 downto 0)"))
+            if isinstance(step, Open) and isinstance(step.part, Loop) and step.part in self._closed_loops:
+                registers.append((self._register("left", step.part), f"unsigned(31 downto 0) := {zeros}"))
+        for ports in self._elements:
+            valid = self._register("valid", ports.loop)
+            registers += [(valid, f"std_logic := {zero}"), (self._register("last", ports.loop), "std_logic")]
+            resets.append((valid, zero))
+            if ports.segments is not None:
+                bits = self._register("segment_valid", ports.loop)
+                registers.append((bits, f"{vhdl_type(ports.segments)} := {zeros}"))
+                resets.append((bits, zeros))
+        registers += [(name, vhdl_type(store.bits)) for _, _, named in self._stores for name, store in named]
+        column = max(len(name) for name, _ in registers)
+        return {
+            "registers": [{"name": name.ljust(column), "type": type_} for name, type_ in registers],
+            "resets": [{"register": name, "value": value} for name, value in resets],
+            "elements": [
+                {"name": ports.name, "valid": self._register("valid", ports.loop)} for ports in self._elements
+            ],
+            "element_segments": [
+                {
+                    "name": ports.name,
+                    "valid": self._register("valid", ports.loop),
+                    "register": self._register("segment_valid", ports.loop),
+                }
+                for ports in self._elements
+                if ports.segments is not None
+            ],
+            "openings": [
+                {"step": place, "statements": [{"statement": text} for text in statements]}
+                for place, step in enumerate(self.steps)
+                if isinstance(step, Open) and (statements := self._opening(step))
+            ],
+            "completions": self._completions(),
+            "closings": [
+                {
+                    "number": self._number(loop),
+                    "statements": [{"statement": text} for text in self._closing(loop)],
+                }
+                for loop in self._closed_loops
+            ],
+        }
+
+    def _opening(self, step: Open) -> list[str]:
+        part = step.part
+        statements = []
+        if part.is_used and _is_counted(step):
+            statements.append(f"{self._length_register(part)} <= counted;")
+        if isinstance(part, Loop) and part in self._closed_loops:
+            value = "left_r" if part.count is None else f"to_unsigned({part.count}, 32)"
+            statements.append(f"{self._register('left', part)} <= {value};")
+        return statements
+
+    def _completions(self) -> list[Configuration]:
+        found = []
+        for place, step in enumerate(self.steps):
+            if isinstance(step, Header | Block | Open) and step.completes and (bit := self._segment_bit(step.completes)):
+                found.append({"step": place, "bit": bit})
+        return found
+
+    def _closing(self, loop: Loop) -> list[str]:
+        left = self._register("left", loop)
+        statements = [f"{left} <= {left} - 1;"]
+        if loop in [ports.loop for ports in self._elements]:
+            last = self._register("last", loop)
+            statements += [f"{self._register('valid', loop)} <= '1';", f"{last} <= '0';"]
+            statements.append(f"if {left} = 1 then {last} <= '1'; end if;")
+        return statements
+
+
+# --- what a step is --------------------------------------------------------------------------------------------------
+
+
+def _is_fixed(step: Step) -> bool:
+    return isinstance(step, Header | Block | Count)
+
+
+def _fixed_size(step: Step) -> int:
+    match step:
+        case Header():
+            return LENGTH_BYTES
+        case Count():
+            return COUNT_BYTES
+        case Block(size=size):
+            return size
+    return 0
+
+
+def _is_counted(step: Step) -> bool:
+    return isinstance(step, Open) and (isinstance(step.part, Data) or step.part.count is None)
+
+
+def _opens_data(step: Step) -> bool:
+    return isinstance(step, Open) and isinstance(step.part, Data)
+
+
+def _terminator(part: Data | Loop) -> int:
+    return part.terminator if isinstance(part, Data) else 0
+
+
+def _is_text(step: Step) -> bool:
+    return isinstance(step, Open) and _terminator(step.part) > 0
+
+
+def _closes_text(step: Step) -> bool:
+    return isinstance(step, Block) and step.checks == ((0, b"\x00"),)
+
+
+def _size(step: Step) -> int:
+    return step.part.element.size if isinstance(step, Open) and isinstance(step.part, Data) else 0
+
+
+def _alignment(step: Step) -> int:
+    return step.alignment if isinstance(step, Padding) else 0
+
+
+# --- text ------------------------------------------------------------------------------------------------------------
+
+
+def step_list(steps: Sequence[Step]) -> list[Configuration]:
+    """The steps for the list in the head of an architecture."""
+    column = len(str(len(steps) - 1))
+    return [
+        {
+            "number": f"{number:>{column}}",
+            "kind": type(step).__name__.lower().ljust(7),
+            "about": f"{size} bytes: {comment(step)}" if (size := _block_size(step)) else comment(step),
+        }
+        for number, step in enumerate(steps)
+    ]
+
+
+def _block_size(step: Step) -> int:
+    return step.size if isinstance(step, Block) else 0
+
+
+def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[Configuration]:
+    """The message side as port declarations in columns, most of them in `direction`."""
+    opposite = {"in": "out", "out": "in"}[direction]
+    width = max([len("frame_error_code"), *(len(port.name) for port in ports)])
+    types = max(len(port.vhdl_type) for port in ports)
+    return [
+        {
+            "name": port.name.ljust(width),
+            "direction": (opposite if port.is_reverse else direction).ljust(3),
+            "type": port.vhdl_type,
+            "padding": " " * (types - len(port.vhdl_type)) if port.comment else "",
+            "comment": f" -- {port.comment}" if port.comment else "",
+        }
+        for port in ports
+    ]
+
+
+def number_rows(numbers: Sequence[int]) -> list[Configuration]:
+    """The rows of a table of numbers by step."""
+    rows = [numbers[start : start + _NUMBERS] for start in range(0, len(numbers), _NUMBERS)]
+    texts = [", ".join(map(str, row)) for row in rows]
+    return [{"numbers": text, "joint": joint} for text, joint in zip(texts, joints(len(texts), ",", ""), strict=True)]
+
+
+def joints(count: int, between: str, behind: str) -> list[str]:
+    """What stands behind each of `count` items of a list."""
+    return [between] * (count - 1) + [behind] if count else []
+
+
+def _values(texts: Iterable[str]) -> list[Configuration]:
+    return [{"value": text, "joint": ""} for text in texts]
+
+
+def _windows(block: Block) -> list[tuple[int, int]]:
+    """The parts of a block that hold used fields, as (first, end) offsets in order, touching parts joined."""
+    windows: list[tuple[int, int]] = []
+    runs = (
+        (run.offset, run.offset + run.count * leaf.type.size) for leaf in block.fields for run in leaf.runs if run.count
+    )
+    for first, end in sorted(runs):
+        if windows and windows[-1][1] == first:
+            windows[-1] = (windows[-1][0], end)
+        else:
+            windows.append((first, end))
+    return windows
+
+
+def _window_condition(store: Store, beats: int) -> str:
+    found = ranges(store.beats)
+    if found == [(0, beats - 1)]:
+        return ""
+    conditions = [
+        f"beat_r = {first}" if first == last else f"(beat_r >= {first} and beat_r <= {last})" for first, last in found
+    ]
+    return f" and {conditions[0]}" if len(conditions) == 1 else f" and ({' or '.join(conditions)})"
+
+
+def _store_data(register: str, store: Store) -> list[Configuration]:
+    lanes = ranges(store.lanes)
+    data = [f"window({8 * last + 7} downto {8 * first})" for first, last in reversed(lanes)]
+    if len(store.beats) > 1:
+        data.append(f"{register}({store.bits - 1} downto {store.beat_bits})")
+    return [{"piece": piece, "joint": joint} for piece, joint in zip(data, joints(len(data), " &", ";"), strict=True)]
+
+
+def _target(piece: Slice) -> str:
+    """The port, or the part of it that the piece is."""
+    port = piece.port
+    is_bit = port.field.type.bits == 1
+    if port.width is None or (piece.width == port.width and not is_bit):
+        return port.name
+    return f"{port.name}({piece.low})" if is_bit else f"{port.name}({piece.high} downto {piece.low})"
