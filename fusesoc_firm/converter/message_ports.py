@@ -32,11 +32,14 @@ _TAKEN = frozenset(
     rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural positive integer
     boolean to_unsigned to_integer resize shift_left shift_right rising_edge failure true false
     firm_axis_select firm_axis_window firm_axis_pack firm_axis_trim firm_axis_pkg
-    step_number step_next beat_last want want_some want_over want_shown beat beat_over step_done take room size gap
-    word is_fixed is_stream is_rest is_count is_padding aligns_to_2 aligns_to_4 is_open is_text closes_text opens_data
-    has_2 has_4 has_8 last_beat last_bytes no_fault bad_length short_frame long_frame bad_encoding bad_count
-    u_window show_lanes window shown shown_last take_valid skip taken fault stopped sink_ready steps lanes numbers_t code_t steps_t count_t
-    counted empty too_many demand judge finish advance receive stream_keep stream_valid stream_last phase_next
+    bad_count bad_encoding bad_length beat_bytes beat_last check_step choose_bytes choose_step code_t count_bytes
+    count_is_zero count_room count_t count_too_large count_value end_step frame_fault frame_over keep_lanes
+    keep_state long_frame no_fault numbers_t padding_left phase_next short_frame sink_ready step_aligns_to_2
+    step_aligns_to_4 step_beat step_closes_text step_count step_done step_has_2 step_has_4 step_has_8 step_is_count
+    step_is_fixed step_is_open step_is_padding step_is_rest step_is_stream step_is_text step_last_beat
+    step_last_bytes step_next step_number step_opens_data step_stopped steps_t stream_data stream_keep stream_last stream_valid
+    taken_bytes u_window wanted wanted_any wanted_beyond wanted_shown window_bytes window_count window_last
+    window_skip window_take window_take_valid
     """.split()
 )
 _NUMBERED = re.compile(r".*_r|closing_\d+", re.IGNORECASE)

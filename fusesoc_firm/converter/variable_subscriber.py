@@ -127,20 +127,24 @@ class _Subscriber:
         sizes = {size: self._places(lambda step, size=size: _size(step) == size) for size in (2, 4, 8)}  # type: ignore[misc]
         aligned = {to: self._places(lambda step, to=to: _alignment(step) == to) for to in (2, 4)}  # type: ignore[misc]
         wanted = [
-            ("IS_FIXED", "Takes a known number of bytes.", self._places(_is_fixed)),
-            ("IS_STREAM", "Hands bytes on.", self._places(lambda step: isinstance(step, StreamStep))),
-            ("IS_REST", "Takes what is left of the payload.", self._places(lambda step: isinstance(step, Tail | End))),
+            ("STEP_IS_FIXED", "Takes a known number of bytes.", self._places(_is_fixed)),
+            ("STEP_IS_STREAM", "Hands bytes on.", self._places(lambda step: isinstance(step, StreamStep))),
+            (
+                "STEP_IS_REST",
+                "Takes what is left of the payload.",
+                self._places(lambda step: isinstance(step, Tail | End)),
+            ),
         ]
         optional = [
-            ("IS_COUNT", "Takes a count.", self._places(lambda step: isinstance(step, Count))),
-            ("IS_PADDING", "Takes padding.", self._places(lambda step: isinstance(step, Padding))),
-            ("ALIGNS_TO_2", "Padding up to a multiple of 2.", aligned[2]),
-            ("ALIGNS_TO_4", "Padding up to a multiple of 4.", aligned[4]),
-            ("IS_OPEN", "Knows a count.", self._places(_is_counted)),
-            ("IS_TEXT", "Its count includes a closing zero.", self._places(_is_text)),
-            ("CLOSES_TEXT", "Begins with that zero.", self._places(_closes_text)),
-            ("OPENS_DATA", "A stream follows.", self._places(_opens_data)),
-            *((f"HAS_{size}", f"Its elements have {size} bytes.", places) for size, places in sizes.items()),
+            ("STEP_IS_COUNT", "Takes a count.", self._places(lambda step: isinstance(step, Count))),
+            ("STEP_IS_PADDING", "Takes padding.", self._places(lambda step: isinstance(step, Padding))),
+            ("STEP_ALIGNS_TO_2", "Padding up to a multiple of 2.", aligned[2]),
+            ("STEP_ALIGNS_TO_4", "Padding up to a multiple of 4.", aligned[4]),
+            ("STEP_IS_OPEN", "Knows a count.", self._places(_is_counted)),
+            ("STEP_IS_TEXT", "Its count includes a closing zero.", self._places(_is_text)),
+            ("STEP_CLOSES_TEXT", "Begins with that zero.", self._places(_closes_text)),
+            ("STEP_OPENS_DATA", "A stream follows.", self._places(_opens_data)),
+            *((f"STEP_HAS_{size}", f"Its elements have {size} bytes.", places) for size, places in sizes.items()),
         ]
         sets = [*wanted, *(found for found in optional if found[2])]
         return [{"name": name, "about": about, "rows": self._rows(places)} for name, about, places in sets]
@@ -165,17 +169,21 @@ class _Subscriber:
         """What a count means: bytes of a stream, and how many elements there is room for."""
         sizes = [size for size in (2, 4, 8) if any(_size(step) == size for step in self.steps)]
         shifts = {2: 1, 4: 2, 8: 3}
-        rooms = [f"shift_right(remaining_r, {shifts[size]}) when HAS_{size}(step_number) = '1' else" for size in sizes]
-        bytes_ = [f"shift_left(counted, {shifts[size]}) when HAS_{size}(step_number) = '1' else" for size in sizes]
+        rooms = [
+            f"shift_right(remaining_r, {shifts[size]}) when STEP_HAS_{size}(step_number) = '1' else" for size in sizes
+        ]
+        bytes_ = [
+            f"shift_left(count_value, {shifts[size]}) when STEP_HAS_{size}(step_number) = '1' else" for size in sizes
+        ]
         masks = {2: "001", 4: "011"}
-        gaps = [(masks[to], f" when ALIGNS_TO_{to}(step_number) = '1' else") for to in (2, 4) if self._aligned(to)]
+        gaps = [(masks[to], f" when STEP_ALIGNS_TO_{to}(step_number) = '1' else") for to in (2, 4) if self._aligned(to)]
         gaps.append(("111", ";"))
         width = self.window.width
         is_whole = width >= 8 * COUNT_BYTES
-        word = "window(31 downto 0)" if is_whole else "window"
+        word = "window_bytes(31 downto 0)" if is_whole else "window_bytes"
         return {
             "rooms": _values([*rooms, "remaining_r;"]),
-            "sizes": _values([*bytes_, "counted;"]),
+            "sizes": _values([*bytes_, "count_value;"]),
             "gaps": [{"mask": mask, "joint": joint} for mask, joint in gaps],
             "header_word": f"unsigned({word})" + ("" if is_whole else f" & remaining_r(31 downto {width})"),
             "payload_length_word": word + ("" if is_whole else f" & payload_length_r(31 downto {width})"),
@@ -213,7 +221,9 @@ class _Subscriber:
         return {
             "assignments": [{"target": target.ljust(column), "value": value} for target, value in pairs],
             "streams": [
-                {"name": self.side.stream(step.part).name, "step": place} for place, step in streams if step.part.is_used
+                {"name": self.side.stream(step.part).name, "step": place}
+                for place, step in streams
+                if step.part.is_used
             ],
             "stores": [
                 store for place, block, named in self._stores for store in self._store_updates(place, block, named)
@@ -303,16 +313,16 @@ class _Subscriber:
             value = self.frame.prefix[: self.frame.checked_prefix]
             for beat in range(-(-len(value) // self.lanes)):
                 data = value[beat * self.lanes : (beat + 1) * self.lanes]
-                bits = "window" if self.lanes == 1 else f"window({8 * len(data) - 1} downto 0)"
+                bits = "window_bytes" if self.lanes == 1 else f"window_bytes({8 * len(data) - 1} downto 0)"
                 condition = f'step_r = 1 and beat_r = {beat} and {bits} /= x"{data[::-1].hex()}"'
                 found.append({"condition": condition, "code": "BAD_ENCODING"})
         if any(map(_closes_text, self.steps)):
-            condition = "CLOSES_TEXT(step_number) = '1' and beat_r = 0 and window(7 downto 0) /= x\"00\""
+            condition = "STEP_CLOSES_TEXT(step_number) = '1' and beat_r = 0 and window_bytes(7 downto 0) /= x\"00\""
             found.append({"condition": condition, "code": "BAD_COUNT"})
         return found
 
     def _count_checks(self) -> list[Configuration]:
-        found = ["IS_TEXT(step_number) = '1' and left_r = 0"] if any(map(_is_text, self.steps)) else []
+        found = ["STEP_IS_TEXT(step_number) = '1' and left_r = 0"] if any(map(_is_text, self.steps)) else []
         for place, step in enumerate(self.steps):
             if isinstance(step, Open) and step.part.bound is not None:
                 most = step.part.bound + _terminator(step.part)
@@ -338,7 +348,7 @@ class _Subscriber:
                 case Guard():
                     jumps.append((f"step_r = {place} and left_r = 0", self.program.behind_guard(place)))
                 case Open(part=part) if _is_counted(step) and self.program.behind(place) != place + 1:
-                    jumps.append((f"step_r = {place} and empty = '1'", self.program.behind(place)))
+                    jumps.append((f"step_r = {place} and count_is_zero = '1'", self.program.behind(place)))
                 case Close(loop=loop):
                     closing = f"closing_{self._number(loop)} = '1'"
                     jumps.append((f"{closing} and {self._register('left', loop)} = 1", place + 1))
@@ -434,7 +444,7 @@ class _Subscriber:
         part = step.part
         statements = []
         if part.is_used and _is_counted(step):
-            statements.append(f"{self._length_register(part)} <= counted;")
+            statements.append(f"{self._length_register(part)} <= count_value;")
         if isinstance(part, Loop) and part in self._closed_loops:
             value = "left_r" if part.count is None else f"to_unsigned({part.count}, 32)"
             statements.append(f"{self._register('left', part)} <= {value};")
@@ -443,7 +453,11 @@ class _Subscriber:
     def _completions(self) -> list[Configuration]:
         found = []
         for place, step in enumerate(self.steps):
-            if isinstance(step, Header | Block | Open) and step.completes and (bit := self._segment_bit(step.completes)):
+            if (
+                isinstance(step, Header | Block | Open)
+                and step.completes
+                and (bit := self._segment_bit(step.completes))
+            ):
                 found.append({"step": place, "bit": bit})
         return found
 
@@ -582,7 +596,7 @@ def _window_condition(store: Store, beats: int) -> str:
 
 def _store_data(register: str, store: Store) -> list[Configuration]:
     lanes = ranges(store.lanes)
-    data = [f"window({8 * last + 7} downto {8 * first})" for first, last in reversed(lanes)]
+    data = [f"window_bytes({8 * last + 7} downto {8 * first})" for first, last in reversed(lanes)]
     if len(store.beats) > 1:
         data.append(f"{register}({store.bits - 1} downto {store.beat_bits})")
     return [{"piece": piece, "joint": joint} for piece, joint in zip(data, joints(len(data), " &", ";"), strict=True)]
