@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from fusesoc_firm.converter.ports import FieldPort, field_ports, port_width, ros_path, vhdl_type
-from fusesoc_firm.converter.program import Program, Scope, subscriber_program
+from fusesoc_firm.converter.program import Program, Scope, has_bytes, subscriber_program
 from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
 from fusesoc_firm.naming import identifier
 
@@ -37,8 +37,8 @@ _TAKEN = frozenset(
     keep_state long_frame no_fault numbers_t padding_left phase_next short_frame sink_ready step_aligns_to_2
     step_aligns_to_4 step_beat step_closes_text step_count step_done step_has_2 step_has_4 step_has_8 step_is_count
     step_is_fixed step_is_open step_is_padding step_is_rest step_is_stream step_is_text step_last_beat
-    step_last_bytes step_next step_number step_opens_data step_stopped steps_t stream_data stream_keep stream_last stream_valid
-    taken_bytes u_window wanted wanted_any wanted_beyond wanted_shown window_bytes window_count window_last
+    step_last_bytes step_next step_number step_opens_data step_stopped steps_t stream_data stream_keep stream_last
+    stream_valid taken_bytes u_window wanted wanted_any wanted_beyond wanted_shown window_bytes window_count window_last
     window_skip window_take window_take_valid
     """.split()
 )
@@ -79,7 +79,10 @@ class StreamPorts:
 
 @dataclass(frozen=True)
 class ElementPorts:
-    """The ports of an array of messages or strings: `segments` is None where an element comes in one piece."""
+    """The ports of an array of messages or strings: `segments` is None where an element comes in one piece.
+
+    Where elements take no bytes there is the length alone.
+    """
 
     loop: Loop
     name: str
@@ -235,6 +238,8 @@ def _ports(side: MessageSide, nodes: Sequence[Node], width: int, done: set[Path]
                 words = f"{ros_path(node.path)}: {node.ros_type}"
                 if node.count is None:
                     yield MessagePort(ports.length, LENGTH_BITS, f"{words}, its elements")
+                if not has_bytes(node):
+                    continue
                 yield from _ports(side, node.body, width, done)
                 if ports.segments is not None:
                     yield MessagePort(ports.segment_valid, ports.segments, f"{words}, segments of an element")

@@ -285,7 +285,7 @@ class _Builder:
         if node.count is None:
             self._count(node)
         self._open(node)
-        if not node.body:
+        if not has_bytes(node):
             return
         # The segment around a loop that is not used goes on behind it.
         outer = self.scope, self.open_steps, self.is_valued
@@ -398,6 +398,11 @@ def _is_used(step: Step) -> bool:
         case Stream(part=part):
             return part.is_used
     return False
+
+
+def has_bytes(loop: Loop) -> bool:
+    """Whether the elements are gone through: where they take no bytes, only their number is there."""
+    return any(not isinstance(node, Fixed) or node.size for node in loop.body)
 
 
 def comment(step: Step) -> str:

@@ -26,13 +26,14 @@ from fusesoc_firm.converter.program import (
     Open,
     Padding,
     Program,
-    Scope,
     Segment,
     Step,
-    Stream as StreamStep,
     Tail,
     comment,
     subscriber_program,
+)
+from fusesoc_firm.converter.program import (
+    Stream as StreamStep,
 )
 from fusesoc_firm.converter.slices import Slice, slices_of
 from fusesoc_firm.converter.stream import Store, StoreMap, Stream, ranges, stores_of
@@ -235,12 +236,14 @@ class _Subscriber:
             case StreamPorts():
                 return [(part.length, f"std_logic_vector({self._length_register(part.part)})")]
             case ElementPorts():
-                number = self._number(part.loop)
-                pairs = [(part.valid, f"valid_{number}_r"), (part.last, f"last_{number}_r")]
-                if part.segments is not None:
-                    pairs.append((part.segment_valid, f"segment_valid_{number}_r"))
+                pairs = []
                 if part.loop.count is None:
-                    pairs.insert(0, (part.length, f"std_logic_vector({self._length_register(part.loop)})"))
+                    pairs.append((part.length, f"std_logic_vector({self._length_register(part.loop)})"))
+                if part in self._elements:
+                    pairs.append((part.valid, self._register("valid", part.loop)))
+                    pairs.append((part.last, self._register("last", part.loop)))
+                if part.segments is not None:
+                    pairs.append((part.segment_valid, self._register("segment_valid", part.loop)))
                 return pairs
         return []
 
@@ -331,7 +334,7 @@ class _Subscriber:
         return [{"condition": condition} for condition in found]
 
     def _close(self, place: int) -> Configuration:
-        """An element ends with its last bytes; where the part at its end is empty, or an array, in a cycle of its own."""
+        """An element ends with its last bytes; if a part at its end is empty, or an array, in a cycle of its own."""
         step = self.steps[place]
         assert isinstance(step, Close)
         is_joined = isinstance(self.steps[place - 1], Block | StreamStep)
@@ -347,7 +350,7 @@ class _Subscriber:
             match step:
                 case Guard():
                     jumps.append((f"step_r = {place} and left_r = 0", self.program.behind_guard(place)))
-                case Open(part=part) if _is_counted(step) and self.program.behind(place) != place + 1:
+                case Open() if _is_counted(step) and self.program.behind(place) != place + 1:
                     jumps.append((f"step_r = {place} and count_is_zero = '1'", self.program.behind(place)))
                 case Close(loop=loop):
                     closing = f"closing_{self._number(loop)} = '1'"

@@ -27,6 +27,7 @@ Generic = int | str | bool
 
 _CASE = re.compile(r"\bcase\b.*?\bendcase\b", re.DOTALL)
 _DEFAULT = re.compile(r"\bdefault\s*:")
+_CHOICE = re.compile(r"^\s*(\d+)'b[01]+\s*:", re.MULTILINE)
 
 
 class GhdlError(Exception):
@@ -92,7 +93,7 @@ class Library:
             if not found:
                 raise
             return found
-        return [case for case in _CASE.findall(netlist) if not _DEFAULT.search(case)]
+        return [case for case in _CASE.findall(netlist) if not _is_complete(case)]
 
     def replace_by_netlist(self, entity: str, generics: Mapping[str, Generic] | None = None) -> Path:
         """Put the netlist of `entity` in its place in this library and return its file.
@@ -119,6 +120,12 @@ class Library:
         if process.returncode != 0:
             raise GhdlError(process.stdout + process.stderr)
         return process.stdout
+
+
+def _is_complete(case: str) -> bool:
+    """Whether a Verilog `case` says what happens for every value."""
+    choices = _CHOICE.findall(case)
+    return bool(_DEFAULT.search(case)) or (bool(choices) and len(choices) == 2 ** int(choices[0]))
 
 
 def core_files(*cores: str, fileset: str = "rtl") -> list[Path]:

@@ -19,6 +19,7 @@ from typing import Any
 from fusesoc_firm.converter.configuration import subscriber_entity
 from fusesoc_firm.converter.message_ports import message_ports, message_side
 from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.program import has_bytes
 from fusesoc_firm.converter.variable_subscriber import (
     VARIABLE_SUBSCRIBER_TEMPLATE,
     variable_subscriber_configuration,
@@ -86,14 +87,13 @@ class Subscriber:
         lines = result.output.splitlines()
         assert not [line for line in lines if "warning" in line and "@0ms" not in line], result.output
         assert lines[-1].startswith("cycles ")
+        (directory / "cycles.txt").write_text(lines[-1], encoding="ascii")
         return [line.rstrip() for line in lines[:-1] if ":@" not in line]
 
     def events(self, value: Any, payload_length: int) -> list[str]:
         """What must come of a message."""
-        side = message_side(self.frame)
         numbers = [struct.pack(">I", payload_length).hex()]
         streams = list(self._events(self.frame.nodes, value, 0, numbers))
-        del side
         return [*streams, " ".join(["message", *numbers])]
 
     def _events(self, nodes: Sequence[Node], value: Any, depth: int, numbers: list[str]) -> Iterator[str]:
@@ -116,6 +116,8 @@ class Subscriber:
                     elements = list(_member(value, node.path[depth:]))
                     if node.count is None:
                         numbers.append(struct.pack(">I", len(elements)).hex())
+                    if not has_bytes(node):
+                        continue
                     ports = side.element(node)
                     for number, element in enumerate(elements):
                         inner: list[str] = []
@@ -191,7 +193,7 @@ def _scoped_ports(frame: Frame, side: Any) -> tuple[list[str], list[tuple[str, l
                     if node.count is None:
                         found.append(side.element(node).length)
                     fields_of_element = own(node.body)
-                    if node.body:
+                    if has_bytes(node):
                         inner.append((side.element(node).name, fields_of_element))
         return found
 

@@ -51,3 +51,33 @@ AWKWARD: Mapping[RosVersion, Mapping[str, str]] = {
     RosVersion.ROS1: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS1}.items()},
     RosVersion.ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS2}.items()},
 }
+
+_VARIABLE_SHARED = {
+    "Text": "string text\n",
+    "Late": "string[] names\nuint8 flag\nfloat64[] data\nbool last\n",
+    "Pair": "string key\nuint8[] value\n",
+    "Deep": "uint8 a\nMiddle[] middles\nuint16 b\n",
+    "Middle": "float64 x\nPair[] pairs\nuint8[3] y\nstring[2] names\n",
+    "Fixtures": "Pair[2] pairs\nstring[3] names\n",
+    "Tails": "Tail[] tails\nuint32 number\n",
+    "Tail": "uint8 kind\nfloat64[] values\n",
+    "Hollows": "Nothing[] nothings\nuint8[] behind\n",
+    "Nothing": "",
+    "Halves": "int16[] halves\nint64[] longs\nuint32[] words\nbool[] flags\nfloat32[] floats\n",
+    "Clashes": (
+        "uint8[] data\nuint32 data_length\nbool data_axis_tvalid\nPair[] pairs\nbool pairs_valid\nuint8 pairs_ready\n"
+        "string entity\nuint8 step_r\nuint8 window_bytes\nuint8 length_1_r\nuint8 payload_length\nuint8 closing_1\n"
+    ),
+    "Wide": "uint8 first\nfloat64[40] block\nstring name\nCell[3] cells\nuint16 last\n",
+    "Cell": "int8 kind\nuint16[2] pair\n",
+}
+
+_VARIABLE_ROS2 = {
+    "Bounded": "string<=5 name\nuint16[<=3] counts\nstring<=4[<=2] names\nPair[<=2] pairs\nuint8 last\n",
+    "Unicode": "uint8 first\nwstring text\nwstring[] texts\nuint8 last\n",
+}
+
+AWKWARD_VARIABLE: Mapping[RosVersion, Mapping[str, str]] = {
+    RosVersion.ROS1: {f"{PACKAGE}/{name}": text for name, text in _VARIABLE_SHARED.items()},
+    RosVersion.ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_VARIABLE_SHARED, **_VARIABLE_ROS2}.items()},
+}
