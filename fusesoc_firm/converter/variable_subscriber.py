@@ -137,7 +137,7 @@ class _Subscriber:
             ),
         ]
         optional = [
-            ("STEP_IS_COUNT", "Takes a count.", self._places(lambda step: isinstance(step, Count))),
+            ("STEP_IS_COUNT", "Takes a count, or the length.", self._places(lambda step: isinstance(step, Header | Count))),
             ("STEP_IS_PADDING", "Takes padding.", self._places(lambda step: isinstance(step, Padding))),
             ("STEP_ALIGNS_TO_2", "Padding up to a multiple of 2.", aligned[2]),
             ("STEP_ALIGNS_TO_4", "Padding up to a multiple of 4.", aligned[4]),
@@ -170,9 +170,6 @@ class _Subscriber:
         """What a count means: bytes of a stream, and how many elements there is room for."""
         sizes = [size for size in (2, 4, 8) if any(_size(step) == size for step in self.steps)]
         shifts = {2: 1, 4: 2, 8: 3}
-        rooms = [
-            f"shift_right(remaining_r, {shifts[size]}) when STEP_HAS_{size}(step_number) = '1' else" for size in sizes
-        ]
         bytes_ = [
             f"shift_left(count_value, {shifts[size]}) when STEP_HAS_{size}(step_number) = '1' else" for size in sizes
         ]
@@ -183,10 +180,12 @@ class _Subscriber:
         is_whole = width >= 8 * COUNT_BYTES
         word = "window_bytes(31 downto 0)" if is_whole else "window_bytes"
         return {
-            "rooms": _values([*rooms, "remaining_r;"]),
+            "overflow": "".join(
+                f" or (STEP_HAS_{size}(step_number) = '1' and left_r(31 downto {32 - shifts[size]}) /= 0)" for size in sizes
+            ),
             "sizes": _values([*bytes_, "count_value;"]),
             "gaps": [{"mask": mask, "joint": joint} for mask, joint in gaps],
-            "header_word": f"unsigned({word})" + ("" if is_whole else f" & remaining_r(31 downto {width})"),
+            "header_word": f"unsigned({word})" if is_whole else f"(unsigned({word}) & left_r(31 downto {width}))",
             "payload_length_word": word + ("" if is_whole else f" & payload_length_r(31 downto {width})"),
             "count_word": f"unsigned({word})" + ("" if is_whole else f" & left_r(31 downto {width})"),
             "first_phase": -len(self.frame.prefix) % 8,
@@ -287,6 +286,7 @@ class _Subscriber:
             "has_checks": bool(self._checks()),
             "checks": self._checks(),
             "count_checks": self._count_checks(),
+            "large_word": "elsif" if self._count_checks() else "if",
             "closes": [self._close(place) for place in closings],
             "closing_sensitivity": "".join(
                 f", closing_{self._number(loop)}, {self._register('left', loop)}" for loop in self._closed_loops
@@ -331,7 +331,9 @@ class _Subscriber:
                 most = step.part.bound + _terminator(step.part)
                 if most < _LARGEST_NATURAL:
                     found.append(f"step_r = {place} and left_r > {most}")
-        return [{"condition": condition} for condition in found]
+        return [
+            {"word": "elsif" if number else "if", "condition": condition} for number, condition in enumerate(found)
+        ]
 
     def _close(self, place: int) -> Configuration:
         """An element ends with its last bytes; if a part at its end is empty, or an array, in a cycle of its own."""
