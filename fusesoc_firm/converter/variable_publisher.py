@@ -461,7 +461,7 @@ class _Publisher:
             "has_counts": bool(counts),
             "opens_counted": _any_place(area.first for area, part in fixed if _count(part) is None),
             "fixed": [
-                {"place": area.first, "value": f'"{2**bits - count:0{bits}b}"', "count": count}
+                {"depth": depth, "place": area.first, "value": f'"{2**bits - count:0{bits}b}"', "count": count}
                 for area, part in fixed
                 if (count := _count(part)) is not None
             ],
