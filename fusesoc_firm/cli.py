@@ -193,16 +193,13 @@ def _stage(stage: str, name: MessageName, definitions: dict[MessageName, Message
 
 def _converters(stage: str, frame: Any, width: int) -> str:
     """Configuration or VHDL of both converters."""
-    from fusesoc_firm.converter import configuration as converter
+    from fusesoc_firm.converter.sources import publisher_source, subscriber_source
     from fusesoc_firm.render import render
 
-    made = {
-        converter.SUBSCRIBER_TEMPLATE: converter.subscriber_configuration(frame, width),
-        converter.PUBLISHER_TEMPLATE: converter.publisher_configuration(frame, width),
-    }
+    made = subscriber_source(frame, width), publisher_source(frame, width)
     if stage == "config":
-        return "---\n".join(_yaml(configuration) for configuration in made.values())
-    return "\n".join(render(template, configuration) for template, configuration in made.items())
+        return "---\n".join(_yaml(source.configuration) for source in made)
+    return "\n".join(render(source.template, source.configuration) for source in made)
 
 
 def _check_system(arguments: argparse.Namespace) -> None:

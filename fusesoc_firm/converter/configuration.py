@@ -38,7 +38,7 @@ def publisher_entity(frame: Frame) -> str:
 def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
     check_fixed_size(frame)
-    _check_width(width)
+    check_width(width)
     _check_size(frame)
     stream = Stream(width)
     windows = windows_of(frame)
@@ -70,7 +70,7 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
 def publisher_configuration(frame: Frame, width: int) -> Configuration:
     """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
     check_fixed_size(frame)
-    _check_width(width)
+    check_width(width)
     _check_size(frame)
     stream = Stream(width)
     beats = stream.beat(frame.frame_bytes - 1) + 1
@@ -86,7 +86,8 @@ def publisher_configuration(frame: Frame, width: int) -> Configuration:
     }
 
 
-def _check_width(width: int) -> None:
+def check_width(width: int) -> None:
+    """Raise `InputError` for a stream of a width that converters do not have."""
     if width not in WIDTHS:
         fail(f"no converter is made for a stream of {width} bits", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
 

@@ -6,14 +6,8 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from fusesoc_firm.converter.configuration import (
-    PUBLISHER_TEMPLATE,
-    SUBSCRIBER_TEMPLATE,
-    publisher_configuration,
-    publisher_entity,
-    subscriber_configuration,
-    subscriber_entity,
-)
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
@@ -58,22 +52,16 @@ def generate(request: Request) -> GeneratedCore:
 
 def subscriber_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
     """`axis_to_<pkg>_<type>.vhd` of each frame."""
-    return {
-        f"{subscriber_entity(frame)}.vhd": GeneratedFile(
-            render(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width)), VHDL
-        )
-        for frame in frames
-    }
+    return {f"{subscriber_entity(frame)}.vhd": _file(subscriber_source(frame, width)) for frame in frames}
 
 
 def publisher_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
     """`<pkg>_<type>_to_axis.vhd` of each frame."""
-    return {
-        f"{publisher_entity(frame)}.vhd": GeneratedFile(
-            render(PUBLISHER_TEMPLATE, publisher_configuration(frame, width)), VHDL
-        )
-        for frame in frames
-    }
+    return {f"{publisher_entity(frame)}.vhd": _file(publisher_source(frame, width)) for frame in frames}
+
+
+def _file(source: ConverterSource) -> GeneratedFile:
+    return GeneratedFile(render(source.template, source.configuration), VHDL)
 
 
 def _message(request: Request) -> tuple[MessageLibrary, MessageName]:

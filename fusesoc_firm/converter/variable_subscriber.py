@@ -137,7 +137,11 @@ class _Subscriber:
             ),
         ]
         optional = [
-            ("STEP_IS_COUNT", "Takes a count, or the length.", self._places(lambda step: isinstance(step, Header | Count))),
+            (
+                "STEP_IS_COUNT",
+                "Takes a count, or the length.",
+                self._places(lambda step: isinstance(step, Header | Count)),
+            ),
             ("STEP_IS_PADDING", "Takes padding.", self._places(lambda step: isinstance(step, Padding))),
             ("STEP_ALIGNS_TO_2", "Padding up to a multiple of 2.", aligned[2]),
             ("STEP_ALIGNS_TO_4", "Padding up to a multiple of 4.", aligned[4]),
@@ -181,7 +185,8 @@ class _Subscriber:
         word = "window_bytes(31 downto 0)" if is_whole else "window_bytes"
         return {
             "overflow": "".join(
-                f" or (STEP_HAS_{size}(step_number) = '1' and left_r(31 downto {32 - shifts[size]}) /= 0)" for size in sizes
+                f" or (STEP_HAS_{size}(step_number) = '1' and left_r(31 downto {32 - shifts[size]}) /= 0)"
+                for size in sizes
             ),
             "sizes": _values([*bytes_, "count_value;"]),
             "gaps": [{"mask": mask, "joint": joint} for mask, joint in gaps],
@@ -331,9 +336,7 @@ class _Subscriber:
                 most = step.part.bound + _terminator(step.part)
                 if most < _LARGEST_NATURAL:
                     found.append(f"step_r = {place} and left_r > {most}")
-        return [
-            {"word": "elsif" if number else "if", "condition": condition} for number, condition in enumerate(found)
-        ]
+        return [{"word": "elsif" if number else "if", "condition": condition} for number, condition in enumerate(found)]
 
     def _close(self, place: int) -> Configuration:
         """An element ends with its last bytes; if a part at its end is empty, or an array, in a cycle of its own."""

@@ -209,8 +209,8 @@ def test_a_fault_in_a_message_is_shown_in_its_file(tmp_path: Path, capsys: Captu
         (["message", "show", "geometry_msgs/Quaterion"], "did you mean 'geometry_msgs/Quaternion'?"),
         (["message", "show", "Quaternion"], "Quaternion"),
         (
-            ["message", "show", "sensor_msgs/Image", "--stage", "vhdl"],
-            "field 'data' of type 'uint8[]' has no fixed size",
+            ["message", "show", "sensor_msgs/Image", "--stage", "vhdl", "--width", "24"],
+            "no converter is made for a stream of 24 bits",
         ),
         (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9 bits"),
         (["message", "list", "--path", "no/such/folder"], "no/such/folder"),

@@ -1,0 +1,96 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Makes a frame exactly as long as its header announces: bytes beyond that are dropped, and a frame that ends before is
+-- filled up. It stands in front of firm_axis_pack and has that one's ports on both sides; all paths through it are
+-- combinational. One adder does both: it counts up to zero, so that its carry tells when less is left than is offered.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+
+entity firm_axis_trim is
+  generic (
+    WIDTH : integer := 8;
+    -- So many bytes of filling are no fault.
+    SLACK : natural := 0);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- The bytes that shall follow the header. `header` says that the bytes offered belong to it: they pass uncounted,
+    -- and `length` is taken with them.
+    length : in std_logic_vector(31 downto 0);
+    header : in std_logic;
+
+    -- As at firm_axis_pack, but `last` comes without bytes: the frame ends in front of it. What stands on `data` then
+    -- fills up a frame that is too short, and shall be zeros.
+    data  : in  std_logic_vector(WIDTH-1 downto 0);
+    count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
+    last  : in  std_logic;
+    valid : in  std_logic;
+    ready : out std_logic;
+
+    -- Bytes are offered that the frame has no room for; it ended, and has room for more than SLACK bytes.
+    is_cut    : out std_logic;
+    is_filled : out std_logic;
+
+    m_data  : out std_logic_vector(WIDTH-1 downto 0);
+    m_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
+    m_last  : out std_logic;
+    m_valid : out std_logic;
+    m_ready : in  std_logic);
+end entity firm_axis_trim;
+
+architecture rtl of firm_axis_trim is
+
+  constant LANES      : natural  := WIDTH/8;
+  constant COUNT_BITS : positive := index_bits(LANES+1);
+
+  -- Minus one more than the bytes left: all ones is none.
+  signal left_r : unsigned(31 downto 0) := (others => '1');
+
+  signal wanted  : unsigned(COUNT_BITS-1 downto 0);
+  signal sum     : unsigned(32 downto 0);
+  signal exceeds : std_logic;  -- less is left than is wanted
+  signal lacking : unsigned(32 downto 0);
+
+begin
+
+  assert is_stream_width(WIDTH)
+    report "firm_axis_trim: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
+
+  wanted  <= to_unsigned(LANES, COUNT_BITS) when last = '1' else unsigned(count);
+  sum     <= ('0' & left_r) + wanted;
+  exceeds <= sum(32);
+
+  pass : process (header, exceeds, wanted, left_r)
+  begin
+    m_count <= std_logic_vector(wanted);
+    if header = '0' and exceeds = '1' then
+      m_count <= std_logic_vector(not left_r(COUNT_BITS-1 downto 0));
+    end if;
+  end process pass;
+
+  m_data  <= data;
+  m_last  <= last and exceeds;
+  m_valid <= valid;
+  ready   <= m_ready and (exceeds or not last);
+
+  lacking   <= ('0' & left_r) + (SLACK + 1);
+  is_cut    <= valid and exceeds and not last and not header;
+  is_filled <= valid and last and not lacking(32);
+
+  count_down : process (clk)
+  begin
+    if rising_edge(clk) and valid = '1' and m_ready = '1' then
+      left_r <= sum(31 downto 0);
+      if header = '1' then
+        left_r <= not unsigned(length);
+      elsif exceeds = '1' then
+        left_r <= (others => '1');
+      end if;
+    end if;
+  end process count_down;
+
+end architecture rtl;

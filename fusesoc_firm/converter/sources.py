@@ -1,0 +1,44 @@
+"""A Frame's converters as template and configuration: those of fixed size, or those of any."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fusesoc_firm.converter.configuration import (
+    PUBLISHER_TEMPLATE,
+    SUBSCRIBER_TEMPLATE,
+    Configuration,
+    check_width,
+    publisher_configuration,
+    publisher_entity,
+    subscriber_configuration,
+    subscriber_entity,
+)
+from fusesoc_firm.converter.variable_publisher import VARIABLE_PUBLISHER_TEMPLATE, variable_publisher_configuration
+from fusesoc_firm.converter.variable_subscriber import VARIABLE_SUBSCRIBER_TEMPLATE, variable_subscriber_configuration
+from fusesoc_firm.frame.model import Frame
+
+
+class ConverterSource(NamedTuple):
+    """What a converter's text is rendered from."""
+
+    template: str
+    configuration: Configuration
+
+
+def subscriber_source(frame: Frame, width: int) -> ConverterSource:
+    """`axis_to_<pkg>_<type>` for a stream of `width` bits. Raises `InputError` for what no converter is made for."""
+    check_width(width)
+    if frame.is_fixed_size:
+        return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width))
+    configuration = variable_subscriber_configuration(frame, width, subscriber_entity(frame))
+    return ConverterSource(VARIABLE_SUBSCRIBER_TEMPLATE, configuration)
+
+
+def publisher_source(frame: Frame, width: int) -> ConverterSource:
+    """`<pkg>_<type>_to_axis` for a stream of `width` bits. Raises `InputError` for what no converter is made for."""
+    check_width(width)
+    if frame.is_fixed_size:
+        return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width))
+    configuration = variable_publisher_configuration(frame, width, publisher_entity(frame))
+    return ConverterSource(VARIABLE_PUBLISHER_TEMPLATE, configuration)
