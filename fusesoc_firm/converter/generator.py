@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from fusesoc_firm.converter.configuration import (
@@ -14,13 +15,18 @@ from fusesoc_firm.converter.configuration import (
     subscriber_configuration,
     subscriber_entity,
 )
+from fusesoc_firm.converter.constants import (
+    CONSTANTS_TEMPLATE,
+    constants_configuration,
+    constants_package,
+)
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.message.signature import signature
+from fusesoc_firm.message.signature import Definitions, signature
 from fusesoc_firm.render import render
 
 VHDL = "vhdlSource-93"
@@ -48,12 +54,23 @@ def generate(request: Request) -> GeneratedCore:
     direction, width = request.parameters["direction"], request.parameters["width"]
     assert isinstance(width, int)
     directions = ("subscriber", "publisher") if direction == "both" else (direction,)
-    files: dict[str, GeneratedFile] = {}
+    files = constants_files([(name, definitions)])
     if "subscriber" in directions:
         files |= subscriber_files([frame], width)
     if "publisher" in directions:
         files |= publisher_files([frame], width)
     return GeneratedCore(f"Converters of {name} (ROS {int(library.ros)}, {signature(name, definitions)})", files)
+
+
+def constants_files(messages: Sequence[tuple[MessageName, Definitions]]) -> dict[str, GeneratedFile]:
+    """The package of each message, of which none comes twice; the definitions are of it and all within it."""
+    counts = Counter(name for name, _ in messages)
+    files = {}
+    for name, definitions in messages:
+        package = constants_package(name, definitions[name].ros if counts[name] > 1 else None)
+        text = render(CONSTANTS_TEMPLATE, constants_configuration(name, definitions, package))
+        files[f"{package}.vhd"] = GeneratedFile(text, VHDL)
+    return files
 
 
 def subscriber_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
