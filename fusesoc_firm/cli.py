@@ -188,15 +188,18 @@ def _stage(stage: str, name: MessageName, definitions: dict[MessageName, Message
     frame = frame_of(name, definitions)
     if stage == "tree":
         return tree.text(tree.rows(name, definitions, frame))
-    return _yaml(description(frame)) if stage == "frame" else _converters(stage, frame, width)
+    return _yaml(description(frame)) if stage == "frame" else _converters(stage, frame, definitions, width)
 
 
-def _converters(stage: str, frame: Any, width: int) -> str:
-    """Configuration or VHDL of both converters."""
+def _converters(stage: str, frame: Any, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
+    """Configuration or VHDL of the message's package and of both converters."""
     from fusesoc_firm.converter import configuration as converter
+    from fusesoc_firm.converter import constants
     from fusesoc_firm.render import render
 
+    package = constants.constants_package(frame.message)
     made = {
+        constants.CONSTANTS_TEMPLATE: constants.constants_configuration(frame.message, definitions, package),
         converter.SUBSCRIBER_TEMPLATE: converter.subscriber_configuration(frame, width),
         converter.PUBLISHER_TEMPLATE: converter.publisher_configuration(frame, width),
     }

@@ -1,7 +1,7 @@
 """Message -> configuration of its VHDL package: the signature, and the constants as converters' ports have such values.
 
-A message of ROS has no other enumerations than its constants. Those of the messages within it are in the package as
-well, under the path of the field, as the ports are: whoever reads the port `status_level` compares it with `STATUS_OK`.
+A message of ROS has no other enumerations than its constants. Those of the messages within it are in the package too,
+behind their message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
 """
 
 from __future__ import annotations
@@ -32,19 +32,21 @@ _QUOTE = '"'
 
 @dataclass(frozen=True)
 class _Placed:
-    """A constant, and the names of the fields from the package's message to the one that defines it."""
+    """A constant and the message within the package's one that defines it, or None if that one does."""
 
-    path: tuple[str, ...]
+    message: MessageName | None
     constant: Constant
 
     @property
     def words(self) -> tuple[str, ...]:
-        return (*self.path, self.constant.name)
+        """What its name in VHDL is made of."""
+        return (self.constant.name,) if self.message is None else (self.message.name, self.constant.name)
 
     @property
     def comment(self) -> str:
-        """Its type and its name in ROS, and the value of a number: `uint8 status.OK=0`."""
-        named = f"{self.constant.type} {'.'.join(self.words)}"
+        """Its type and its name in ROS, and the value of a number: `uint8 sensor_msgs/PointField.INT8=1`."""
+        owner = "" if self.message is None else f"{self.message}."
+        named = f"{self.constant.type} {owner}{self.constant.name}"
         return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
 
 
@@ -55,7 +57,7 @@ def constants_package(name: MessageName, ros: RosVersion | None = None) -> str:
 
 def constants_configuration(name: MessageName, definitions: Definitions, package: str) -> dict[str, Any]:
     """The configuration of a message's package; `definitions` hold the message and all within it."""
-    placed = list(_placed(name, definitions, ()))
+    placed = list(_placed(name, definitions))
     texts = [item for item in placed if isinstance(item.constant.type, StringType)]
     numbers = [item for item in placed if not isinstance(item.constant.type, StringType)]
     parts = [(*item.words, part) for item in texts for part in ("length", "bytes")]
@@ -79,13 +81,23 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
     }
 
 
-def _placed(name: MessageName, definitions: Definitions, path: tuple[str, ...]) -> Iterator[_Placed]:
-    """The constants of a message, then of those within it, in the order of the definitions."""
-    for constant in definitions[name].constants:
-        yield _Placed(path, constant)
+def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
+    """The constants of a message, then of each one within it, once, in the order of the fields."""
+    messages: list[MessageName] = []
+    _collect(name, definitions, messages)
+    for message in messages:
+        for constant in definitions[message].constants:
+            yield _Placed(None if message == name else message, constant)
+
+
+def _collect(name: MessageName, definitions: Definitions, found: list[MessageName]) -> None:
+    """Add a message and all within it that were not found yet."""
+    if name in found:
+        return
+    found.append(name)
     for field in definitions[name].fields:
         if nested := nested_message(field.type):
-            yield from _placed(nested, definitions, (*path, field.name))
+            _collect(nested, definitions, found)
 
 
 def _value(item: _Placed, name: str, ros: RosVersion) -> dict[str, Any]:
