@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.system.grammar import Key, Section, keys_of
 from fusesoc_firm.system.specification import Specification
+from fusesoc_firm.yaml_sections import Key, Section, keys_of
 from tests.unit.system.systems import read
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "specification.md"
