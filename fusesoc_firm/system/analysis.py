@@ -155,8 +155,7 @@ class _Analysis:
             library.get(name, message.source)
             frame = frame_of(name, library.closure(name))
         except InputError as error:
-            for fault in error.diagnostics:
-                self.faults.error(fault.message, fault.source or message.source, fault.hint)
+            self.faults.take(error, message.source)
             return None
         try:
             check_fixed_size(frame)
