@@ -63,8 +63,8 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
         if name not in table:
             faults.error(f"unknown parameter '{name}'", origin.key(name), nearest(name, table))
         elif replacing.get(name) in given:
-            message = f"parameter '{name}' does not go with '{replacing[name]}', which stands in its place"
-            faults.error(message, origin.key(name))
+            hint = f"'{replacing[name]}' stands in its place"
+            faults.error(f"parameter '{name}' does not go with '{replacing[name]}'", origin.key(name), hint)
     for name, parameter in table.items():
         if name not in given:
             if parameter.is_required and replacing.get(name) not in given:

@@ -102,10 +102,9 @@ def _wanted(
     except InputError as error:
         faults.take(error, entry.name.source)
         return None
-    names = {"subscriber": entry.subscribers, "publisher": entry.publishers}
-    return Wanted(
-        frame_of(message, definitions), definitions, {direction: given for direction, given in names.items() if given}
-    )
+    given = {"subscriber": entry.subscribers, "publisher": entry.publishers}
+    interfaces = {direction: tuple(map(str, names)) for direction, names in given.items() if names}
+    return Wanted(frame_of(message, definitions), definitions, interfaces)
 
 
 def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
