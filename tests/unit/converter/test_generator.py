@@ -186,6 +186,21 @@ def test_a_message_in_both_versions_one_each_way(demo: Path) -> None:
     assert stems(core)[4:] == ["In_1", "Out_2"]
 
 
+def test_packages_are_namespaces(demo: Path) -> None:
+    """Messages of one name in two packages stand side by side."""
+    (demo / "other_msgs" / "msg").mkdir(parents=True)
+    (demo / "other_msgs" / "msg" / "Grip.msg").write_text("uint64 width\n")
+    entries = [
+        {"type": "ROS", "name": f"{package}/Grip", "subscribers": f"AXIS2{package[:4]}"}
+        for package in ("demo_msgs", "other_msgs")
+    ]
+    core = made(demo, yaml.safe_dump({"project": {"name": "two"}, "messages": entries}))
+    assert " closed " in str(core.files["axis_to_demo_msgs_grip.vhd"].content)
+    assert "width            : out std_logic_vector(63 downto 0)" in str(
+        core.files["axis_to_other_msgs_grip.vhd"].content
+    )
+
+
 def test_a_file_that_is_not_there(demo: Path) -> None:
     with pytest.raises(InputError, match=r"cannot read .*robot\.yaml: No such file"):
         inputs(request(demo, config="robot.yaml"))
