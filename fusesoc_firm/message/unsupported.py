@@ -72,6 +72,12 @@ FEATURES = (
         "write 'string type' and 'uint8[] data'",
     ),
     _feature(
+        "inherited fields",
+        "extends inherits",
+        (r"(?:extends|inherits)(?=\s+\w+/\w)",),
+        "hold the base in a field, such as 'Base base'",
+    ),
+    _feature(
         "enum types",
         "enum",
         (_DECLARATION.format("enum"),),
