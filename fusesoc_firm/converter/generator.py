@@ -21,7 +21,7 @@ from fusesoc_firm.converter.constants import (
     constants_package,
 )
 from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_configuration
-from fusesoc_firm.converter.order import Order, order_of_config, order_of_message
+from fusesoc_firm.converter.order import ENTITIES, Order, order_of_config, order_of_message
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
@@ -53,9 +53,10 @@ def generate(request: Request) -> GeneratedCore:
     for wanted in order.messages:
         for direction, files_of in (("subscriber", subscriber_files), ("publisher", publisher_files)):
             if direction in wanted.interfaces:
-                converter = files_of([wanted.frame], order.width)
-                files |= converter
-                interfaces |= _interface_files(wanted.interfaces[direction], converter, wanted.frame)
+                files |= files_of([wanted.frame], order.width)
+                converter = ENTITIES[direction](wanted.frame)
+                vhdl = str(files[f"{converter}.vhd"].content)
+                interfaces |= _interface_files(wanted.interfaces[direction], converter, vhdl, wanted.frame)
     return GeneratedCore(f"Converters of {order.title}", files | interfaces)
 
 
@@ -100,16 +101,13 @@ def _order(request: Request) -> Order:
     return order_of_message(str(request.parameters["message"]), str(request.parameters["direction"]), width, library)
 
 
-def _interface_files(
-    names: Sequence[str], converter: Mapping[str, GeneratedFile], frame: Frame
-) -> dict[str, GeneratedFile]:
-    """`<name>.vhd` of each name of a converter that is not its own."""
-    ((path, file),) = converter.items()
-    entity, message = path.removesuffix(".vhd"), f"{frame.message} (ROS {int(frame.ros)})"
+def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:
+    """`<name>.vhd` of each name of a converter, whose text is `vhdl`, that is not its own."""
+    message = f"{frame.message} (ROS {int(frame.ros)})"
     return {
         f"{name}.vhd": GeneratedFile(
-            render(INTERFACE_TEMPLATE, interface_configuration(name, entity, str(file.content), message)), VHDL
+            render(INTERFACE_TEMPLATE, interface_configuration(name, converter, vhdl, message)), VHDL
         )
         for name in names
-        if name.lower() != entity
+        if name.lower() != converter
     }
