@@ -188,15 +188,22 @@ def _stage(stage: str, name: MessageName, definitions: dict[MessageName, Message
     frame = frame_of(name, definitions)
     if stage == "tree":
         return tree.text(tree.rows(name, definitions, frame))
-    return _yaml(description(frame)) if stage == "frame" else _converters(stage, frame, width)
+    return _yaml(description(frame)) if stage == "frame" else _converters(stage, frame, definitions, width)
 
 
-def _converters(stage: str, frame: Any, width: int) -> str:
-    """Configuration or VHDL of both converters."""
-    from fusesoc_firm.converter.sources import publisher_source, subscriber_source
+def _converters(stage: str, frame: Any, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
+    """Configuration or VHDL of the message's package and of both converters."""
+    from fusesoc_firm.converter import constants
+    from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
     from fusesoc_firm.render import render
 
-    made = subscriber_source(frame, width), publisher_source(frame, width)
+    package = constants.constants_package(frame.message)
+    configuration = constants.constants_configuration(frame.message, definitions, package)
+    made = (
+        ConverterSource(constants.CONSTANTS_TEMPLATE, configuration),
+        subscriber_source(frame, width),
+        publisher_source(frame, width),
+    )
     if stage == "config":
         return "---\n".join(_yaml(source.configuration) for source in made)
     return "\n".join(render(source.template, source.configuration) for source in made)

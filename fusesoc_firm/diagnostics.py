@@ -75,6 +75,11 @@ class Diagnostics:
         if diagnostic not in self.found:
             self.found.append(diagnostic)
 
+    def take(self, error: InputError, source: SourceRef | None) -> None:
+        """Note the faults of another reader; those without a place belong to what asked for it, at `source`."""
+        for fault in error.diagnostics:
+            self.error(fault.message, fault.source or source, fault.hint)
+
     def raise_if_any(self) -> None:
         """Raise `InputError` with every fault, in the order of files, lines and columns."""
         if self.found:

@@ -77,10 +77,21 @@ _DISTRO = Parameter("distro", "str", "the ROS distribution whose standard messag
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
         (
-            Parameter("message", "str", "the message's type, such as geometry_msgs/Quaternion", is_required=True),
+            Parameter(
+                "message",
+                "str",
+                "the type of a message, service or action, such as geometry_msgs/Quaternion",
+                is_required=True,
+            ),
             Parameter("ros", "int", "the ROS version whose wire format is spoken", is_required=True, choices=(1, 2)),
             Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
             Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter(
+                "config",
+                "str",
+                "a file that lists messages and the names of their interfaces, relative to the core",
+                replaces=("message", "ros", "direction", "width"),
+            ),
             _PATHS,
             _DISTRO,
         ),

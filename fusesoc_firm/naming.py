@@ -7,10 +7,10 @@ generated code says in a comment which ROS name a port stands for, so the mappin
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 
 # IEEE 1076-2008, IEEE 1364-2005 and IEEE 1800-2017: a name must be usable whatever target translates it.
-_VHDL_KEYWORDS = frozenset(
+VHDL_KEYWORDS = frozenset(
     """abs access after alias all and architecture array assert assume assume_guarantee attribute begin block body
     buffer bus case component configuration constant context cover default disconnect downto else elsif end entity
     exit fairness file for force function generate generic group guarded if impure in inertial inout is label library
@@ -38,21 +38,36 @@ _VERILOG_KEYWORDS = frozenset(
     tri tri0 tri1 triand trior trireg type typedef union unique unique0 unsigned until until_with untyped use uwire var
     vectored virtual void wait wait_order wand weak weak0 weak1 while wildcard wire with within wor xnor xor""".split()
 )
-KEYWORDS = _VHDL_KEYWORDS | _VERILOG_KEYWORDS
+KEYWORDS = VHDL_KEYWORDS | _VERILOG_KEYWORDS
+
+# What std.standard, std_logic_1164 and numeric_std declare, and the libraries: a constant of such a name in a package
+# that is used as a whole would hide both, so that `severity error` no longer compiled.
+VHDL_PREDEFINED = frozenset(
+    """ack bel bit bit_vector boolean boolean_vector bs can character cr dc1 dc2 dc3 dc4 del delay_length dle em enq eot
+    error esc etb etx failure false ff file_open_kind file_open_status firm foreign fs fsp gs gsp hr ht ieee integer
+    integer_vector lf maximum min minimum mode_error ms nak name_error natural note now ns nul numeric_std open_ok
+    positive ps read_mode real real_vector rs rsp sec severity_level si so soh standard status_error std std_logic
+    std_logic_1164 std_logic_vector std_ulogic std_ulogic_vector string stx sub syn time time_vector true us usp ux01
+    ux01z vt warning work write_mode append_mode x01 x01z resolved falling_edge rising_edge is_x to_bit to_bitvector
+    to_bstring to_hstring to_ostring to_stdlogicvector to_stdulogic to_stdulogicvector to_string to_01 to_integer
+    to_signed to_unsigned to_ux01 to_x01 to_x01z find_leftmost find_rightmost resize rotate_left rotate_right
+    shift_left shift_right signed std_match unresolved_signed unresolved_unsigned unsigned""".split()
+)
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
 _UNDERSCORES = re.compile(r"_{2,}")
 
 
-def identifier(*parts: str) -> str:
+def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "field") -> str:
     """One legal identifier of the parts joined with `_`.
 
-    It has no `__`, no `_` at its ends and no digit in front, and is no keyword of VHDL or Verilog.
+    It has no `__`, no `_` at its ends and no digit in front. A word of `avoid` (in lower case) gets the suffix; these
+    are the keywords of VHDL and Verilog unless others are given.
     """
     joined = _UNDERSCORES.sub("_", _ILLEGAL.sub("_", "_".join(parts))).strip("_")
     if not joined or joined[0].isdigit():
         joined = f"n{joined}"
-    return f"{joined}_field" if joined.lower() in KEYWORDS else joined
+    return f"{joined}_{suffix}" if joined.lower() in avoid else joined
 
 
 def distinct_identifiers(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
@@ -61,10 +76,22 @@ def distinct_identifiers(names: Iterable[Sequence[str]], reserved: Iterable[str]
     VHDL does not tell `Stamp` from `stamp`; ROS does. A clash, with an earlier name or with a port of the
     entity, is solved by the first free of `_2`, `_3`, ...
     """
+    return _distinct((identifier(*name) for name in names), reserved)
+
+
+def distinct_constants(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
+    """As `distinct_identifiers`, for constants of a VHDL package: in capitals, and none is a name that VHDL predefines.
+
+    `STATUS_OK` stays; `ERROR` and `IN` become `ERROR_VALUE` and `IN_VALUE`.
+    """
+    avoided = VHDL_KEYWORDS | VHDL_PREDEFINED
+    return _distinct((identifier(*name, avoid=avoided, suffix="value").upper() for name in names), reserved)
+
+
+def _distinct(bases: Iterable[str], reserved: Iterable[str]) -> list[str]:
     taken = {word.lower() for word in reserved}
     chosen = []
-    for name in names:
-        base = identifier(*name)
+    for base in bases:
         candidate, number = base, 2
         while candidate.lower() in taken:
             candidate, number = f"{base}_{number}", number + 1

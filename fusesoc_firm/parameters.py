@@ -24,7 +24,8 @@ _TYPES: dict[str, tuple[type, str]] = {
 class Parameter:
     """A parameter: `type` and `meaning` are words of the generator's usage text, `bounds` its least and greatest value.
 
-    One that is neither given nor required has its `default`.
+    One that is neither given nor required has its `default`. It may say what others would (`replaces`): these are then
+    not required, and not allowed beside it.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Parameter:
     is_required: bool = False
     choices: tuple[str | int, ...] = ()
     bounds: tuple[int, int] | None = None
+    replaces: tuple[str, ...] = ()
 
     def usage(self) -> str:
         """`name (type): text`, as the generator core lists it."""
@@ -42,6 +44,8 @@ class Parameter:
             facts.append(" | ".join(map(str, self.choices)))
         if self.bounds:
             facts.append(f"{self.bounds[0]} to {self.bounds[1]}")
+        if self.replaces:
+            facts.append(f"in place of {', '.join(self.replaces)}")
         if self.is_required:
             facts.append("required")
         elif self.default is not None:
@@ -53,14 +57,19 @@ class Parameter:
 def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origin: RequestingCore) -> dict[str, Plain]:
     """Every known parameter with the value given or its default. Raises `InputError` with all faults."""
     table = {parameter.name: parameter for parameter in known}
+    replacing = {name: parameter.name for parameter in table.values() for name in parameter.replaces}
     faults = Diagnostics()
     for name in given:
         if name not in table:
             faults.error(f"unknown parameter '{name}'", origin.key(name), nearest(name, table))
+        elif replacing.get(name) in given:
+            hint = f"'{replacing[name]}' stands in its place"
+            faults.error(f"parameter '{name}' does not go with '{replacing[name]}'", origin.key(name), hint)
     for name, parameter in table.items():
         if name not in given:
-            if parameter.is_required:
-                faults.error(f"parameter '{name}' is missing; it is {parameter.meaning}", origin.instance())
+            if parameter.is_required and replacing.get(name) not in given:
+                hint = f"or give '{replacing[name]}' in its place" if name in replacing else ""
+                faults.error(f"parameter '{name}' is missing; it is {parameter.meaning}", origin.instance(), hint)
         elif fault := _fault(parameter, given[name]):
             faults.error(f"parameter '{name}' is {given[name]!r}, but must be {fault}", origin.value(name))
     faults.raise_if_any()

@@ -15,7 +15,9 @@ _MESSAGE = _WORDS | {"message"}
 _FRAME = _MESSAGE | {"frame"}
 # What every stage that makes files may use: it knows no stage.
 _WRITING = {"generation", "render"}
-_CONVERTER = _FRAME | _WRITING | {"converter", "yaml_text"}
+# What every stage that reads a file of the user may use.
+_READING = {"yaml_text", "yaml_sections"}
+_CONVERTER = _FRAME | _WRITING | _READING | {"converter"}
 _SYSTEM = _CONVERTER | {"system"}
 
 # Each room, and the rooms that it may import from beside itself.
@@ -24,7 +26,7 @@ ALLOWED: dict[str, set[str]] = {
     "naming": set(),
     "message": _WORDS,
     "frame": _MESSAGE,
-    "converter": _FRAME | _WRITING,
+    "converter": _FRAME | _WRITING | _READING,
     "system": _CONVERTER,
     "scheduling": _SYSTEM,
     "host": _SYSTEM,
@@ -33,6 +35,7 @@ ALLOWED: dict[str, set[str]] = {
     "store": set(),
     "library_path": set(),
     "yaml_text": {"diagnostics"},
+    "yaml_sections": {"diagnostics", "yaml_text"},
     "generation": set(),
     "requesting_core": {"diagnostics", "yaml_text"},
     "parameters": {"diagnostics", "generation", "requesting_core"},

@@ -1,20 +1,26 @@
-"""The generator `firm`: the converters of one message as a core."""
+"""The generator `firm`: the converters of messages, and the packages of their constants, as a core."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.constants import (
+    CONSTANTS_TEMPLATE,
+    constants_configuration,
+    constants_package,
+)
+from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_configuration
+from fusesoc_firm.converter.order import ENTITIES, Order, order_of_config, order_of_message
 from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
-from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.message.signature import signature
+from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.render import render
 
 VHDL = "vhdlSource-93"
@@ -29,25 +35,34 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
 
 
 def inputs(request: Request) -> list[Path]:
-    """The files that hold the message and those below it; none for a definition of a type store."""
-    library, name = _message(request)
-    return library.files(library.closure(name))
+    """The files that say what is wanted and that hold the definitions; none for those of a type store."""
+    return list(_order(request).files)
 
 
 def generate(request: Request) -> GeneratedCore:
-    """The converters in the direction that the request names. Raises `InputError`."""
-    library, name = _message(request)
-    definitions = library.closure(name)
-    frame = frame_of(name, definitions)
-    direction, width = request.parameters["direction"], request.parameters["width"]
-    assert isinstance(width, int)
-    directions = ("subscriber", "publisher") if direction == "both" else (direction,)
-    files: dict[str, GeneratedFile] = {}
-    if "subscriber" in directions:
-        files |= subscriber_files([frame], width)
-    if "publisher" in directions:
-        files |= publisher_files([frame], width)
-    return GeneratedCore(f"Converters of {name} (ROS {int(library.ros)}, {signature(name, definitions)})", files)
+    """What the request asks for, in the order in which a tool reads it. Raises `InputError`."""
+    order = _order(request)
+    files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages])
+    interfaces: dict[str, GeneratedFile] = {}
+    for wanted in order.messages:
+        for direction, files_of in (("subscriber", subscriber_files), ("publisher", publisher_files)):
+            if direction in wanted.interfaces:
+                files |= files_of([wanted.frame], order.width)
+                converter = ENTITIES[direction](wanted.frame)
+                vhdl = str(files[f"{converter}.vhd"].content)
+                interfaces |= _interface_files(wanted.interfaces[direction], converter, vhdl, wanted.frame)
+    return GeneratedCore(f"Converters of {order.title}", files | interfaces)
+
+
+def constants_files(messages: Sequence[tuple[MessageName, Definitions]]) -> dict[str, GeneratedFile]:
+    """The package of each message, of which none comes twice; the definitions are of it and all within it."""
+    counts = Counter(name for name, _ in messages)
+    files = {}
+    for name, definitions in messages:
+        package = constants_package(name, definitions[name].ros if counts[name] > 1 else None)
+        text = render(CONSTANTS_TEMPLATE, constants_configuration(name, definitions, package))
+        files[f"{package}.vhd"] = GeneratedFile(text, VHDL)
+    return files
 
 
 def subscriber_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
@@ -64,7 +79,23 @@ def _file(source: ConverterSource) -> GeneratedFile:
     return GeneratedFile(render(source.template, source.configuration), VHDL)
 
 
-def _message(request: Request) -> tuple[MessageLibrary, MessageName]:
-    ros = request.parameters["ros"]
-    assert isinstance(ros, int)
-    return MessageLibrary(RosVersion(ros), *library_sources(request)), parse_name(str(request.parameters["message"]))
+def _order(request: Request) -> Order:
+    """What the request asks for, be it a message or what a configuration file lists."""
+    config, ros, width = (request.parameters.get(name) for name in ("config", "ros", "width"))
+    if config is not None:
+        return order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
+    assert isinstance(ros, int) and isinstance(width, int)
+    library = MessageLibrary(RosVersion(ros), *library_sources(request))
+    return order_of_message(str(request.parameters["message"]), str(request.parameters["direction"]), width, library)
+
+
+def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:
+    """`<name>.vhd` of each name of a converter, whose text is `vhdl`, that is not its own."""
+    message = f"{frame.message} (ROS {int(frame.ros)})"
+    return {
+        f"{name}.vhd": GeneratedFile(
+            render(INTERFACE_TEMPLATE, interface_configuration(name, converter, vhdl, message)), VHDL
+        )
+        for name in names
+        if name.lower() != converter
+    }

@@ -64,6 +64,12 @@ class Interface:
         return self._sections + tuple(self._suffixed(suffix) for suffix in self._wrappers)
 
     @property
+    def exchanged(self) -> tuple[MessageName, ...]:
+        """Those that the two ends exchange: all but the events, which ROS 2 itself publishes about a service."""
+        events = {self._suffixed(suffix) for suffix in (*_ROS2_SERVICE_EVENT, *_ROS2_ACTION_EVENTS)}
+        return tuple(name for name in self.messages if self.ros is RosVersion.ROS1 or name not in events)
+
+    @property
     def has_signature(self) -> bool:
         """Whether its version of ROS gives it one: ROS 2 knows no hashes before events."""
         return self.ros is RosVersion.ROS1 or self.has_events

@@ -25,6 +25,7 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.parser import parse_message
 from fusesoc_firm.message.stores import DistributionStore, distributions
+from fusesoc_firm.message.unsupported import unsupported_word
 
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
@@ -191,6 +192,8 @@ class MessageLibrary:
         if interface := self.interface(name):
             return f"it is a {_WORDS[interface.kind]}; its messages are {', '.join(map(str, interface.messages))}"
         places = ", ".join([*(str(folder) for folder in self._folders), self._store.title])
+        if feature := unsupported_word(name.name):
+            return f"looked in: {places}; {feature.fault}: {feature.hint}"
         nearest = self._nearest(name)
         return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}"
 

@@ -19,6 +19,10 @@ class RosVersion(IntEnum):
     ROS2 = 2
 
 
+# What the files of users call a version; ROS was once all there was.
+MIDDLEWARES = {"ROS": RosVersion.ROS1, "ROS1": RosVersion.ROS1, "ROS2": RosVersion.ROS2}
+
+
 class InterfaceKind(StrEnum):
     """What a file defines, in ROS's own word: the file's suffix, its folder, and the middle of ROS 2's full names."""
 

@@ -35,6 +35,7 @@ from fusesoc_firm.message.model import (
     StringType,
 )
 from fusesoc_firm.message.piece import Piece, read_lines
+from fusesoc_firm.message.unsupported import unsupported_form, unsupported_word
 from fusesoc_firm.message.values import read_default, read_value
 
 _SEPARATOR = "---"
@@ -131,6 +132,10 @@ class _Reader:
         """Take in one line."""
         code, _ = line.partition("#")
         if not code.text:
+            return
+        if unsupported := unsupported_form(code):
+            feature, part = unsupported
+            self._diagnostics.error(feature.fault, part.source, feature.hint)
             return
         kind, rest = code.split_word()
         if not rest.text:
@@ -259,6 +264,9 @@ class _Reader:
         is_package = len(parts) == 1 or self._dialect.package_name.accepts(package)
         if is_package and self._dialect.message_name.accepts(name):
             return MessageType(MessageName(package, name))
+        if feature := unsupported_word(piece.text):
+            self._diagnostics.error(feature.fault, piece.source, feature.hint)
+            return None
         hint = nearest(piece.text, self._dialect.builtin_types) if len(parts) == 1 else self._message_hint(is_package)
         self._diagnostics.error(f"unknown type '{piece.text}'", piece.source, hint)
         return None

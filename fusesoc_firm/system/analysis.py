@@ -15,7 +15,7 @@ from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.model import MIDDLEWARES, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.connections import Wiring
@@ -29,7 +29,6 @@ from fusesoc_firm.system.derived import (
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.specification import (
-    MIDDLEWARES,
     SOURCE_SUFFIXES,
     Accelerator,
     Block,
@@ -156,8 +155,7 @@ class _Analysis:
             library.get(name, message.source)
             frame = frame_of(name, library.closure(name))
         except InputError as error:
-            for fault in error.diagnostics:
-                self.faults.error(fault.message, fault.source or message.source, fault.hint)
+            self.faults.take(error, message.source)
             return None
         try:
             check_fixed_size(frame)

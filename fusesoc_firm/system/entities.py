@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.constants import constants_package
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.configuration import accelerator_entity
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
@@ -18,12 +20,18 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     """Note every block and accelerator that cannot have the entities that its message, name or sources ask for."""
     owners = {system.entity: "the system", f"{system.entity}_tb": "the system's test bench"}
     frames: dict[str, Frame] = {}
+    packages: dict[str, MessageName] = {}
     for entity, block, frame in _converters(system):
         if frames.setdefault(entity, frame) != frame:
             message = f"'{block}' and {owners[entity]} need the entity '{entity}' for different messages"
             hint = f"one system has a message in one ROS version: here ROS {int(frames[entity].ros)}"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(entity, f"converter '{block}'")
+        package = constants_package(frame.message)
+        if packages.setdefault(package, frame.message) != frame.message:
+            message = f"'{block}' and {owners[package]} need the package '{package}' for different messages"
+            faults.error(message, blocks[block].name.source)
+        owners.setdefault(package, f"converter '{block}'")
     for accelerator in system.accelerator_types:
         name = accelerator.accelerator.name
         if accelerator.accelerator.type == "VHDL" and identifier(name) != name:

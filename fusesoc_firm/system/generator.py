@@ -6,12 +6,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.generator import VHDL, library_sources, publisher_files, subscriber_files
+from fusesoc_firm.converter.generator import (
+    VHDL,
+    constants_files,
+    library_sources,
+    publisher_files,
+    subscriber_files,
+)
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
@@ -33,6 +40,10 @@ class LoadedSystem:
     def inputs(self) -> list[Path]:
         """The accelerators' sources and the files of all messages."""
         return source_files(self.specification, self.folder) + self._message_files()
+
+    def messages(self) -> list[tuple[MessageName, Definitions]]:
+        """Every message of a converter, with the definitions of it and all within it."""
+        return [(frame.message, self.libraries[frame.ros].closure(frame.message)) for frame in self.system.frames]
 
     def _message_files(self) -> list[Path]:
         found: list[Path] = []
@@ -70,6 +81,7 @@ def generate(request: Request) -> GeneratedCore:
     loaded = load_requested(request)
     system = loaded.system
     files = {
+        **constants_files(loaded.messages()),
         **subscriber_files(_frames(system.subscribers), system.width),
         **publisher_files(_frames(system.publishers), system.width),
     }

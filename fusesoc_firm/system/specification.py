@@ -11,11 +11,10 @@ from pathlib import Path
 
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.diagnostics import Diagnostics, fail
-from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.grammar import Section, key, read
+from fusesoc_firm.message.model import MIDDLEWARES
+from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
-MIDDLEWARES = {"ROS": RosVersion.ROS1, "ROS1": RosVersion.ROS1, "ROS2": RosVersion.ROS2}
 # The types of accelerators, each with the endings of its sources' names.
 SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)

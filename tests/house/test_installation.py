@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
+ROBOT = Path(__file__).parent / "data" / "robot"
 # One worker does them all, so that each kind is installed once.
 pytestmark = pytest.mark.xdist_group("installation")
 
@@ -191,3 +192,32 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
     cores = {file["core"] for file in files.values()}
     assert "robot:manager:manager:0.1.0" in cores
     assert not any(core.startswith("robot:sim:") for core in cores)
+
+
+def test_another_projects_core_simulates_converters_of_a_message_and_of_a_configuration(
+    installation: Installation, project: Path
+) -> None:
+    """Listing 5.1's road: `robot/grip.yaml` names the interfaces, `robot/loop_tb.vhd` instantiates them."""
+    shutil.copytree(ROBOT, project / "robot", dirs_exist_ok=True)
+    done = installation.fusesoc("run", "me:robots:loop", cwd=project)
+    assert done.returncode == 0, done.stdout + done.stderr
+    # The MD5 sum of geometry_msgs/Twist is the one that ROS 1 prints.
+    assert "PASS 9f195f881246fdfa2798d1d3eebca84a RIHS01_" in done.stdout
+    (description,) = project.glob("build/me_robots_loop_1.0/default/*.eda.yml")
+    files = [Path(file["name"]).name for file in yaml.safe_load(description.read_text())["files"]]
+    assert (
+        files.index("demo_msgs_grip_pkg.vhd") < files.index("axis_to_demo_msgs_grip.vhd") < files.index("AXIS2Left.vhd")
+    )
+    again = installation.fusesoc("run", "me:robots:loop", cwd=project)
+    assert again.stdout.count(" from store in ") == 2
+
+
+def test_a_fault_in_another_projects_configuration_is_shown_there(installation: Installation, project: Path) -> None:
+    shutil.copytree(ROBOT, project / "robot", dirs_exist_ok=True)
+    path = project / "robot" / "grip.yaml"
+    path.write_text(path.read_text().replace("subscribers:", "subscriber:"))
+    done = installation.fusesoc("run", "me:robots:loop", cwd=project)
+    assert done.returncode == 1
+    assert f"{path}:10:5: error: an item of 'messages' has no key 'subscriber'\n" in done.stderr
+    assert "did you mean 'subscribers'?" in done.stderr
+    assert "Traceback" not in done.stderr

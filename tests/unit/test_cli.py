@@ -84,8 +84,8 @@ def test_every_stage_is_printed(stage: str, capsys: Captured) -> None:
         "tree": "field",
         "message": "# geometry_msgs/Point (ROS 2)",
         "frame": "message: geometry_msgs/Point",
-        "config": "entity: axis_to_geometry_msgs_point",
-        "vhdl": "-- axis_to_geometry_msgs_point: ",
+        "config": "package: geometry_msgs_point_pkg",
+        "vhdl": "-- geometry_msgs_point_pkg: ",
     }
     assert text.startswith(beginning[stage])
     if stage in ("frame", "config"):
@@ -104,9 +104,10 @@ def test_a_message_is_printed_with_its_signature(ros: str, signature: str, capsy
     assert lines[:3] == [f"# geometry_msgs/Point (ROS {ros})", f"# signature: {signature}", ""]
 
 
-def test_both_converters_are_printed(capsys: Captured) -> None:
+def test_the_package_and_both_converters_are_printed(capsys: Captured) -> None:
     text = out(capsys, "message", "show", "geometry_msgs/Point", "--stage", "vhdl")
     assert text.count("\nend entity") == 2
+    assert text.count("\nend package") == 1
     assert "entity geometry_msgs_point_to_axis is" in text
 
 
@@ -169,7 +170,7 @@ def test_a_service_is_printed_with_its_messages(name: str, interfaces: Path, cap
     ]
     frames = list(yaml.safe_load_all(out(capsys, *arguments, "frame")))
     assert [frame["message"] for frame in frames] == ["my_msgs/SetRequest", "my_msgs/SetResponse"]
-    assert len(list(yaml.safe_load_all(out(capsys, *arguments, "config")))) == 4
+    assert len(list(yaml.safe_load_all(out(capsys, *arguments, "config")))) == 6
 
 
 def test_an_action_is_printed_with_its_messages(interfaces: Path, capsys: Captured) -> None:

@@ -33,7 +33,7 @@ class Echo:
         self.calls = 0
 
     def inputs(self, request: Request) -> list[Path]:
-        return [request.files_root / str(request.parameters["spec"])]
+        return [request.files_root / str(request.parameters["file"] or request.parameters["spec"])]
 
     def generate(self, request: Request) -> GeneratedCore:
         self.calls += 1
@@ -74,6 +74,7 @@ class Bench:
             Parameter("width", "int", "bits", 8, choices=(8, 16)),
             Parameter("seed", "int", "a seed", 1, bounds=(1, 99)),
             Parameter("paths", "list", "folders"),
+            Parameter("file", "str", "a file that says it all", replaces=("spec", "width")),
         )
         return main("echo", ["system_input.yml"], {"echo": Generator(known, self.echo.inputs, self.echo.generate)})
 
@@ -168,6 +169,7 @@ def test_a_fault_of_the_input_is_printed_without_traceback(bench: Bench, capsys:
         ({"paths": "a", "spec": "b"}, 9, "9:14: error: parameter 'paths' is 'a', but must be a list of strings\n"),
         ({"paths": [1], "spec": "b"}, 10, "10:7: error: parameter 'paths' is [1], but must be a list of strings\n"),
         ({"width": 8}, 6, "6:3: error: parameter 'spec' is missing; it is a path\n"),
+        ({"file": "a", "spec": "b"}, 10, "10:7: error: parameter 'spec' does not go with 'file'\n"),
     ],
 )
 def test_a_fault_in_a_parameter_is_shown_in_the_core(
@@ -178,6 +180,14 @@ def test_a_fault_in_a_parameter_is_shown_in_the_core(
     error = capsys.readouterr().err
     assert error.startswith(f"{core}:{message}")
     assert f"{line:5d} | {core.read_text().splitlines()[line - 1]}\n" in error
+
+
+def test_one_parameter_stands_in_for_others(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+    assert bench.run(width=8) == 1
+    assert capsys.readouterr().err.endswith("      = or give 'file' in its place\n")
+    assert bench.run(file="spec.yaml", width=16) == 1
+    assert "parameter 'width' does not go with 'file'" in capsys.readouterr().err
+    assert bench.run(file="spec.yaml") == 0
 
 
 def test_all_faults_come_at_once(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fusesoc_firm.naming import KEYWORDS, distinct_identifiers, entity_name, identifier
+from fusesoc_firm.naming import (
+    KEYWORDS,
+    VHDL_KEYWORDS,
+    VHDL_PREDEFINED,
+    distinct_constants,
+    distinct_identifiers,
+    entity_name,
+    identifier,
+)
 
 LEGAL = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
 WORDS = st.one_of(
@@ -63,6 +71,20 @@ def test_what_changes_and_how(parts: tuple[str, ...], expected: str) -> None:
 def test_clashes_are_numbered_in_order() -> None:
     names = [("stamp",), ("Stamp",), ("stamp_2",), ("STAMP",), ("clk",)]
     assert distinct_identifiers(names, ["CLK"]) == ["stamp", "Stamp_2", "stamp_2_2", "STAMP_3", "clk_2"]
+
+
+@given(st.lists(st.lists(st.one_of(WORDS, st.sampled_from(sorted(VHDL_PREDEFINED))), min_size=1, max_size=3)))
+def test_constants_are_legal_distinct_and_hide_nothing(names: list[list[str]]) -> None:
+    chosen = distinct_constants(names, ["SIGNATURE"])
+    assert all(LEGAL.fullmatch(name) and name == name.upper() for name in chosen)
+    assert not {name.lower() for name in chosen} & (VHDL_KEYWORDS | VHDL_PREDEFINED | {"signature"})
+    assert len(set(chosen)) == len(chosen) == len(names)
+
+
+def test_constants_stay_as_they_are_where_they_can() -> None:
+    names = ["OK", "ERROR", "In", "ok", "wire", "SIGNATURE"]
+    chosen = distinct_constants([(name,) for name in names], ["SIGNATURE"])
+    assert chosen == ["OK", "ERROR_VALUE", "IN_VALUE", "OK_2", "WIRE", "SIGNATURE_2"]
 
 
 def test_entity_name() -> None:

@@ -34,6 +34,10 @@ _SHARED = {
     # The names of two leaves meet once their paths are joined.
     "Inner": "uint8 b\nuint8 b_c\n",
     "Joined": "Inner a\nuint16 a_b\nuint16 a_b_2\nuint16 a_b_c\n",
+    "Numbers": (
+        "int8 i8\nuint8 u8\nint16 i16\nuint16 u16\nint32 i32\nuint32 u32\nint64 i64\nuint64 u64\n"
+        "float32 f32\nfloat64 f64\n"
+    ),
     "Long": "uint8[300] data\nfloat32 last\n",
     "Large": "float64[140] data\nbool flag\nuint16 tail\n",
 }

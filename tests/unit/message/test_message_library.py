@@ -238,3 +238,16 @@ def test_a_cycle_below_the_message_is_found(tmp_path: Path) -> None:
         MessageLibrary(ROS2, [tmp_path]).closure(MessageName("my_msgs", "Top"))
     (fault,) = caught.value.diagnostics
     assert fault.hint == "my_msgs/A -> my_msgs/B -> my_msgs/A"
+
+
+@pytest.mark.parametrize(
+    ("ros", "words"), [(ROS1, ("any", "union", "map", "Any")), (ROS2, ("Any", "Optional", "Union"))]
+)
+def test_messages_may_be_called_like_what_msg_has_not(tmp_path: Path, ros: RosVersion, words: tuple[str, ...]) -> None:
+    folder = tmp_path / "my_msgs" / "msg"
+    folder.mkdir(parents=True)
+    for word in words:
+        (folder / f"{word}.msg").write_text("uint8 any\nuint8 optional\nuint8 union\n")
+    (folder / "All.msg").write_text("".join(f"{word} f{n}\nmy_msgs/{word}[] g{n}\n" for n, word in enumerate(words)))
+    closure = MessageLibrary(ros, [tmp_path]).closure(MessageName("my_msgs", "All"))
+    assert {name.name for name in closure} == {*words, "All"}

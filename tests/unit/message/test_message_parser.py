@@ -116,7 +116,7 @@ def test_types_of_one_version(text: str, ros: RosVersion, expected: FieldType) -
         ("uint8 =3", ROS1, "1:7 the constant name is missing"),
         ("uint8 []  data", ROS1, "1:7 a blank before '['"),
         ("uint8 [] data", ROS2, "1:7 a blank before '['"),
-        ("uint8[2][3] x", ROS1, "1:1 'uint8[2][3]' is not a type"),
+        ("uint8[2][3] x", ROS1, "1:1 multi-dimensional arrays are not supported by .msg"),
         ("uint8[ x", ROS2, "1:1 'uint8[' is not a type"),
         ("uint8[-1] x", ROS1, "1:7 '-1' is not a size"),
         ("uint8[0] x", ROS2, "1:7 '0' is not a size"),

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.generation import Request
 from fusesoc_firm.render import render
 from fusesoc_firm.system import generator
@@ -138,3 +139,51 @@ def test_a_source_of_two_types_is_in_the_core_once(tmp_path: Path) -> None:
     core = generator.generate(Request("far", "a:b:c-d:0", folder, parameters))
     assert [name for name in core.files if "/" in name] == ["one/acc.vhd", "one/sub/own.vhd", "two/above/own.vhd"]
     assert list(core.files)[-1] == "robot_system.vhd"
+
+
+BRIDGE = """\
+  - name: bridge
+    type: VHDL
+    sources: acc.vhd
+    interface:
+      input: [{middleware: ROS, message: geometry_msgs/Point}]
+      output: [{middleware: ROS2, message: geometry_msgs/Point}]
+"""
+
+
+def test_packages_come_first_and_those_of_two_versions_have_two_names(tmp_path: Path) -> None:
+    blocks = (
+        converter("s", "subscriber", "Point", "b")
+        + instance("b", "bridge", "p")
+        + converter("p", "publisher", "Point", ros="ROS2")
+        + converter("t", "subscriber", "Pose", "q")
+        + converter("q", "publisher", "Pose")
+    )
+    derived(tmp_path, specification(blocks, BRIDGE))
+    parameters = {"spec": "spec.yaml", "paths": None, "distro": None}
+    core = generator.generate(Request("far", "a:b:c-d:0", tmp_path, parameters))
+    assert list(core.files)[:4] == [
+        "geometry_msgs_point_ros1_pkg.vhd",
+        "geometry_msgs_pose_pkg.vhd",
+        "geometry_msgs_point_ros2_pkg.vhd",
+        "axis_to_geometry_msgs_point.vhd",
+    ]
+
+
+def test_two_messages_cannot_have_one_package(tmp_path: Path) -> None:
+    for package, name in (("odd_msgs", "Point"), ("odd", "Msgs_Point")):
+        (tmp_path / package / "msg").mkdir(parents=True)
+        (tmp_path / package / "msg" / f"{name}.msg").write_text("float64 x\n")
+    blocks = (
+        converter("s", "subscriber", "odd_msgs/Point", "a")
+        + instance("a", "change", "p")
+        + converter("p", "publisher", "odd/Msgs_Point")
+    )
+    types = accelerator("change", "odd_msgs/Point", "odd/Msgs_Point")
+    (tmp_path / "acc.vhd").touch()
+    (tmp_path / "spec.yaml").write_text(specification(blocks, types))
+    request = Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": ["odd", "odd_msgs"], "distro": None})
+    with pytest.raises(InputError) as raised:
+        generator.generate(request)
+    (fault,) = raised.value.diagnostics
+    assert fault.message == "'p' and converter 's' need the package 'odd_msgs_point_pkg' for different messages"

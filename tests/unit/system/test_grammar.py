@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.system.grammar import Key, Section, keys_of
+from fusesoc_firm.converter.config_file import ConfigFile
 from fusesoc_firm.system.specification import Specification
+from fusesoc_firm.yaml_sections import Key, Section, keys_of
 from tests.unit.system.systems import read
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "specification.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 _FORMS = {"text": "word", "texts": "words"}
 
 
@@ -124,9 +125,10 @@ def _default(section: type[Section], field: str, entry: Key) -> str:
     return "none" if default in (None, ()) else str(default)
 
 
-def test_the_page_has_every_key_as_it_is() -> None:
-    lines = PAGE.read_text(encoding="utf-8").splitlines()
+@pytest.mark.parametrize(("page", "grammar"), [("specification.md", Specification), ("converters.md", ConfigFile)])
+def test_the_page_has_every_key_as_it_is(page: str, grammar: type[Section]) -> None:
+    lines = (DOCS / page).read_text(encoding="utf-8").splitlines()
     start = lines.index("| section | key | form | default | legal | meaning |") + 2
     table = lines[start : lines.index("", start)]
     written = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
-    assert sorted(written) == sorted(_rows(Specification, "(the file)"))
+    assert sorted(written) == sorted(_rows(grammar, "(the file)"))

@@ -1,0 +1,33 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- What accelerators need to work with the values of messages.
+library ieee;
+use ieee.std_logic_1164.all;
+
+package firm_message_pkg is
+
+  -- Whether a value has the bits of a constant: `value = reference`, a bit at a time. GHDL 2.0 synthesises a constant of
+  -- 64 bits as zero if its low half is zero, and writes one of more than 32 bits into Verilog as a text; with this, none is
+  -- left that is wider than a bit.
+  function is_equal(value, reference : std_logic_vector) return boolean;
+
+end package firm_message_pkg;
+
+package body firm_message_pkg is
+
+  function is_equal(value, reference : std_logic_vector) return boolean is
+    alias value_bits     : std_logic_vector(value'length-1 downto 0) is value;
+    alias reference_bits : std_logic_vector(reference'length-1 downto 0) is reference;
+    variable equal       : boolean := true;
+  begin
+    if value'length /= reference'length then
+      return false;
+    end if;
+    for place in value_bits'range loop
+      if value_bits(place) /= reference_bits(place) then
+        equal := false;
+      end if;
+    end loop;
+    return equal;
+  end function is_equal;
+
+end package body firm_message_pkg;

@@ -1,0 +1,84 @@
+"""FIRM's configuration file: the messages of a project and the names of their interfaces (dissertation, listing 5.1).
+
+This is the one source of its grammar. An interface is a converter under the name that its user gives it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.converter.stream import WIDTHS
+from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.message.model import MIDDLEWARES
+from fusesoc_firm.naming import identifier
+from fusesoc_firm.yaml_sections import Section, key, read
+from fusesoc_firm.yaml_text import Text, is_null, read_yaml
+
+
+@dataclass(frozen=True)
+class Platform(Section):
+    """What the hardware is for; a converter is the same for all."""
+
+    board: Text | None = key("the board's name")
+    fpga_part: Text | None = key("the FPGA's part number", name="FPGA", aliases=("fpgaPart",))
+
+
+@dataclass(frozen=True)
+class Project(Section):
+    """What holds for all messages."""
+
+    name: Text = key("the project's name", is_required=True)
+    platform: Platform | None = key("what the hardware is for", form="section", section=Platform)
+    width: int = key("bits of the streams", form="integer", choices=WIDTHS, default=8)
+
+
+@dataclass(frozen=True)
+class MessageInterfaces(Section):
+    """A message and the converters that are wanted of it."""
+
+    type: Text = key("whose message it is", is_required=True, choices=tuple(MIDDLEWARES))
+    name: Text = key("the message's type, such as sensor_msgs/Image", is_required=True)
+    subscribers: tuple[Text, ...] = key("names of converters from frames to the message", form="texts")
+    publishers: tuple[Text, ...] = key("names of converters from the message to frames", form="texts")
+
+
+@dataclass(frozen=True)
+class ConfigFile(Section):
+    """The whole file."""
+
+    project: Project = key("what holds for all messages", form="section", section=Project, is_required=True)
+    messages: tuple[MessageInterfaces, ...] = key(
+        "the messages and their interfaces", form="sections", section=MessageInterfaces, is_required=True
+    )
+
+
+def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
+    """The configuration in a file, with all that is wrong in it noted.
+
+    Raises `InputError` if the file cannot be read, is empty, or is no YAML from the start.
+    """
+    text = read_yaml(path, str(path), faults)
+    if text.root is None or is_null(text.root):
+        faults.raise_if_any()
+        fail(f"{path} is empty; a configuration needs the keys 'project' and 'messages'")
+    config = read(ConfigFile, text.root, text, faults, "a configuration")
+    _check_names(config, faults)
+    return config
+
+
+def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
+    """Every message has an interface, and every interface a name that an entity can have alone."""
+    seen: dict[str, Text] = {}
+    for message in config.messages:
+        names = (*message.subscribers, *message.publishers)
+        if not names and message.is_sound:
+            hint = "it needs 'subscribers' or 'publishers', or both"
+            faults.error(f"'{message.name}' has no interface", message.name.source, hint)
+        for name in names:
+            if identifier(name) != name:
+                hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+                faults.error(f"no entity can be called '{name}'", name.source, hint)
+            first = seen.setdefault(name.lower(), name)
+            if first is not name:
+                faults.error(f"a second interface is called '{name}'; the first is at {first.source}", name.source)

@@ -1,0 +1,205 @@
+"""Message -> configuration of its VHDL package: the signature, and the constants as converters' ports have such values.
+
+A message of ROS has no other enumerations than its constants. Those of the messages within it are in the package too,
+behind their message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.frame.layout import RULES
+from fusesoc_firm.frame.model import COUNT_BYTES
+from fusesoc_firm.frame.rules import CHARACTER, WIDE_CHARACTER
+from fusesoc_firm.message.model import Constant, MessageName, RosVersion, StringType, nested_message
+from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.naming import distinct_constants, entity_name
+
+CONSTANTS_TEMPLATE = "vhdl/constants.vhd"
+SIGNATURE = "SIGNATURE"
+
+_LONGEST_LINE = 120
+_LONGEST_EXPRESSION = 110
+_CHARACTERS_A_PIECE = 100
+_BYTES_A_PIECE = 50
+_QUOTE = '"'
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A constant and the message within the package's one that defines it, or None if that one does."""
+
+    message: MessageName | None
+    constant: Constant
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What its name in VHDL is made of."""
+        return (self.constant.name,) if self.message is None else (self.message.name, self.constant.name)
+
+    @property
+    def comment(self) -> str:
+        """Its type and its name in ROS, and the value of a number: `uint8 sensor_msgs/PointField.INT8=1`."""
+        owner = "" if self.message is None else f"{self.message}."
+        named = f"{self.constant.type} {owner}{self.constant.name}"
+        return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
+
+
+def constants_package(name: MessageName, ros: RosVersion | None = None) -> str:
+    """`<pkg>_<type>_pkg`, or `<pkg>_<type>_ros<N>_pkg` where packages of both versions lie side by side."""
+    return "_".join([entity_name(name.package, name.name), *([] if ros is None else [f"ros{int(ros)}"]), "pkg"])
+
+
+def constants_configuration(name: MessageName, definitions: Definitions, package: str) -> dict[str, Any]:
+    """The configuration of a message's package; `definitions` hold the message and all within it."""
+    placed = list(_placed(name, definitions))
+    texts = [item for item in placed if isinstance(item.constant.type, StringType)]
+    numbers = [item for item in placed if not isinstance(item.constant.type, StringType)]
+    parts = [(*item.words, part) for item in texts for part in ("length", "bytes")]
+    # What a text adds gives way to what the definition names.
+    names = distinct_constants([*(item.words for item in (*numbers, *texts)), *parts], [SIGNATURE])
+    values, heads = names[: len(numbers)], names[len(numbers) : len(placed)]
+    lengths, contents = names[len(placed) :: 2], names[len(placed) + 1 :: 2]
+    ros, sum_ = definitions[name].ros, signature(name, definitions)
+    return {
+        "package": package,
+        "message": str(name),
+        "ros": int(ros),
+        "signature": _declaration(SIGNATURE, f"string(1 to {len(sum_)})", _characters(sum_)),
+        "has_values": bool(numbers),
+        "values": _aligned([_value(item, own, ros) for item, own in zip(numbers, values, strict=True)]),
+        "has_texts": bool(texts),
+        "texts": [
+            {"comment": item.comment, "declarations": _text(item, own)}
+            for item, *own in zip(texts, heads, lengths, contents, strict=True)
+        ],
+    }
+
+
+def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
+    """The constants of a message, then of each one within it, once, in the order of the fields."""
+    messages: list[MessageName] = []
+    _collect(name, definitions, messages)
+    for message in messages:
+        for constant in definitions[message].constants:
+            yield _Placed(None if message == name else message, constant)
+
+
+def _collect(name: MessageName, definitions: Definitions, found: list[MessageName]) -> None:
+    """Add a message and all within it that were not found yet."""
+    if name in found:
+        return
+    found.append(name)
+    for field in definitions[name].fields:
+        if nested := nested_message(field.type):
+            _collect(nested, definitions, found)
+
+
+def _value(item: _Placed, name: str, ros: RosVersion) -> dict[str, Any]:
+    """A number or a bool, as the bits that it has at a port."""
+    wire = RULES[ros].scalars[str(item.constant.type)]
+    digits = struct.pack(f">{wire.code}", item.constant.value).hex()
+    is_bit = wire.bits == 1
+    return {
+        "name": name,
+        "type": vhdl_type(None if is_bit else wire.bits),
+        "value": f"'{digits[-1]}'" if is_bit else f'x"{digits}"',
+        "comment": item.comment,
+    }
+
+
+def _aligned(values: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The same in columns; where a line would get too long, all comments stand above their constants."""
+    columns = {key: max((len(value[key]) for value in values), default=0) for key in ("name", "type", "value")}
+    longest = max((len(value["comment"]) for value in values), default=0)
+    punctuation = len("  constant  :  := ; -- ")
+    is_above = sum(columns.values()) + longest + punctuation > _LONGEST_LINE
+    return [
+        {
+            "is_above": is_above,
+            "name": value["name"].ljust(columns["name"]),
+            "type": value["type"].ljust(columns["type"]),
+            "value": value["value"],
+            "padding": " " * (columns["value"] - len(value["value"])),
+            "comment": value["comment"],
+        }
+        for value in values
+    ]
+
+
+def _text(item: _Placed, names: Sequence[str]) -> list[dict[str, Any]]:
+    """A text three times: as a string, its length, and its bytes as a converter's stream has them."""
+    characters = str(item.constant.value).encode()
+    data = _wire_bytes(item)
+    count = len(data) // (WIDE_CHARACTER.size if _is_wide(item) else CHARACTER.size)
+    head, length, content = (name.ljust(max(map(len, names))) for name in names)
+    declarations = [
+        _declaration(head, f"string(1 to {len(characters)})", _characters(characters.decode("latin-1"))),
+        _declaration(length, vhdl_type(8 * COUNT_BYTES), [f'x"{count:0{2 * COUNT_BYTES}x}"']),
+    ]
+    if data:  # a vector without bits is more than some tools take
+        declarations.append(_declaration(content, vhdl_type(8 * len(data)), _bytes(data)))
+    return declarations
+
+
+def _is_wide(item: _Placed) -> bool:
+    return isinstance(item.constant.type, StringType) and item.constant.type.is_wide
+
+
+def _wire_bytes(item: _Placed) -> bytes:
+    """The text without what comes before and behind it on the wire."""
+    text = str(item.constant.value)
+    if not _is_wide(item):
+        return text.encode()
+    units = text.encode("utf-16-le")
+    return b"".join(units[first : first + 2].ljust(WIDE_CHARACTER.size, b"\0") for first in range(0, len(units), 2))
+
+
+def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
+    """A constant whose value is `pieces` joined with `&`, on its own line or on several."""
+    lines = [pieces[0]]
+    for piece in pieces[1:]:
+        if len(lines[-1]) + len(piece) < _LONGEST_EXPRESSION:
+            lines[-1] += f" & {piece}"
+        else:
+            lines.append(piece)
+    is_one_line = len(lines) == 1 and len(f"  constant {name} : {type_} := {lines[0]};") <= _LONGEST_LINE
+    joints = [" &"] * (len(lines) - 1) + [";"]
+    return {
+        "name": name,
+        "type": type_,
+        "is_one_line": is_one_line,
+        "value": lines[0],
+        "lines": [{"line": line, "joint": joint} for line, joint in zip(lines, joints, strict=True)],
+    }
+
+
+def _characters(text: str) -> list[str]:
+    """Pieces that make up a string of Latin-1: `"printable"` and, for any other character, `character'val(10)`."""
+    pieces = []
+    for is_printable, run in groupby(text, key=lambda character: character.isascii() and character.isprintable()):
+        characters = list(run)
+        if not is_printable:
+            pieces += [f"character'val({ord(character)})" for character in characters]
+            continue
+        for first in range(0, len(characters), _CHARACTERS_A_PIECE):
+            part = "".join(characters[first : first + _CHARACTERS_A_PIECE])
+            pieces.append(f'"{part.replace(_QUOTE, 2 * _QUOTE)}"')
+    # Two characters make a string only with a string in front.
+    return pieces if pieces and pieces[0].startswith(_QUOTE) else ['""', *pieces]
+
+
+def _bytes(data: bytes) -> list[str]:
+    """Pieces that make up a vector, the first byte lowest."""
+    digits, size = data[::-1].hex(), 2 * _BYTES_A_PIECE
+    return [f'x"{digits[first : first + size]}"' for first in range(0, len(digits), size)]
+
+
+def _decimal(value: bool | float) -> str:
+    """A number as ROS writes it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,52 @@
+"""An interface: a converter under the name that a configuration file gives it, as an entity that only instantiates it.
+
+Its ports are read from the converter's own text, so the two cannot differ. One converter serves any number of names.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from fusesoc_firm.naming import distinct_identifiers
+
+INTERFACE_TEMPLATE = "vhdl/interface.vhd"
+
+# The templates of converters close a list with `  );` on a line of its own, and declare one name a line.
+_LIST = r"^  {} \(\n(.*?)^  \);\n"
+_NAME = re.compile(r"^    (\w+) +: ", re.MULTILINE)
+
+
+def interface_configuration(name: str, converter: str, vhdl: str, message: str) -> dict[str, Any]:
+    """The configuration of the entity `name` around the entity `converter`, whose text is `vhdl`."""
+    generics, ports = _declarations(vhdl, "generic"), _declarations(vhdl, "port")
+    port_names = _NAME.findall(ports)
+    (label,) = distinct_identifiers([("u_converter",)], reserved=port_names)
+    return {
+        "entity": name,
+        "converter": converter,
+        "message": message,
+        "label": label,
+        "has_generics": bool(generics),
+        "generics": generics.splitlines(),
+        "ports": ports.splitlines(),
+        "generic_names": _associations(_NAME.findall(generics)),
+        "port_names": _associations(port_names),
+    }
+
+
+def _declarations(vhdl: str, kind: str) -> str:
+    """The lines of an entity's list of generics or ports; "" if it has none."""
+    entity = vhdl.partition("\nentity ")[2].partition("\nend entity;")[0] + "\n"
+    found = re.search(_LIST.format(kind), entity, re.MULTILINE | re.DOTALL)
+    return found[1] if found else ""
+
+
+def _associations(names: list[str]) -> list[dict[str, str]]:
+    """`formal => actual` of each name to itself."""
+    column = max(map(len, names), default=0)
+    commas = [","] * (len(names) - 1) + [""]
+    return [
+        {"formal": name.ljust(column), "actual": name, "comma": comma}
+        for name, comma in zip(names, commas, strict=bool(names))
+    ]

@@ -1,0 +1,142 @@
+"""What is asked of the generator `firm`: messages, which converters of them, and by what names.
+
+It is asked by the parameters of a core, for a message, a service or an action, or by a configuration file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.converter.config_file import MessageInterfaces, read_config
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.constants import constants_package
+from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
+from fusesoc_firm.message.parser import parse_full_name, parse_name
+from fusesoc_firm.message.signature import Definitions, signature
+
+# The directions and the entity of a frame's converter in each.
+ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A message's frame, with the definitions of it and all within it.
+
+    `interfaces` has a key for each direction of which a converter is wanted, with further names for that converter.
+    """
+
+    frame: Frame
+    definitions: Definitions
+    interfaces: Mapping[str, tuple[str, ...]]
+
+    @property
+    def message(self) -> MessageName:
+        """Its name."""
+        return self.frame.message
+
+    @property
+    def ros(self) -> RosVersion:
+        """Whose message it is."""
+        return self.frame.ros
+
+
+@dataclass(frozen=True)
+class Order:
+    """All that is wanted: each message once, streams of `width` bits, and the `files` that it was read from."""
+
+    title: str
+    width: int
+    messages: tuple[Wanted, ...]
+    files: tuple[Path, ...]
+
+
+def order_of_message(text: str, direction: str, width: int, library: MessageLibrary) -> Order:
+    """The converters of one message, or of those that the two ends of a service or an action exchange.
+
+    `direction` is one of `ENTITIES`, or "both". Raises `InputError`.
+    """
+    kind, name = parse_full_name(text)
+    interface = library.interface(name, kind)
+    names = interface.exchanged if interface else (name,)
+    definitions = library.joint_closure(names)
+    directions = dict.fromkeys(ENTITIES if direction == "both" else (direction,), ())
+    messages = tuple(Wanted(frame_of(each, definitions), definitions, directions) for each in names)
+    facts = [f"ROS {int(library.ros)}"]
+    if interface is None:
+        facts.append(signature(name, definitions))
+    elif interface.has_signature:
+        facts.append(signature(name, library.joint_closure(interface.messages), interface.kind))
+    title = f"{interface or name} ({', '.join(facts)})"
+    return Order(title, width, messages, tuple(library.files(definitions)))
+
+
+def order_of_config(path: Path, libraries: Mapping[RosVersion, MessageLibrary]) -> Order:
+    """The converters that a configuration file lists. Raises `InputError` with all faults of the file."""
+    faults = Diagnostics()
+    config = read_config(path, faults)
+    found = [(entry, wanted) for entry in config.messages if (wanted := _wanted(entry, libraries, faults))]
+    _check_entities(found, faults)
+    faults.raise_if_any()
+    messages = _joined(wanted for _, wanted in found)
+    files = [file for wanted in messages for file in libraries[wanted.ros].files(wanted.definitions)]
+    return Order(str(config.project.name), config.project.width, messages, (path, *dict.fromkeys(files)))
+
+
+def _wanted(
+    entry: MessageInterfaces, libraries: Mapping[RosVersion, MessageLibrary], faults: Diagnostics
+) -> Wanted | None:
+    """The message of an item of the file; None if a fault was noted."""
+    if not entry.type or not entry.name:
+        return None
+    library = libraries[MIDDLEWARES[entry.type]]
+    try:
+        message = parse_name(entry.name)
+        library.get(message, entry.name.source)
+        definitions = library.closure(message)
+    except InputError as error:
+        faults.take(error, entry.name.source)
+        return None
+    given = {"subscriber": entry.subscribers, "publisher": entry.publishers}
+    interfaces = {direction: tuple(map(str, names)) for direction, names in given.items() if names}
+    return Wanted(frame_of(message, definitions), definitions, interfaces)
+
+
+def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
+    """Each message once, with all its interfaces."""
+    joined: dict[tuple[RosVersion, MessageName], Wanted] = {}
+    for wanted in messages:
+        first = joined.get((wanted.ros, wanted.message))
+        interfaces = dict(first.interfaces) if first else {}
+        for direction, names in wanted.interfaces.items():
+            interfaces[direction] = (*interfaces.get(direction, ()), *names)
+        joined[wanted.ros, wanted.message] = Wanted(wanted.frame, wanted.definitions, interfaces)
+    return tuple(joined.values())
+
+
+def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], faults: Diagnostics) -> None:
+    """A tool keeps one entity or package of each name, so none may be needed for two things."""
+    owners: dict[str, tuple[str, Frame]] = {}
+    for entry, wanted in found:
+        package = constants_package(wanted.message)
+        _, twin = owners.setdefault(package, ("package", wanted.frame))
+        if twin.message != wanted.message:
+            message = f"'{wanted.message}' and '{twin.message}' need the package '{package}'"
+            faults.error(message, entry.name.source)
+        for direction in wanted.interfaces:
+            entity = ENTITIES[direction](wanted.frame)
+            _, twin = owners.setdefault(entity, (direction, wanted.frame))
+            if twin.message == wanted.message and twin.ros is not wanted.ros:
+                message = f"'{wanted.message}' needs the entity '{entity}' for ROS {int(twin.ros)} already"
+                faults.error(message, entry.name.source, "one project has a message in one ROS version each way")
+    for entry, wanted in found:
+        own = {"subscriber": entry.subscribers, "publisher": entry.publishers}
+        for name, direction in ((name, direction) for direction, names in own.items() for name in names):
+            what, frame = owners.get(name.lower(), ("", wanted.frame))
+            if what and (what, frame) != (direction, wanted.frame):
+                faults.error(f"'{name}' is what the {what} of {frame.message} is called", name.source)

@@ -1,0 +1,99 @@
+"""What other definition languages have and `.msg` has not: named as such, with what says the same in a `.msg`.
+
+docs/types.md tells where each would stand in a Frame. Nothing here is legal in either version of ROS: a form is one
+that both reference parsers refuse, and a word is looked at only where no message can have that name, or none has.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from fusesoc_firm.message.piece import Piece
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature, how people write it at the beginning of a line and its words alone."""
+
+    name: str
+    form: re.Pattern[str]
+    words: frozenset[str]
+    hint: str
+
+    @property
+    def fault(self) -> str:
+        """What to tell."""
+        return f"{self.name} are not supported by .msg"
+
+
+def _feature(name: str, words: str, forms: tuple[str, ...], hint: str) -> Feature:
+    return Feature(name, re.compile("|".join(f"(?:{form})" for form in forms)), frozenset(words.split()), hint)
+
+
+# A keyword with two words or a block behind it; with one word it is a field's type.
+_DECLARATION = r"{}(?=\s+\S+\s+\S|\s*\{{|\s+\w+\s*\{{)"
+
+FEATURES = (
+    _feature(
+        "multi-dimensional arrays",
+        "",
+        (r"[^\s\[\]=]+\[[^\[\]]*\]\s*\[[^\[\]]*\]", r"[^\s\[\]=]+\[\s*[1-9]\d*\s*[,x*]\s*\d+[^\]]*\]"),
+        "write one dimension, such as 'float64[9] x' for 3 by 3; its element (i, j) is x[3*i + j]",
+    ),
+    _feature(
+        "maps",
+        "map dict",
+        (r"(?:std::)?(?:unordered_map|map|dict)\s*<[^>]*>?",),
+        "write an array of a message that has the fields 'key' and 'value'",
+    ),
+    _feature(
+        "optional fields",
+        "optional",
+        (r"@optional\b", r"(?:std::)?optional\s*<[^>]*>?", _DECLARATION.format("optional"), r"\w+(?:/\w+)*\?(?=\s)"),
+        "write an array of none or one, or a bool beside the field",
+    ),
+    _feature(
+        "unions",
+        "union variant oneof",
+        (r"(?:std::)?variant\s*<[^>]*>?", _DECLARATION.format("(?:union|oneof)")),
+        "write a number that tells the kind, and a field of each kind",
+    ),
+    _feature(
+        "typedefs",
+        "typedef",
+        (_DECLARATION.format("typedef"), r"using\s+\w+\s*=.*"),
+        "write the type itself, or a message that has it as its field",
+    ),
+    _feature(
+        "any types",
+        "any",
+        (r"(?:std::)?any\s*<[^>]*>?",),
+        "write 'string type' and 'uint8[] data'",
+    ),
+    _feature(
+        "inherited fields",
+        "extends inherits",
+        (r"(?:extends|inherits)(?=\s+\w+/\w)",),
+        "hold the base in a field, such as 'Base base'",
+    ),
+    _feature(
+        "enum types",
+        "enum",
+        (_DECLARATION.format("enum"),),
+        "write a number and constants, such as 'uint8 mode' and 'uint8 MODE_IDLE=0'",
+    ),
+)
+
+
+def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
+    """The feature that a line without its comment asks for, and the part that does."""
+    for feature in FEATURES:
+        if match := feature.form.match(code.text):
+            return feature, code.part(0, match.end())
+    return None
+
+
+def unsupported_word(type_name: str) -> Feature | None:
+    """The feature that somebody means who takes this word for a type."""
+    return next((feature for feature in FEATURES if type_name.lower() in feature.words), None)
