@@ -14,7 +14,7 @@ from typing import IO, Any
 
 from fusesoc_firm.frame.codec import MessageValue
 from fusesoc_firm.message.model import MessageDefinition, MessageName
-from fusesoc_firm.verify.definitions import NoJudgementError, joint_text
+from fusesoc_firm.verify.definitions import NoJudgementError, plain_text
 
 TITLE = "genpy"
 _SERVER = Path(__file__).with_name("genpy_server.py")
@@ -37,7 +37,8 @@ def serialise(
     """The payload of each value. Raises `NoJudgementError` if genpy refuses the message."""
     server = _server()
     assert server is not None, "ask is_installed() first"
-    is_done, answer = server.ask((str(name), joint_text(name, definitions), list(values)))
+    texts = {str(other): plain_text(definition) for other, definition in definitions.items()}
+    is_done, answer = server.ask((str(name), texts, list(values)))
     if not is_done:
         raise NoJudgementError(answer)
     payloads: list[bytes] = answer

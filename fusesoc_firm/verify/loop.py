@@ -116,9 +116,7 @@ def _element_gates(name: str, ports: dict[str, MessagePort], first: int) -> list
 
 def _segment_gate(prefix: str, number: int, taken: str, gate: int) -> Gate:
     segment = f"{prefix}segment_valid({number})"
-    return Gate(
-        segment, f"sub_{segment}", taken, ((f"pub_{segment}", f"sub_{segment} and is_open({gate})"),)
-    )
+    return Gate(segment, f"sub_{segment}", taken, ((f"pub_{segment}", f"sub_{segment} and is_open({gate})"),))
 
 
 def _gate_of(valid: str, ready: str, offered: str, shown: str, gate: int) -> Gate:

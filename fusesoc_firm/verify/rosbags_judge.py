@@ -92,7 +92,9 @@ def _message(
     store: Typestore, name: MessageName, definitions: Mapping[MessageName, MessageDefinition], value: MessageValue
 ) -> object:
     arguments = {
-        normalize_fieldname(field.name): _argument(store, field.type, definitions, definitions[name].ros, value[field.name])
+        normalize_fieldname(field.name): _argument(
+            store, field.type, definitions, definitions[name].ros, value[field.name]
+        )
         for field in definitions[name].fields
     }
     return store.types[_long(name)](**arguments)

@@ -140,7 +140,9 @@ class Stimuli:
         encoding, unit = ("utf-16-le", 2) if type_.is_wide else ("utf-8", 1)
         text = ""
         while length > 0:
-            wide = "" if kind == TYPICAL else "".join(c for c in _WIDE_LETTERS if len(c.encode(encoding)) <= unit * length)
+            wide = (
+                "" if kind == TYPICAL else "".join(c for c in _WIDE_LETTERS if len(c.encode(encoding)) <= unit * length)
+            )
             letter = self.chance.choice(_LETTERS + wide)
             length -= len(letter.encode(encoding)) // unit
             text += letter

@@ -109,7 +109,9 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
     if task.keeps_files and verdict is Verdict.FAIL:
         files = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.iterdir())}
         files[OUTPUT_FILE] = outcome.output
-    return Result(**{**vars(told), "verdict": verdict, "detail": outcome.detail, "cycles": outcome.cycles, "files": files})
+    return Result(
+        **{**vars(told), "verdict": verdict, "detail": outcome.detail, "cycles": outcome.cycles, "files": files}
+    )
 
 
 def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
