@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fusesoc_firm.diagnostics import InputError, fail
@@ -123,7 +123,7 @@ class _Tasks:
 
     def _copy(self, name: MessageName, first: MessageName) -> Entry:
         result = self._results[first]
-        copied = Result(**{**vars(result), "seconds": 0.0, "files": {}})
+        copied = replace(result, seconds=0.0, files={})
         return Entry(name, self.library.ros, copied, self._statistics[name], first)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 import time
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.verify.campaign import Entry, Settings, run, select
@@ -39,6 +41,9 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
 
     Raises `InputError` if one fails, or if none could be verified.
     """
+    if settings.width not in WIDTHS:
+        legal = ", ".join(map(str, WIDTHS))
+        fail(f"no converter is made for a stream of {settings.width} bits", hint=f"legal here: {legal}")
     if not places.cluster:
         ghdl()
     names = select(library, patterns)
@@ -89,6 +94,8 @@ def _print_summary(report: Report, places: Places) -> None:
         if len(found) > _SHOWN:
             print(f"and {len(found) - _SHOWN} more: {verdict}")
     counts = ", ".join(f"{count} {verdict}" for verdict, count in report.totals.items() if count)
-    print(f"{len(report.entries)} messages in {report.seconds:g} s: {counts}")
+    judges = Counter(entry.result.judge for entry in report.entries if entry.result.judge)
+    judged = "; ".join(f"{count} by {judge}" for judge, count in sorted(judges.items()))
+    print(f"{len(report.entries)} messages in {report.seconds:g} s: {counts}\njudged: {judged or 'none'}")
     if places.report:
         print(f"{places.report}, {write_report(report, places.report)}")

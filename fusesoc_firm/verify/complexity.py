@@ -34,8 +34,11 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class Statistics:
-    """`fields` are the leaves with all messages unfolded, an array counting once; `types` the distinct types among all
-    fields, messages included and arrays by their elements; `depth` is 1 where no message lies within."""
+    """The figures of a message.
+
+    `fields` are the leaves with all messages unfolded, an array counting once; `types` the distinct types among all
+    fields, messages included and arrays by their elements; `depth` is 1 where no message lies within.
+    """
 
     level: Level
     fields: int

@@ -56,7 +56,11 @@ class _Server:
         self._requests: IO[bytes] = self._process.stdin
         self._answers: IO[bytes] = self._process.stdout
         self._lock = threading.Lock()
-        self.version: str = pickle.load(self._answers)
+        try:
+            self.version: str = pickle.load(self._answers)
+        except EOFError:
+            self._process.wait()
+            raise
 
     def ask(self, request: object) -> Any:
         with self._lock:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,6 +31,8 @@ _OPTIONS = ("--std=93",)
 _CYCLES = re.compile(r"^\d+ frames in, \d+ frames out, (\d+) cycles", re.MULTILINE)
 _REPORT = re.compile(r"^[^ ]*:@\d+[a-z]+:\(([a-z ]+)\): ")
 _DETAIL_LINES = 3
+# The threads of a Dask worker share the library.
+_lock = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -88,13 +92,10 @@ def ghdl_version() -> str:
     return subprocess.run([ghdl(), "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
 
 
-@cache
 def firm_library() -> Path:
     """A folder with the cores of the bench as the library `firm`, analysed once a process and deleted at its end."""
-    folder = _temporary_folder().name
-    files = [str(path) for path in core_files()]
-    subprocess.run([ghdl(), "-a", *_OPTIONS, "--work=firm", f"--workdir={folder}", *files], check=True)
-    return Path(folder)
+    with _lock:
+        return _analysed_library()
 
 
 def core_files(root: Path | None = None) -> Iterator[Path]:
@@ -106,9 +107,12 @@ def core_files(root: Path | None = None) -> Iterator[Path]:
 
 
 @cache
-def _temporary_folder() -> tempfile.TemporaryDirectory[str]:
-    """Kept alive by the cache."""
-    return tempfile.TemporaryDirectory(prefix="firm_verify_")
+def _analysed_library() -> Path:
+    folder = tempfile.mkdtemp(prefix="firm_verify_")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    files = [str(path) for path in core_files()]
+    subprocess.run([ghdl(), "-a", *_OPTIONS, "--work=firm", f"--workdir={folder}", *files], check=True)
+    return Path(folder)
 
 
 def _hex_lines(frame: bytes) -> str:

@@ -6,13 +6,13 @@ import random
 import tempfile
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
 from fusesoc_firm.converter.generator import publisher_files, subscriber_files
 from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.frame.codec import CodecError, pack_frame, used_bytes
+from fusesoc_firm.frame.codec import CodecError, MessageValue, encode, pack_frame, used_bytes
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
@@ -79,7 +79,7 @@ def verify(task: Task) -> Result:
     started = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="firm_verify_") as name:
         result = _verify_in(Path(name), task, library)
-    return Result(**{**vars(result), "seconds": round(time.perf_counter() - started, 3)})
+    return replace(result, seconds=round(time.perf_counter() - started, 3))
 
 
 def _verify_in(folder: Path, task: Task, library: Path) -> Result:
@@ -95,13 +95,14 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
         frame = frame_of(task.name, task.definitions)
         sources = _write_sources(folder, frame, task.width)
     except InputError as error:
-        return Result(**{**vars(told), "detail": f"not converted: {error.diagnostics[0].message}"})
+        return replace(told, detail=f"not converted: {error.diagnostics[0].message}")
     except Exception as error:  # noqa: BLE001 - a message that the generator stumbles over must not end all others
-        return Result(**{**vars(told), "detail": f"not converted: {type(error).__name__}: {error}"})
-    try:
-        frames = [_stimulus(frame, payload, chance) for payload in judgement.payloads]
-    except CodecError as error:
-        return Result(**{**vars(told), "detail": f"the judge's bytes are no {task.name}: {error}"})
+        return replace(told, detail=f"not converted: {type(error).__name__}: {error}")
+    # The loop itself cannot tell two fields from each other that both converters take for one another.
+    for value, payload in zip(values, judgement.payloads, strict=True):
+        if fault := _layout_fault(frame, value, payload):
+            return replace(told, detail=f"the layout is not the judge's: {fault}")
+    frames = [_stimulus(frame, payload, chance) for payload in judgement.payloads]
     write_frames(folder, frames, [pack_frame(PUBLISHER_ID, payload) for payload in judgement.payloads])
     outcome = simulate(folder, sources, library, chance.randint(1, _HIGHEST_SEED))
     verdict = Verdict.PASS if outcome.is_right else Verdict.FAIL
@@ -109,9 +110,7 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
     if task.keeps_files and verdict is Verdict.FAIL:
         files = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.iterdir())}
         files[OUTPUT_FILE] = outcome.output
-    return Result(
-        **{**vars(told), "verdict": verdict, "detail": outcome.detail, "cycles": outcome.cycles, "files": files}
-    )
+    return replace(told, verdict=verdict, detail=outcome.detail, cycles=outcome.cycles, files=files)
 
 
 def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
@@ -123,8 +122,25 @@ def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
     return list(texts)
 
 
+def _layout_fault(frame: Frame, value: MessageValue, payload: bytes) -> str:
+    """How our own layout of a value differs from the judge's bytes; empty if it does not."""
+    try:
+        ours = encode(frame, value)
+        used_bytes(frame, payload)
+    except CodecError as error:
+        return str(error)
+    if ours == payload:
+        return ""
+    at = next((at for at, pair in enumerate(zip(ours, payload, strict=False)) if pair[0] != pair[1]), None)
+    return (
+        f"{len(ours)} bytes, not {len(payload)}"
+        if at is None
+        else f"byte {at} is {ours[at]:02x}, not {payload[at]:02x}"
+    )
+
+
 def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
-    """The frame that carries a payload as a foreign writer may send it: what is in the padding and behind the last field is chance.
+    """The frame that carries a payload, with garbage in the padding and behind the last field, as writers may send it.
 
     Our own layout says where padding lies. Where it errs, a value is hurt, and the answer is not the judge's.
     """

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TypeVar
+from importlib import import_module
+from typing import Any, TypeVar
 
 from fusesoc_firm.diagnostics import fail
 
@@ -62,11 +63,12 @@ def local_workers(jobs: int | None = None) -> Iterator[Workers]:
 def cluster_workers(address: str) -> Iterator[Workers]:
     """The workers of the Dask cluster whose scheduler is at `address`. Raises `InputError` if there is none."""
     try:
-        from distributed import Client
+        # Its types are partial.
+        distributed: Any = import_module("distributed")
     except ImportError:
         fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
     try:
-        client = Client(address, timeout=_CONNECT_SECONDS)
+        client = distributed.Client(address, timeout=_CONNECT_SECONDS)
     except (OSError, ValueError) as error:
         fail(f"no Dask scheduler answers at '{address}'", hint=str(error).splitlines()[0])
     with client:
