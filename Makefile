@@ -16,13 +16,16 @@ WAVES ?=
 SIM_OPTIONS ?=
 # Programs that a target needs beside those of all.
 TOOLS :=
+# Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
+CORPUS ?= ../shared/corpus
+VERIFY_OPTIONS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
 
-.PHONY: help sim test lint setup tools clean distclean
+.PHONY: help sim test corpus lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -37,6 +40,19 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIO
 test: TOOLS = iverilog
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+
+HAS_CORPUS := $(and $(wildcard $(CORPUS)/ros1),$(wildcard $(CORPUS)/ros2))
+
+corpus: $(if $(HAS_CORPUS),setup) ## Verify the converters of all messages below CORPUS; VERIFY_OPTIONS='--width 64 ...'
+ifeq ($(HAS_CORPUS),)
+	@echo "No corpus: '$(CORPUS)' has no folders ros1 and ros2 of message definitions; CORPUS=DIR names another place"
+else
+	@status=0; \
+	for ros in 1 2; do \
+	  $(BIN)/firm message verify --ros $$ros --path "$(CORPUS)/ros$$ros" \
+	    --report build/corpus_ros$$ros.json $(VERIFY_OPTIONS) || status=1; \
+	done; exit $$status
+endif
 
 lint: setup ## Check style and types
 	@$(BIN)/ruff check .

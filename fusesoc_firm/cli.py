@@ -27,7 +27,7 @@ Handler = Callable[[argparse.Namespace], None]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run `firm`; the exit status is 1 for faults in the input, 2 for a wrong command line."""
+    """Run `firm`; the exit status is 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
     arguments = _parser().parse_args(argv)
     try:
         arguments.handler(arguments)
@@ -35,6 +35,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
     except BrokenPipeError:
         # Whoever read the output (`| head`) has seen enough. Nothing may be flushed into the closed pipe at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -94,8 +97,34 @@ def _add_message(commands: Any) -> None:
     show.add_argument("type", metavar="TYPE", help="its type, such as geometry_msgs/Quaternion")
     show.add_argument("--stage", choices=STAGES, default="tree", help="what to print (default: tree)")
     show.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
-    for parser in (listing, show):
+    verify = _command(
+        actions,
+        "verify",
+        "check converters of messages in simulation, against other serialisers",
+        "firm message verify 'geometry_msgs/*' --ros 1 --report geometry.json",
+        _verify_messages,
+    )
+    for parser in (listing, show, verify):
         _add_definitions(parser)
+    _add_verification(verify)
+
+
+def _add_verification(verify: argparse.ArgumentParser) -> None:
+    verify.add_argument("types", metavar="TYPE", nargs="*", help="a type, or several with * and ? (default: all known)")
+    verify.add_argument("--stimuli", type=_positive, default=3, metavar="N", help="values of each message (default: 3)")
+    verify.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
+    verify.add_argument("--seed", type=int, default=1, metavar="N", help="all randomness follows from it (default: 1)")
+    verify.add_argument("--jobs", type=_positive, metavar="N", help="messages at once (default: one a core)")
+    verify.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
+    verify.add_argument("--report", type=Path, metavar="F.json", help="write a report, and F.html beside it")
+    verify.add_argument("--keep", type=Path, metavar="DIR", help="keep the work folder of each message that fails")
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"{number} is less than 1")
+    return number
 
 
 def _add_system(commands: Any) -> None:
@@ -163,6 +192,22 @@ def _show_message(arguments: argparse.Namespace) -> None:
         texts.insert(0, _title(interface, definitions))
     separator = "\n---\n" if arguments.stage in ("frame", "config") else "\n\n"
     print(separator.join(text.rstrip("\n") for text in texts))
+
+
+def _verify_messages(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.verify.campaign import Settings
+    from fusesoc_firm.verify.command import Places, verify_messages
+
+    command = ["firm", "message", "verify", "--ros", str(arguments.ros)]
+    command += [word for path in arguments.path for word in ("--path", str(path))]
+    command += ["--distro", arguments.distro] if arguments.distro else []
+    command += ["--width", str(arguments.width), "--stimuli", str(arguments.stimuli), "--seed", str(arguments.seed)]
+    verify_messages(
+        _library(arguments, arguments.ros),
+        arguments.types,
+        Settings(arguments.width, arguments.stimuli, arguments.seed, keeps_files=arguments.keep is not None),
+        Places(arguments.jobs, arguments.cluster, arguments.report, arguments.keep, command),
+    )
 
 
 def _title(interface: Interface, definitions: dict[MessageName, MessageDefinition]) -> str:

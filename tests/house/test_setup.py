@@ -97,7 +97,7 @@ def test_make_without_a_target_lists_them() -> None:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     done = subprocess.run(["make"], cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
     listed = [line.split()[0] for line in done.stdout.splitlines()[1:]]
-    assert listed == ["help", "sim", "test", "lint", "setup", "clean", "distclean"]
+    assert listed == ["help", "sim", "test", "corpus", "lint", "setup", "clean", "distclean"]
 
 
 @pytest.mark.parametrize(
@@ -113,3 +113,27 @@ def test_make_sim_passes_its_variables_on(variables: list[str], arguments: str) 
     command = ["make", "--dry-run", "sim", *variables]
     done = subprocess.run(command, cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
     assert f" .venv/bin/fusesoc run --target=sim {arguments} 2>&1 | " in " ".join(done.stdout.split())
+
+
+def make_corpus(corpus: Path) -> list[str]:
+    """What `make corpus` would do, line by line."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    command = ["make", "--dry-run", "corpus", f"CORPUS={corpus}", "VERIFY_OPTIONS=--width 64"]
+    return subprocess.run(
+        command, cwd=ROOT, env=environment, text=True, capture_output=True, check=True
+    ).stdout.splitlines()
+
+
+def test_make_corpus_verifies_both_versions(tmp_path: Path) -> None:
+    for ros in ("ros1", "ros2"):
+        (tmp_path / ros).mkdir()
+    text = " ".join(" ".join(make_corpus(tmp_path)).replace("\\", "").split())
+    expected = (
+        f'firm message verify --ros $ros --path "{tmp_path}/ros$ros" --report build/corpus_ros$ros.json --width 64'
+    )
+    assert expected in text
+
+
+def test_make_corpus_without_a_corpus_is_one_line(tmp_path: Path) -> None:
+    (line,) = make_corpus(tmp_path)
+    assert line.startswith(f"echo \"No corpus: '{tmp_path}' has no folders ros1 and ros2")

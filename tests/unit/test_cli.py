@@ -41,7 +41,16 @@ def test_path_is_the_library(capsys: Captured) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    [[], ["path"], ["message"], ["message", "list"], ["message", "show"], ["system"], ["system", "check"]],
+    [
+        [],
+        ["path"],
+        ["message"],
+        ["message", "list"],
+        ["message", "show"],
+        ["message", "verify"],
+        ["system"],
+        ["system", "check"],
+    ],
     ids=" ".join,
 )
 def test_every_command_has_help_with_an_example(command: list[str], capsys: Captured) -> None:

@@ -33,10 +33,10 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.stores import distributions
+from fusesoc_firm.verify.stimuli import EMPTY, KINDS, Stimuli
 from tests.unit.frame.genpy_oracle import GenpyOracle, has_genpy
 from tests.unit.frame.oracle import DefinitionsOracle, Oracle, is_same
 from tests.unit.frame.random_messages import random_texts
-from tests.unit.frame.stimuli import EMPTY, KINDS, Stimuli
 
 ROS1 = RosVersion.ROS1
 CORPUS = os.environ.get("CORPUS", "")

@@ -1,0 +1,132 @@
+"""Many messages: which ones, each layout once, and what came of them."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.parser import parse_full_name
+from fusesoc_firm.verify.complexity import Statistics, statistics
+from fusesoc_firm.verify.task import Result, Task, Verdict, verify
+from fusesoc_firm.verify.workers import Workers
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How messages are verified."""
+
+    width: int = 8
+    stimuli: int = 3
+    seed: int = 1
+    keeps_files: bool = False
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A message and what came of it.
+
+    `same_as` is the message of the same layout that was verified for it; `statistics` is None for one that is no legal
+    definition.
+    """
+
+    name: MessageName
+    ros: RosVersion
+    result: Result
+    statistics: Statistics | None = None
+    same_as: MessageName | None = None
+
+
+def select(library: MessageLibrary, patterns: Sequence[str]) -> list[MessageName]:
+    """The messages that names or patterns with `*` and `?` mean, all if there is none; sorted.
+
+    A service or an action means its messages. Raises `InputError` for a name or a pattern that means none, and for
+    every fault in what a name leads to.
+    """
+    if not patterns:
+        return library.names()
+    found: set[MessageName] = set()
+    for pattern in patterns:
+        names = list(_matching(library, pattern)) if set(pattern) & set("*?[") else _named(library, pattern)
+        if not names:
+            fail(f"no message is like '{pattern}'", hint="`firm message list` shows all")
+        found |= set(names)
+    return sorted(found)
+
+
+def _matching(library: MessageLibrary, pattern: str) -> Iterator[MessageName]:
+    yield from (name for name in library.names() if fnmatch.fnmatchcase(str(name), pattern))
+    for interface in library.interfaces():
+        if fnmatch.fnmatchcase(str(interface), pattern):
+            yield from interface.messages
+
+
+def _named(library: MessageLibrary, full_name: str) -> Sequence[MessageName]:
+    kind, name = parse_full_name(full_name)
+    interface = library.interface(name, kind)
+    names = interface.messages if interface else (name,)
+    library.joint_closure(names)
+    return names
+
+
+def run(library: MessageLibrary, names: Iterable[MessageName], settings: Settings, workers: Workers) -> Iterator[Entry]:
+    """Verify messages; an entry for each, as they are done. Raises `InputError` if no message can be verified here."""
+    tasks = _Tasks(library, settings)
+    for task, result in workers.run(verify, tasks.of(names)):
+        yield from tasks.finished
+        tasks.finished.clear()
+        yield from tasks.entries(task, result)
+    yield from tasks.finished
+
+
+@dataclass
+class _Tasks:
+    """Makes a task of the first message of each layout, and knows the others of that layout."""
+
+    library: MessageLibrary
+    settings: Settings
+    finished: list[Entry] = field(default_factory=list)
+    """What no task was made of: refused definitions, and those whose layout was already verified."""
+    _first: dict[Any, MessageName] = field(default_factory=dict)
+    _waiting: dict[MessageName, list[MessageName]] = field(default_factory=dict)
+    _results: dict[MessageName, Result] = field(default_factory=dict)
+    _statistics: dict[MessageName, Statistics] = field(default_factory=dict)
+
+    def of(self, names: Iterable[MessageName]) -> Iterator[Task]:
+        for name in names:
+            try:
+                definitions = self.library.closure(name)
+            except InputError as error:
+                refused = Result(Verdict.REFUSED, _first_fault(error))
+                self.finished.append(Entry(name, self.library.ros, refused))
+                continue
+            self._statistics[name] = statistics(name, definitions)
+            first = self._first.setdefault(frame_of(name, definitions).nodes, name)
+            if first == name:
+                yield Task(name, definitions, **vars(self.settings))
+            elif first in self._results:
+                self.finished.append(self._copy(name, first))
+            else:
+                self._waiting.setdefault(first, []).append(name)
+
+    def entries(self, task: Task, result: Result) -> Iterator[Entry]:
+        """What a result says of the message and of all that wait for it."""
+        self._results[task.name] = result
+        yield Entry(task.name, task.ros, result, self._statistics[task.name])
+        for name in self._waiting.pop(task.name, ()):
+            yield self._copy(name, task.name)
+
+    def _copy(self, name: MessageName, first: MessageName) -> Entry:
+        result = self._results[first]
+        copied = replace(result, seconds=0.0, files={})
+        return Entry(name, self.library.ros, copied, self._statistics[name], first)
+
+
+def _first_fault(error: InputError) -> str:
+    fault = error.diagnostics[0]
+    return f"line {fault.source.line}: {fault.message}" if fault.source else fault.message

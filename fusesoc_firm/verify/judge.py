@@ -1,0 +1,67 @@
+"""What the bytes of a message must be, by serialisers that are not ours.
+
+ROS 1 is judged by genpy, ROS's own, or by rosbags where genpy is not installed. ROS 2 is judged by rosbags, and
+mcap-ros2-support, where it is installed, must read the same values out of its bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from fusesoc_firm.frame.codec import MessageValue
+from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.verify import genpy_judge, mcap_judge, rosbags_judge
+from fusesoc_firm.verify.definitions import NoJudgementError
+
+Definitions = Mapping[MessageName, MessageDefinition]
+Serialise = Callable[[MessageName, Definitions, Sequence[MessageValue]], list[bytes]]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The payload of each value, and who says so."""
+
+    payloads: tuple[bytes, ...]
+    judge: str
+
+
+def judge(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> Judgement:
+    """The payloads of a message's values.
+
+    Raises:
+        NoJudgementError: no installed serialiser can read the message, or two of them disagree.
+    """
+    if definitions[name].ros is RosVersion.ROS2:
+        return _judge_ros2(name, definitions, values)
+    refusals = []
+    for title, serialise in ros1_judges():
+        try:
+            return Judgement(tuple(serialise(name, definitions, values)), title)
+        except NoJudgementError as error:
+            refusals.append(f"{title}: {error}")
+    raise NoJudgementError("; ".join(refusals))
+
+
+def ros1_judges() -> list[tuple[str, Serialise]]:
+    """Who can judge ROS 1 here, the better first."""
+    genpy = [(genpy_judge.TITLE, genpy_judge.serialise)] if genpy_judge.is_installed() else []
+    return [*genpy, (rosbags_judge.TITLE, rosbags_judge.serialise)]
+
+
+def versions() -> dict[str, str]:
+    """The installed judges and their versions."""
+    found = {
+        rosbags_judge.TITLE: rosbags_judge.version(),
+        genpy_judge.TITLE: genpy_judge.version(),
+        mcap_judge.TITLE: mcap_judge.version(),
+    }
+    return {title: version for title, version in found.items() if version}
+
+
+def _judge_ros2(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> Judgement:
+    payloads = rosbags_judge.serialise(name, definitions, values)
+    if not mcap_judge.version():
+        return Judgement(tuple(payloads), rosbags_judge.TITLE)
+    mcap_judge.check(name, definitions, values, payloads)
+    return Judgement(tuple(payloads), f"{rosbags_judge.TITLE}, {mcap_judge.TITLE}")

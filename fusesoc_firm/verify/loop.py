@@ -1,0 +1,163 @@
+"""A Frame -> the bench that has its converters in a loop, with a gate in every handshake between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.render import render
+
+# Messages of variable size come with `from fusesoc_firm.converter.message_ports import message_ports, segment_count`.
+from fusesoc_firm.verify.ports import MessagePort, message_ports, segment_count
+
+ENTITY = "firm_verify_loop"
+SUBSCRIBER_ID = 1
+PUBLISHER_ID = 2
+
+_TEMPLATE = "verify/loop.vhd"
+# Cycles without a beat at the host: until it gives up, and in which it waits for surplus frames.
+_WATCHDOG = 5000
+_QUIET = 100
+
+
+@dataclass(frozen=True)
+class Gate:
+    """A handshake with a gate in it.
+
+    `valid` and `ready` are what its source and its sink say, `assignments` lead both through to the other side.
+    """
+
+    name: str
+    valid: str
+    ready: str
+    assignments: tuple[tuple[str, str], ...]
+
+
+def loop_text(frame: Frame, width: int) -> str:
+    """The bench of a message's converters, entity `ENTITY`, with the generics `SEED` and `STALL_PERCENT`."""
+    ports = message_ports(frame, width)
+    found = gates(ports, segment_count(frame))
+    # The fields of a message of fixed size are its only segment.
+    fields = ports if frame.is_fixed_size else ()
+    apart = {name for port in ports if port.is_reverse for name in _gated_names(port, ports)}
+    apart |= {port.name for port in fields}
+    streams = [port.name.removesuffix("_axis_tready") for port in ports if _is_stream(port)]
+    column = max([len("frame_error_code"), *(len(port.name) for port in ports)])
+    return render(
+        _TEMPLATE,
+        {
+            "message": str(frame.message),
+            "ros": int(frame.ros),
+            "entity": ENTITY,
+            "width": width,
+            "subscriber": SUBSCRIBER_ID,
+            "publisher": PUBLISHER_ID,
+            "select_high": PUBLISHER_ID.bit_length() - 1,
+            "watchdog": _WATCHDOG,
+            "quiet": _QUIET,
+            "subscriber_entity": subscriber_entity(frame),
+            "publisher_entity": publisher_entity(frame),
+            "has_publisher_errors": not frame.is_fixed_size,
+            "gate_count": len(found),
+            "gates": [_gate(number, gate) for number, gate in enumerate(found)],
+            "signals": list(_signals(ports, apart, segment_count(frame))),
+            "ports": [
+                {
+                    "port": port.name.ljust(column),
+                    "subscriber_signal": f"sub_{port.name}",
+                    "publisher_signal": f"pub_{port.name}" if port.name in apart else f"sub_{port.name}",
+                }
+                for port in ports
+            ],
+            "has_fields": bool(fields),
+            "fields": [
+                {"name": port.name, "nothing": "'X'" if port.width is None else "(others => 'X')"} for port in fields
+            ],
+            "has_streams": bool(streams),
+            "streams": [{"name": name} for name in streams],
+        },
+    )
+
+
+def gates(ports: Sequence[MessagePort], segments: int) -> list[Gate]:
+    """The gates of a message side: one a segment, a stream, an element and a segment of an element.
+
+    A handshake is found by its `ready`, the only kind of port that goes against the message.
+    """
+    by_name = {port.name: port for port in ports}
+    found: list[Gate] = []
+    for number in range(segments):
+        found.append(_segment_gate("", number, "msg_ready", len(found)))
+    for port in ports:
+        if _is_stream(port):
+            name = port.name.removesuffix("_tready")
+            found.append(_gate_of(f"{name}_tvalid", port.name, f"sub_{name}_tvalid", "", len(found)))
+        elif port.is_reverse:
+            found += _element_gates(port.name.removesuffix("_ready"), by_name, len(found))
+    return found
+
+
+def _is_stream(port: MessagePort) -> bool:
+    return port.is_reverse and port.name.endswith("_axis_tready")
+
+
+def _element_gates(name: str, ports: dict[str, MessagePort], first: int) -> list[Gate]:
+    """The gates of an array's elements. An element is shown when all its segments are."""
+    own = ports.get(f"{name}_segment_valid")
+    count = own.width if own and own.width else 0
+    taken = f"pub_{name}_valid and pub_{name}_ready"
+    segments = [_segment_gate(f"{name}_", number, taken, first + number) for number in range(count)]
+    shown = "".join(f" and pub_{name}_segment_valid({number})" for number in range(count))
+    element = _gate_of(f"{name}_valid", f"{name}_ready", f"sub_{name}_valid{shown}", shown, first + count)
+    return [*segments, element]
+
+
+def _segment_gate(prefix: str, number: int, taken: str, gate: int) -> Gate:
+    segment = f"{prefix}segment_valid({number})"
+    return Gate(segment, f"sub_{segment}", taken, ((f"pub_{segment}", f"sub_{segment} and is_open({gate})"),))
+
+
+def _gate_of(valid: str, ready: str, offered: str, shown: str, gate: int) -> Gate:
+    return Gate(
+        valid,
+        offered,
+        f"pub_{ready}",
+        (
+            (f"pub_{valid}", f"{offered} and is_open({gate})"),
+            (f"sub_{ready}", f"pub_{ready}{shown} and is_open({gate})"),
+        ),
+    )
+
+
+def _gated_names(ready: MessagePort, ports: Sequence[MessagePort]) -> Iterator[str]:
+    yield ready.name
+    if _is_stream(ready):
+        yield f"{ready.name.removesuffix('ready')}valid"
+        return
+    name = ready.name.removesuffix("_ready")
+    yield f"{name}_valid"
+    if any(port.name == f"{name}_segment_valid" for port in ports):
+        yield f"{name}_segment_valid"
+
+
+def _gate(number: int, gate: Gate) -> dict[str, object]:
+    return {
+        "number": number,
+        "name": gate.name,
+        "valid": gate.valid,
+        "ready": gate.ready,
+        "assignments": [{"target": target, "value": value} for target, value in gate.assignments],
+    }
+
+
+def _signals(ports: Sequence[MessagePort], apart: set[str], segments: int) -> Iterator[dict[str, str]]:
+    vector = f"std_logic_vector({segments - 1} downto 0)"
+    declared = [("sub_segment_valid", vector), ("pub_segment_valid", vector), ("msg_ready", "std_logic")]
+    for port in ports:
+        declared.append((f"sub_{port.name}", port.vhdl_type))
+        if port.name in apart:
+            declared.append((f"pub_{port.name}", port.vhdl_type))
+    column = max(len(name) for name, _ in declared)
+    return ({"name": name.ljust(column), "type": type_} for name, type_ in declared)

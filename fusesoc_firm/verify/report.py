@@ -1,0 +1,228 @@
+"""What a campaign came to: JSON for programs, HTML for people. Neither holds a path of the machine."""
+
+from __future__ import annotations
+
+import html
+import json
+import platform
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm import __version__
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.render import render, write_if_changed
+from fusesoc_firm.verify.campaign import Entry, Settings
+from fusesoc_firm.verify.complexity import Level, Statistics
+from fusesoc_firm.verify.judge import versions
+from fusesoc_firm.verify.simulation import STALL_PERCENT, ghdl_version
+from fusesoc_firm.verify.task import Verdict
+
+_TEMPLATE = "verify/report.html"
+_LEVELS = {
+    Level.SIMPLE: "1 Simple",
+    Level.EXPANDING: "2 Expanding",
+    Level.ARRAYS: "3 Arrays",
+    Level.VARIABLE_SUBMESSAGES: "4 VariableSubmessages",
+}
+# Pixels of a figure, and of what stands below and left of its bars.
+_WIDTH, _HEIGHT, _MARGIN, _LABELS = 560, 200, 40, 34
+
+
+@dataclass(frozen=True)
+class Report:
+    """All entries of a campaign, how it was run, and how long it took."""
+
+    entries: tuple[Entry, ...]
+    settings: Settings
+    seconds: float
+    tools: Mapping[str, str]
+
+    @property
+    def totals(self) -> dict[str, int]:
+        """How many messages got each verdict."""
+        found = Counter(entry.result.verdict for entry in self.entries)
+        return {str(verdict): found[verdict] for verdict in Verdict}
+
+    @property
+    def failures(self) -> list[Entry]:
+        """The messages that failed, those that stand for themselves first."""
+        failed = [entry for entry in self.entries if entry.result.verdict is Verdict.FAIL]
+        return sorted(failed, key=lambda entry: entry.same_as is not None)
+
+
+def make_report(entries: Iterable[Entry], settings: Settings, seconds: float) -> Report:
+    """A report with its entries in the order of names and the versions of what judged them."""
+    ordered = tuple(sorted(entries, key=lambda entry: (entry.ros, entry.name)))
+    tools = {"fusesoc-firm": __version__, "GHDL": ghdl_version(), "Python": platform.python_version(), **versions()}
+    return Report(ordered, settings, round(seconds, 1), tools)
+
+
+def write_report(report: Report, path: Path) -> Path:
+    """Write the report to `path`, and as HTML beside it; the path of that is returned."""
+    write_if_changed(path, json.dumps(as_data(report), indent=1, ensure_ascii=False) + "\n")
+    beside = path.with_suffix(".html")
+    write_if_changed(beside, as_html(report))
+    return beside
+
+
+def as_data(report: Report) -> dict[str, Any]:
+    """The report as plain data."""
+    settings = report.settings
+    return {
+        "tools": dict(report.tools),
+        "width": settings.width,
+        "stimuli": settings.stimuli,
+        "stall_percent": STALL_PERCENT,
+        "seed": settings.seed,
+        "seconds": report.seconds,
+        "totals": {"messages": len(report.entries), **report.totals},
+        "messages": [_entry(entry) for entry in report.entries],
+    }
+
+
+def _entry(entry: Entry) -> dict[str, Any]:
+    result = entry.result
+    found: dict[str, Any] = {"name": str(entry.name), "ros": int(entry.ros)}
+    if entry.statistics:
+        found |= {name: int(value) for name, value in vars(entry.statistics).items()}
+    if entry.same_as:
+        found["same_as"] = str(entry.same_as)
+    return found | {
+        "verdict": str(result.verdict),
+        "detail": result.detail,
+        "judge": result.judge,
+        "bytes": list(result.payload_bytes),
+        "cycles": result.cycles,
+        "seconds": result.seconds,
+    }
+
+
+# --- HTML --------------------------------------------------------------------------------------------------------
+
+
+def as_html(report: Report) -> str:
+    """The report as a page that needs no other file."""
+    settings = report.settings
+    versions_of_ros = [ros for ros in RosVersion if any(entry.ros is ros for entry in report.entries)]
+    return render(
+        _TEMPLATE,
+        {
+            "width": settings.width,
+            "stimuli": settings.stimuli,
+            "stall_percent": STALL_PERCENT,
+            "seed": settings.seed,
+            "seconds": f"{report.seconds:g}",
+            "tools": html.escape(", ".join(f"{name} {version}" for name, version in report.tools.items())),
+            "verdicts": [{"verdict": str(verdict)} for verdict in Verdict],
+            "totals": [_total(row, entries) for row, entries in _groups(report.entries, versions_of_ros)],
+            "figures": [figure for ros in versions_of_ros for figure in _figures(report.entries, ros)],
+            "tables": [
+                _table(f"Messages with the verdict '{verdict}'", verdict, report.entries)
+                for verdict in (Verdict.FAIL, Verdict.NO_JUDGE, Verdict.REFUSED)
+                if report.totals[verdict]
+            ],
+        },
+    )
+
+
+def _groups(entries: Sequence[Entry], versions_of_ros: Sequence[RosVersion]) -> list[tuple[str, list[Entry]]]:
+    """The rows of the table of totals: all, and each level, of each version."""
+    rows = []
+    for ros in versions_of_ros:
+        mine = [entry for entry in entries if entry.ros is ros]
+        rows.append((f"ROS {int(ros)}", mine))
+        for level, words in _LEVELS.items():
+            of_level = [entry for entry in mine if entry.statistics and entry.statistics.level is level]
+            rows.append((f"ROS {int(ros)}, level {words}", of_level))
+    return rows
+
+
+def _total(row: str, entries: Sequence[Entry]) -> dict[str, Any]:
+    found = Counter(entry.result.verdict for entry in entries)
+    return {"row": row, "messages": len(entries), "counts": [{"count": found[verdict]} for verdict in Verdict]}
+
+
+def _table(title: str, verdict: Verdict, entries: Sequence[Entry]) -> dict[str, Any]:
+    rows = []
+    for entry in entries:
+        if entry.result.verdict is verdict:
+            same = f" (as {entry.same_as})" if entry.same_as else ""
+            rows.append(
+                {
+                    "name": html.escape(f"{entry.name}{same}"),
+                    "ros": int(entry.ros),
+                    "level": int(entry.statistics.level) if entry.statistics else "",
+                    "detail": html.escape(entry.result.detail),
+                }
+            )
+    return {"title": title, "rows": rows}
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """`counts[k]` values lie from `first + k * step` on below the next one; `beyond` lie at or above the end."""
+
+    first: int
+    step: int
+    counts: tuple[int, ...]
+    beyond: int
+
+
+def histogram(values: Sequence[int], first: int, step: int, most: int) -> Histogram:
+    """The histogram of values from `first` to `most`, as wide as they need."""
+    inside = [value for value in values if value <= most]
+    counts = Counter((value - first) // step for value in inside)
+    return Histogram(
+        first, step, tuple(counts[k] for k in range(max(counts, default=0) + 1)), len(values) - len(inside)
+    )
+
+
+def _figures(entries: Sequence[Entry], ros: RosVersion) -> list[dict[str, Any]]:
+    """Figures 5.8 to 5.10 of the dissertation, of one version."""
+    known = [entry.statistics for entry in entries if entry.ros is ros and entry.statistics]
+    figures = (
+        ("Fields, all messages within unfolded", histogram([each.fields for each in known], 0, 10, 249)),
+        ("Distinct types of the fields", histogram([each.types for each in known], 0, 1, 60)),
+        ("Depth of nesting; 1 is a message without another one", histogram([each.depth for each in known], 1, 1, 30)),
+    )
+    return [_figure(f"ROS {int(ros)}: {title}", found, known) for title, found in figures]
+
+
+def _figure(title: str, found: Histogram, known: Sequence[Statistics]) -> dict[str, Any]:
+    tallest = max([1, *found.counts])
+    pitch = max(4, (_WIDTH - _MARGIN) // len(found.counts))
+    every = max(1, -(-_LABELS // pitch))
+    bars = []
+    for number, count in enumerate(found.counts):
+        low = found.first + number * found.step
+        height = round(_HEIGHT * count / tallest)
+        bars.append(
+            {
+                "x": _MARGIN + number * pitch,
+                "y": _HEIGHT - height,
+                "width": pitch - 1,
+                "height": height,
+                "label_y": _HEIGHT + 14,
+                "middle": _MARGIN + number * pitch + pitch // 2,
+                "label": str(low) if number % every == 0 else "",
+                "title": f"{_range(low, found.step)}: {count}",
+            }
+        )
+    beyond = f"; {found.beyond} beyond the figure" if found.beyond else ""
+    return {
+        "title": html.escape(title),
+        "caption": f"{len(known)} messages{beyond}",
+        "view_width": _MARGIN + len(found.counts) * pitch,
+        "view_height": _HEIGHT + 20,
+        "base": _HEIGHT,
+        "axis": _MARGIN,
+        "tallest": tallest,
+        "bars": bars,
+    }
+
+
+def _range(low: int, step: int) -> str:
+    return str(low) if step == 1 else f"{low} to {low + step - 1}"

@@ -1,0 +1,129 @@
+"""GHDL runs the loop of a message: frames in, frames expected back, a verdict out."""
+
+from __future__ import annotations
+
+import atexit
+import re
+import shutil
+import subprocess
+import tempfile
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import yaml
+
+from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.library_path import library_root
+from fusesoc_firm.verify.loop import ENTITY
+
+STIMULUS_FILE, EXPECTED_FILE, OUTPUT_FILE = "stimulus.txt", "expected.txt", "output.txt"
+BYTES_PER_LINE = 64
+STALL_PERCENT = 30
+# Seconds; the host gives up on hardware that hangs long before, so this is for a simulation that cannot get on.
+TIMEOUT = 300
+
+# What the bench is made of, each behind what it depends on.
+_CORES = ("axis/axis", "sched/fixed_priority", "manager/manager", "sim/host", "sim/parts")
+_OPTIONS = ("--std=93",)
+_CYCLES = re.compile(r"^\d+ frames in, \d+ frames out, (\d+) cycles", re.MULTILINE)
+_REPORT = re.compile(r"^[^ ]*:@\d+[a-z]+:\(([a-z ]+)\): ")
+_DETAIL_LINES = 3
+# The threads of a Dask worker share the library.
+_lock = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a simulation: `detail` says what is wrong, `output` is all that GHDL printed."""
+
+    is_right: bool
+    cycles: int
+    detail: str
+    output: str
+
+
+def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, timeout: float = TIMEOUT) -> Outcome:
+    """Compile `sources` of `folder`, the bench last, with the cores in `library`, and run it there."""
+    # Compiled and run by one process, which keeps all in memory: twice as fast as by steps.
+    command = [ghdl(), "-c", *_OPTIONS, f"-P{library}", *sources, "-r", ENTITY]
+    command += [f"-gSEED={seed}", f"-gSTALL_PERCENT={STALL_PERCENT}"]
+    try:
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            timeout=timeout,
+            check=False,
+        )
+    except subprocess.TimeoutExpired as error:
+        output = error.output.decode(errors="replace") if isinstance(error.output, bytes) else error.output or ""
+        return Outcome(False, 0, f"the simulation did not end within {timeout:g} s", output)
+    cycles = _CYCLES.search(done.stdout)
+    is_right = done.returncode == 0 and cycles is not None
+    return Outcome(is_right, int(cycles[1]) if cycles else 0, "" if is_right else _detail(done.stdout), done.stdout)
+
+
+def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes]) -> None:
+    """The host's two files (docs/simulation.md): stimulus k causes answer k, and nothing else comes."""
+    sent = (f"> stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(stimuli))
+    expected = (f"< @{number} answer to stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(answers))
+    (folder / STIMULUS_FILE).write_text("".join(sent), encoding="ascii")
+    (folder / EXPECTED_FILE).write_text("".join(expected), encoding="ascii")
+
+
+@cache
+def ghdl() -> str:
+    """The program. Raises `InputError` if it is not installed."""
+    path = shutil.which("ghdl")
+    if path is None:
+        fail("GHDL is not installed, and messages are verified in simulation", hint="apt-get install ghdl-mcode")
+    return path
+
+
+def ghdl_version() -> str:
+    """The first line that GHDL says of itself."""
+    return subprocess.run([ghdl(), "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
+
+
+def firm_library() -> Path:
+    """A folder with the cores of the bench as the library `firm`, analysed once a process and deleted at its end."""
+    with _lock:
+        return _analysed_library()
+
+
+def core_files(root: Path | None = None) -> Iterator[Path]:
+    """The sources of the cores that the bench is made of."""
+    for core in _CORES:
+        description = (root or library_root()) / "cores" / f"{core}.core"
+        for name in yaml.safe_load(description.read_text(encoding="utf-8"))["filesets"]["rtl"]["files"]:
+            yield description.parent / name
+
+
+@cache
+def _analysed_library() -> Path:
+    folder = tempfile.mkdtemp(prefix="firm_verify_")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    files = [str(path) for path in core_files()]
+    subprocess.run([ghdl(), "-a", *_OPTIONS, "--work=firm", f"--workdir={folder}", *files], check=True)
+    return Path(folder)
+
+
+def _hex_lines(frame: bytes) -> str:
+    starts = range(0, len(frame), BYTES_PER_LINE)
+    return "".join(f"  {frame[start : start + BYTES_PER_LINE].hex()}\n" for start in starts)
+
+
+def _detail(output: str) -> str:
+    """The first lines that name a fault: the host's, an assertion's, or the compiler's."""
+    lines = output.splitlines()
+    faults = [line.partition(": ")[2] for line in lines if line.startswith("fault in cycle")]
+    faults += [_REPORT.sub("", line) for line in lines if "(assertion failure)" in line and "FAIL" not in line]
+    faults = faults or [line for line in lines if "error" in line] or lines[:1] or ["GHDL ended without a word"]
+    return "; ".join(faults[:_DETAIL_LINES])

@@ -1,0 +1,149 @@
+"""One message from its definition to a verdict: stimuli, judge, converters, simulation."""
+
+from __future__ import annotations
+
+import random
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+
+from fusesoc_firm.converter.generator import publisher_files, subscriber_files
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.frame.codec import CodecError, MessageValue, encode, pack_frame, used_bytes
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.verify.definitions import NoJudgementError
+from fusesoc_firm.verify.judge import judge
+from fusesoc_firm.verify.loop import PUBLISHER_ID, SUBSCRIBER_ID, loop_text
+from fusesoc_firm.verify.simulation import OUTPUT_FILE, firm_library, simulate, write_frames
+from fusesoc_firm.verify.stimuli import Stimuli, kinds
+
+_BENCH = "loop.vhd"
+_HIGHEST_SEED = 2**31 - 86  # of the simulated host
+_VHDL_ENCODING = "ascii"
+
+
+class Verdict(StrEnum):
+    """What became of a message; `REFUSED` ones are no legal definitions, so nothing could be made of them."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    NO_JUDGE = "no judge"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True)
+class Task:
+    """A message with all definitions below it, and how it is verified; it needs no file, so any machine can do it."""
+
+    name: MessageName
+    definitions: Mapping[MessageName, MessageDefinition]
+    width: int
+    stimuli: int
+    seed: int
+    keeps_files: bool = False
+
+    @property
+    def ros(self) -> RosVersion:
+        """The version of ROS that the message is of."""
+        return self.definitions[self.name].ros
+
+    def chance(self) -> random.Random:
+        """The randomness of this message, the same in whatever company it is verified."""
+        return random.Random(f"{self.seed} {self.name} {int(self.ros)}")
+
+
+@dataclass(frozen=True)
+class Result:
+    """The verdict on a message. `payload_bytes` are those of each stimulus, `cycles` from first beat in to last out.
+
+    `files` are the work folder's, by name, if the task keeps them and the message did not pass.
+    """
+
+    verdict: Verdict
+    detail: str = ""
+    judge: str = ""
+    payload_bytes: tuple[int, ...] = ()
+    cycles: int = 0
+    seconds: float = 0.0
+    files: Mapping[str, str] = field(default_factory=dict, repr=False)
+
+
+def verify(task: Task) -> Result:
+    """Verify a message. Raises `InputError` only for what concerns every message: GHDL is not installed."""
+    library = firm_library()
+    started = time.perf_counter()
+    with tempfile.TemporaryDirectory(prefix="firm_verify_") as name:
+        result = _verify_in(Path(name), task, library)
+    return replace(result, seconds=round(time.perf_counter() - started, 3))
+
+
+def _verify_in(folder: Path, task: Task, library: Path) -> Result:
+    chance = task.chance()
+    stimuli = Stimuli(task.definitions, task.ros, chance)
+    values = [stimuli.message(task.name, kind) for kind in kinds(task.stimuli)]
+    try:
+        judgement = judge(task.name, task.definitions, values)
+    except NoJudgementError as error:
+        return Result(Verdict.NO_JUDGE, str(error))
+    told = Result(Verdict.FAIL, "", judgement.judge, tuple(map(len, judgement.payloads)))
+    try:
+        frame = frame_of(task.name, task.definitions)
+        sources = _write_sources(folder, frame, task.width)
+    except InputError as error:
+        return replace(told, detail=f"not converted: {error.diagnostics[0].message}")
+    except Exception as error:  # noqa: BLE001 - a message that the generator stumbles over must not end all others
+        return replace(told, detail=f"not converted: {type(error).__name__}: {error}")
+    # The loop itself cannot tell two fields from each other that both converters take for one another.
+    for value, payload in zip(values, judgement.payloads, strict=True):
+        if fault := _layout_fault(frame, value, payload):
+            return replace(told, detail=f"the layout is not the judge's: {fault}")
+    frames = [_stimulus(frame, payload, chance) for payload in judgement.payloads]
+    write_frames(folder, frames, [pack_frame(PUBLISHER_ID, payload) for payload in judgement.payloads])
+    outcome = simulate(folder, sources, library, chance.randint(1, _HIGHEST_SEED))
+    verdict = Verdict.PASS if outcome.is_right else Verdict.FAIL
+    files: dict[str, str] = {}
+    if task.keeps_files and verdict is Verdict.FAIL:
+        files = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.iterdir())}
+        files[OUTPUT_FILE] = outcome.output
+    return replace(told, verdict=verdict, detail=outcome.detail, cycles=outcome.cycles, files=files)
+
+
+def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
+    """Write converters and bench; their names in the order of compilation."""
+    files = subscriber_files([frame], width) | publisher_files([frame], width)
+    texts = {name: str(file.content) for name, file in files.items()} | {_BENCH: loop_text(frame, width)}
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding=_VHDL_ENCODING)
+    return list(texts)
+
+
+def _layout_fault(frame: Frame, value: MessageValue, payload: bytes) -> str:
+    """How our own layout of a value differs from the judge's bytes; empty if it does not."""
+    try:
+        ours = encode(frame, value)
+        used_bytes(frame, payload)
+    except CodecError as error:
+        return str(error)
+    if ours == payload:
+        return ""
+    at = next((at for at, pair in enumerate(zip(ours, payload, strict=False)) if pair[0] != pair[1]), None)
+    return (
+        f"{len(ours)} bytes, not {len(payload)}"
+        if at is None
+        else f"byte {at} is {ours[at]:02x}, not {payload[at]:02x}"
+    )
+
+
+def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
+    """The frame that carries a payload, with garbage in the padding and behind the last field, as writers may send it.
+
+    Our own layout says where padding lies. Where it errs, a value is hurt, and the answer is not the judge's.
+    """
+    used = used_bytes(frame, payload)
+    noisy = bytes(byte if is_used else chance.randrange(256) for byte, is_used in zip(payload, used, strict=True))
+    return pack_frame(SUBSCRIBER_ID, noisy + chance.randbytes(chance.randint(0, frame.trailing_bytes)))

@@ -1,0 +1,87 @@
+"""Who does the work: processes of this machine, or the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, TypeVar
+
+from fusesoc_firm.diagnostics import fail
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+_CONNECT_SECONDS = 10
+# Tasks handed out for each worker, so that none waits for the next one.
+_AHEAD = 4
+
+
+@dataclass(frozen=True)
+class Workers:
+    """An executor, and how many tasks it does at once."""
+
+    executor: Executor
+    count: int
+
+    def run(self, function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[tuple[Task, Result]]:
+        """Each task with its result, as they come; tasks are taken from their source only when there is room."""
+        pending: dict[Future[Result], Task] = {}
+        for task in tasks:
+            pending[self.executor.submit(function, task)] = task
+            if len(pending) >= _AHEAD * self.count:
+                yield from _finished(pending)
+        while pending:
+            yield from _finished(pending)
+
+
+def _finished(pending: dict[Future[Result], Task]) -> Iterator[tuple[Task, Result]]:
+    done, _ = wait(pending, return_when=FIRST_COMPLETED)
+    for future in done:
+        yield pending.pop(future), future.result()
+
+
+@contextmanager
+def local_workers(jobs: int | None = None) -> Iterator[Workers]:
+    """Processes of this machine, one a core unless `jobs` says how many."""
+    count = jobs or len(os.sched_getaffinity(0))
+    # Started anew: a copy of a process that has threads (a progress bar's) may hang.
+    context = multiprocessing.get_context("spawn")
+    executor = ProcessPoolExecutor(count, mp_context=context, initializer=_leave_interrupts_to_the_parent)
+    try:
+        yield Workers(executor, count)
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def cluster_workers(address: str) -> Iterator[Workers]:
+    """The workers of the Dask cluster whose scheduler is at `address`. Raises `InputError` if there is none."""
+    try:
+        # Its types are partial.
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
+    try:
+        client = distributed.Client(address, timeout=_CONNECT_SECONDS)
+    except (OSError, ValueError) as error:
+        fail(f"no Dask scheduler answers at '{address}'", hint=str(error).splitlines()[0])
+    with client:
+        count = sum(client.ncores().values())
+        if not count:
+            fail(f"the Dask cluster at '{address}' has no workers", hint=f"start some: dask worker {address}")
+        executor = client.get_executor(pure=False)
+        try:
+            yield Workers(executor, count)
+        finally:
+            executor.shutdown(wait=False)
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    # A handler, not SIG_IGN: that one the simulators would inherit, but Ctrl-C shall end them.
+    signal.signal(signal.SIGINT, lambda *_: None)
