@@ -129,7 +129,6 @@ class _Subscriber:
         aligned = {to: self._places(lambda step, to=to: _alignment(step) == to) for to in (2, 4)}  # type: ignore[misc]
         wanted = [
             ("STEP_IS_FIXED", "Takes a known number of bytes.", self._places(_is_fixed)),
-            ("STEP_IS_STREAM", "Hands bytes on.", self._places(lambda step: isinstance(step, StreamStep))),
             (
                 "STEP_IS_REST",
                 "Takes what is left of the payload.",
@@ -137,6 +136,7 @@ class _Subscriber:
             ),
         ]
         optional = [
+            ("STEP_IS_STREAM", "Hands bytes on.", self._places(lambda step: isinstance(step, StreamStep))),
             (
                 "STEP_IS_COUNT",
                 "Takes a count, or the length.",

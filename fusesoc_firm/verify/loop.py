@@ -6,11 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.message_ports import MessagePort, message_ports, segment_count
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.render import render
-
-# Messages of variable size come with `from fusesoc_firm.converter.message_ports import message_ports, segment_count`.
-from fusesoc_firm.verify.ports import MessagePort, message_ports, segment_count
 
 ENTITY = "firm_verify_loop"
 SUBSCRIBER_ID = 1
