@@ -36,7 +36,7 @@ class Gate:
 def loop_text(frame: Frame, width: int) -> str:
     """The bench of a message's converters, entity `ENTITY`, with the generics `SEED` and `STALL_PERCENT`."""
     ports = message_ports(frame, width)
-    found = gates(ports, segment_count(frame))
+    found = gates(ports, segment_count(frame), has_msg_valid=not frame.is_fixed_size)
     # The fields of a message of fixed size are its only segment.
     fields = ports if frame.is_fixed_size else ()
     apart = {name for port in ports if port.is_reverse for name in _gated_names(port, ports)}
@@ -79,8 +79,8 @@ def loop_text(frame: Frame, width: int) -> str:
     )
 
 
-def gates(ports: Sequence[MessagePort], segments: int) -> list[Gate]:
-    """The gates of a message side: one a segment, a stream, an element and a segment of an element.
+def gates(ports: Sequence[MessagePort], segments: int, *, has_msg_valid: bool) -> list[Gate]:
+    """The gates of a message side: one a segment, a stream, an element, a segment of an element, and the message.
 
     A handshake is found by its `ready`, the only kind of port that goes against the message.
     """
@@ -94,6 +94,8 @@ def gates(ports: Sequence[MessagePort], segments: int) -> list[Gate]:
             found.append(_gate_of(f"{name}_tvalid", port.name, f"sub_{name}_tvalid", "", len(found)))
         elif port.is_reverse:
             found += _element_gates(port.name.removesuffix("_ready"), by_name, len(found))
+    if has_msg_valid:
+        found.append(_message_gate(segments, len(found)))
     return found
 
 
@@ -110,6 +112,12 @@ def _element_gates(name: str, ports: dict[str, MessagePort], first: int) -> list
     shown = "".join(f" and pub_{name}_segment_valid({number})" for number in range(count))
     element = _gate_of(f"{name}_valid", f"{name}_ready", f"sub_{name}_valid{shown}", shown, first + count)
     return [*segments, element]
+
+
+def _message_gate(segments: int, gate: int) -> Gate:
+    """A message is shown when all its segments are."""
+    shown = " and ".join(["sub_msg_valid", *(f"pub_segment_valid({number})" for number in range(segments))])
+    return Gate("msg_valid", shown, "msg_ready", (("pub_msg_valid", f"{shown} and is_open({gate})"),))
 
 
 def _segment_gate(prefix: str, number: int, taken: str, gate: int) -> Gate:
@@ -152,7 +160,8 @@ def _gate(number: int, gate: Gate) -> dict[str, object]:
 
 def _signals(ports: Sequence[MessagePort], apart: set[str], segments: int) -> Iterator[dict[str, str]]:
     vector = f"std_logic_vector({segments - 1} downto 0)"
-    declared = [("sub_segment_valid", vector), ("pub_segment_valid", vector), ("msg_ready", "std_logic")]
+    declared = [("sub_segment_valid", vector), ("pub_segment_valid", vector), ("sub_msg_valid", "std_logic")]
+    declared += [("pub_msg_valid", "std_logic"), ("msg_ready", "std_logic")]
     for port in ports:
         declared.append((f"sub_{port.name}", port.vhdl_type))
         if port.name in apart:
