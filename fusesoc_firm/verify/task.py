@@ -103,7 +103,8 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
         if fault := _layout_fault(frame, value, payload):
             return replace(told, detail=f"the layout is not the judge's: {fault}")
     frames = [_stimulus(frame, payload, chance) for payload in judgement.payloads]
-    write_frames(folder, frames, [pack_frame(PUBLISHER_ID, payload) for payload in judgement.payloads])
+    answers = [_answer(frame, payload, sent) for payload, sent in zip(judgement.payloads, frames, strict=True)]
+    write_frames(folder, frames, answers)
     outcome = simulate(folder, sources, library, chance.randint(1, _HIGHEST_SEED))
     verdict = Verdict.PASS if outcome.is_right else Verdict.FAIL
     files: dict[str, str] = {}
@@ -147,3 +148,13 @@ def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
     used = used_bytes(frame, payload)
     noisy = bytes(byte if is_used else chance.randrange(256) for byte, is_used in zip(payload, used, strict=True))
     return pack_frame(SUBSCRIBER_ID, noisy + chance.randbytes(chance.randint(0, frame.trailing_bytes)))
+
+
+def _answer(frame: Frame, payload: bytes, sent: bytes) -> bytes:
+    """What must come back: the judge's bytes.
+
+    Where the size varies, the length is that of the frame that was sent, for the publisher has it before it can know of
+    bytes behind the last field: it sends zeros for these.
+    """
+    trailing = 0 if frame.is_fixed_size else len(sent) - len(pack_frame(SUBSCRIBER_ID, payload))
+    return pack_frame(PUBLISHER_ID, payload + bytes(trailing))
