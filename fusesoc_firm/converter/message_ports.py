@@ -18,39 +18,17 @@ from dataclasses import dataclass, field
 
 from fusesoc_firm.converter.ports import FieldPort, field_ports, port_width, ros_path, vhdl_type
 from fusesoc_firm.converter.program import Program, Scope, has_bytes, subscriber_program
+from fusesoc_firm.converter.reserved import reserved_names
 from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
 from fusesoc_firm.naming import identifier
 
 LENGTH_BITS = 32
 
-# What the templates of variable size declare or use by name, beside numbered signals such as `store_3_r`.
-_TAKEN = frozenset(
-    """
-    clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
-    m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
-    END_PLACE BAD_LENGTH SHORT_PART LONG_PART all_words word_index this_word word_size sent_size is_supplied
-    is_at_end is_withdrawn is_ending is_header is_offered is_accepted is_done is_jumping jump_target is_short is_long
-    left_step left_sum left_ends in_stream stream_last stream_keep stream_size stream_more stream_done
-    is_closing element_last elements_end phase_left padding_size in_padding repeat_last trim_ready is_cut
-    is_filled pack_data pack_count pack_last pack_valid pack_ready u_select walk_places count_bytes
-    watch_stream check_stream check_element stream_short stream_long elements_short elements_long count_elements give_up
-    count_phase count_repeats report_fault u_trim u_pack lanes_kept
-    segment_valid msg_valid msg_ready frame_error frame_error_code payload_length id
-    rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural positive integer
-    boolean to_unsigned to_integer resize shift_left shift_right rising_edge failure true false
-    firm_axis_select firm_axis_window firm_axis_pack firm_axis_trim firm_axis_pkg
-    bad_count bad_encoding bad_length beat_bytes beat_last charge charged charged_by charged_sum check_step choose_bytes
-    choose_step code_t count_bytes
-    count_is_zero count_t count_too_large count_value end_step frame_fault frame_over keep_lanes
-    keep_state long_frame no_fault numbers_t padding_left phase_next short_frame sink_ready step_aligns_to_2
-    step_aligns_to_4 step_beat step_closes_text step_count step_done step_has_2 step_has_4 step_has_8 step_is_count
-    step_is_fixed step_is_open step_is_padding step_is_rest step_is_stream step_is_text step_last_beat
-    step_last_bytes step_next step_number step_opens_data step_stopped steps_t stream_data stream_keep stream_last
-    stream_cut stream_ends stream_valid taken_bytes u_window wanted wanted_any wanted_beyond wanted_shown window_bytes
-    window_count window_last window_skip window_take window_take_valid
-    """.split()
+_TEMPLATES = ("vhdl/variable_subscriber.vhd", "vhdl/variable_publisher.vhd")
+# What is numbered in the templates' configurations, and the tables there.
+_NUMBERED = re.compile(
+    r".*_r|payload_length|(closing|elements)_\d+(_\w+)?|step_(is|has|closes|opens|aligns)_\w+", re.IGNORECASE
 )
-_NUMBERED = re.compile(r".*_r|closing_\d+|elements_\d+_sum", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -185,7 +163,7 @@ class _Naming:
 
     program: Program
     parts: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(default_factory=dict)
-    taken: set[str] = field(default_factory=lambda: set(_TAKEN))
+    taken: set[str] = field(default_factory=lambda: set(reserved_names(*_TEMPLATES)))
 
     def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
         for node in nodes:
@@ -233,33 +211,42 @@ def _has_parts(loop: Loop) -> bool:
 def _ports(side: MessageSide, nodes: Sequence[Node], width: int, done: set[Path]) -> Iterator[MessagePort]:
     for node in nodes:
         match node:
-            case Fixed(fields=fields):
-                for leaf in fields:
-                    if leaf.count and leaf.is_used and leaf.path not in done:
-                        port = side.field(leaf)
-                        yield MessagePort(port.name, port.width, port.comment)
-                        done.add(leaf.path)
+            case Fixed():
+                yield from _leaf_ports(side, node, done)
             case Data() if node.is_used:
                 yield from _stream_ports(side.stream(node), width)
             case Loop() if node.is_used:
                 ports = side.element(node)
-                words = f"{ros_path(node.path)}: {node.ros_type}"
                 if node.count is None:
-                    yield MessagePort(ports.length, LENGTH_BITS, f"{words}, its elements")
-                if not has_bytes(node):
-                    continue
-                yield from _ports(side, node.body, width, done)
-                if ports.segments is not None:
-                    yield MessagePort(ports.segment_valid, ports.segments, f"{words}, segments of an element")
-                if not node.body:
-                    continue
-                yield MessagePort(ports.valid, None, f"{words}, an element")
-                yield MessagePort(ports.last, None)
-                yield MessagePort(ports.ready, None, is_reverse=True)
+                    yield MessagePort(ports.length, LENGTH_BITS, f"{_words(node)}, its elements")
+                if has_bytes(node):
+                    yield from _ports(side, node.body, width, done)
+                    yield from _element_ports(ports)
+
+
+def _words(part: Data | Loop) -> str:
+    return f"{ros_path(part.path)}: {part.ros_type}"
+
+
+def _leaf_ports(side: MessageSide, node: Fixed, done: set[Path]) -> Iterator[MessagePort]:
+    """Each leaf once, though padding may part its elements."""
+    for leaf in node.fields:
+        if leaf.count and leaf.is_used and leaf.path not in done:
+            port = side.field(leaf)
+            yield MessagePort(port.name, port.width, port.comment)
+            done.add(leaf.path)
+
+
+def _element_ports(ports: ElementPorts) -> Iterator[MessagePort]:
+    if ports.segments is not None:
+        yield MessagePort(ports.segment_valid, ports.segments, f"{_words(ports.loop)}, segments of an element")
+    yield MessagePort(ports.valid, None, f"{_words(ports.loop)}, an element")
+    yield MessagePort(ports.last, None)
+    yield MessagePort(ports.ready, None, is_reverse=True)
 
 
 def _stream_ports(ports: StreamPorts, width: int) -> Iterator[MessagePort]:
-    words = f"{ros_path(ports.part.path)}: {ports.part.ros_type}"
+    words = _words(ports.part)
     yield MessagePort(ports.length, LENGTH_BITS, f"{words}, its length")
     yield MessagePort(ports.axis("tdata"), width, words)
     yield MessagePort(ports.axis("tkeep"), width // 8)

@@ -33,7 +33,7 @@ from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.render import render
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.unit.frame.oracle import Oracle
-from tests.unit.frame.stimuli import Stimuli
+from fusesoc_firm.verify.stimuli import Stimuli
 from tests.unit.frame.variable_samples import VARIABLE
 
 ID = 0xA5

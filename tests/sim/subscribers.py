@@ -10,10 +10,10 @@ An event is a line: a stream with its bytes, an element of an array with its fie
 
 from __future__ import annotations
 
+import pathlib
 import struct
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.configuration import subscriber_entity
@@ -24,7 +24,7 @@ from fusesoc_firm.converter.variable_subscriber import (
     VARIABLE_SUBSCRIBER_TEMPLATE,
     variable_subscriber_configuration,
 )
-from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Step
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Path, Step
 from fusesoc_firm.render import render
 from tests.sim.ghdl import Generic, Library, core_files
 
@@ -36,7 +36,7 @@ _ZERO = {True: "(others => '0')", False: "'0'"}
 class SubscriberBench:
     """GHDL's libraries in one directory."""
 
-    directory: Path
+    directory: pathlib.Path
     made: dict[tuple[Frame, int], Subscriber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -75,10 +75,12 @@ class Subscriber:
 
     def analyse_bench(self) -> None:
         file = self.library.directory / self.library.name / f"{self.entity}_tb.vhd"
-        file.write_text(render("subscriber_tb.vhd", self._configuration(), Path(__file__).parent), encoding="ascii")
+        file.write_text(
+            render("subscriber_tb.vhd", self._configuration(), pathlib.Path(__file__).parent), encoding="ascii"
+        )
         self.library.analyse([file])
 
-    def run(self, directory: Path, frames: Sequence[bytes], **generics: Generic) -> list[str]:
+    def run(self, directory: pathlib.Path, frames: Sequence[bytes], **generics: Generic) -> list[str]:
         """What comes of the frames, given as all bytes behind their ids."""
         rows = [row for frame in frames for row in self._beats(frame)]
         (directory / "beats.txt").write_text("".join(f"{row}\n" for row in rows), encoding="ascii")
@@ -99,14 +101,11 @@ class Subscriber:
     def _events(self, nodes: Sequence[Node], value: Any, depth: int, numbers: list[str]) -> Iterator[str]:
         """The events of a message or an element; its own fields and lengths are added to `numbers`."""
         side = message_side(self.frame)
-        shown = set()
+        shown: set[Path] = set()
         for node in nodes:
             match node:
-                case Fixed(fields=fields):
-                    for leaf in fields:
-                        if leaf.count and leaf.is_used and leaf.path not in shown:
-                            shown.add(leaf.path)
-                            numbers.append(_leaf_digits(leaf, _elements(value, leaf.path[depth:])))
+                case Fixed():
+                    numbers += _fixed_digits(node, value, depth, shown)
                 case Data() if node.is_used:
                     data, count = _data(node, _member(value, node.path[depth:]))
                     numbers.append(struct.pack(">I", count).hex())
@@ -213,6 +212,14 @@ def _elements(value: Any, path: Sequence[Step]) -> list[Any]:
         if step.count is not None:
             found = [element for part in found for element in part]
     return found
+
+
+def _fixed_digits(node: Fixed, value: Any, depth: int, shown: set[Path]) -> Iterator[str]:
+    """The digits of each leaf that is not shown yet."""
+    for leaf in node.fields:
+        if leaf.count and leaf.is_used and leaf.path not in shown:
+            shown.add(leaf.path)
+            yield _leaf_digits(leaf, _elements(value, leaf.path[depth:]))
 
 
 def _leaf_digits(leaf: FrameField, elements: Sequence[Any]) -> str:

@@ -15,10 +15,10 @@ from fusesoc_firm.frame.codec import CodecError, decode, encode
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.verify.stimuli import KINDS, TYPICAL, Stimuli
 from tests.sim.subscribers import LENGTH_BYTES, SubscriberBench
 from tests.unit.frame.oracle import Oracle
 from tests.unit.frame.samples import AWKWARD_VARIABLE
-from tests.unit.frame.stimuli import KINDS, TYPICAL, Stimuli
 
 SEED = 20240711
 

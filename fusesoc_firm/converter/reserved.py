@@ -1,0 +1,34 @@
+"""Names that no field's port may have, since the templates declare or use them: they are read from the templates."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+from fusesoc_firm.render import TEMPLATES
+
+# What a template uses by the names of others.
+_USED = frozenset(
+    """rtl firm ieee work std std_logic_1164 numeric_std std_logic std_logic_vector unsigned natural positive integer
+    boolean line string to_unsigned to_integer resize shift_left shift_right rising_edge failure true false""".split()
+)
+_TAG = re.compile(r"\{\{\{?[^}]*\}?\}\}")
+_COMMENT = re.compile(r"--.*")
+_DECLARED = re.compile(
+    r"^\s*(?:signal|constant|variable|type|subtype|function|alias)\s+(\w+(?:\s*,\s*\w+)*)"  # signal a, b : ...
+    r"|^\s*(\w+)\s*:"  # a port, a generic, the label of a process or an instance
+    r"|\b(?:firm\.|use\s+firm\.\w+\.)(\w+)",  # what is used of the library
+    re.MULTILINE,
+)
+
+
+@cache
+def reserved_names(*templates: str) -> frozenset[str]:
+    """In lower case, the names in the VHDL templates; those made of a tag have no place here, as they are numbered."""
+    found = set(_USED)
+    for template in templates:
+        text = (TEMPLATES / f"{template}.mustache").read_text(encoding="utf-8")
+        text = _TAG.sub("\N{REPLACEMENT CHARACTER}", _COMMENT.sub("", text))
+        for names in _DECLARED.findall(text):
+            found |= {name.strip().lower() for group in names for name in group.split(",") if name.strip()}
+    return frozenset(found)
