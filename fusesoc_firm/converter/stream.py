@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 
+# A longer store is parted, at the cost of one more enable: in simulation, each beat that is taken moves a whole store.
+_MOST_BEATS = 64
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
 
 
@@ -78,7 +80,11 @@ def stores_of(stream: Stream, windows: Sequence[tuple[int, int]]) -> list[Store]
     lanes: dict[tuple[int, ...], list[int]] = {}
     for lane in sorted(beats):
         lanes.setdefault(tuple(beats[lane]), []).append(lane)
-    return [Store(tuple(found), key) for key, found in lanes.items()]
+    return [
+        Store(tuple(found), key[start : start + _MOST_BEATS])
+        for key, found in lanes.items()
+        for start in range(0, len(key), _MOST_BEATS)
+    ]
 
 
 @dataclass(frozen=True)
