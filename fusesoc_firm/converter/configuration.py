@@ -14,7 +14,7 @@ from typing import Any
 from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.converter.slices import Slice, slices_of, windows_of
-from fusesoc_firm.converter.storing import at_beat, joints, store_configuration, store_names
+from fusesoc_firm.converter.storing import Counter, joints, store_configuration, store_names
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, stores_of
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.defaults import default_bytes
@@ -29,7 +29,7 @@ PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
 # A position tells 2**3 states that are no beats; while a message waits, the next beat is the first one.
 _STATE_BITS = 3
-_FIRST = "is_first = '1'"
+_COUNTER = Counter(start="is_first = '1'")
 # Bytes of a literal in a line.
 _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
@@ -57,7 +57,7 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     inputs = ["s_axis_tdata"] + ([] if stream.lanes == 1 else ["s_axis_tkeep"])
     return {
         **_common(frame, stream, subscriber_entity(frame), "out"),
-        **store_configuration(stores, start=_FIRST),
+        **store_configuration(stores, _COUNTER),
         **_states(stream.beat(ends[-1])),
         "is_byte_wide": stream.lanes == 1,
         "has_void_lane": stream.length_start > 0,
@@ -178,7 +178,7 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
     return [
         {
             "position": beat,
-            "condition": f"{'if' if beat == beats[0] else 'elsif'} {at_beat(beat, beat, start=_FIRST)}",
+            "condition": f"{'if' if beat == beats[0] else 'elsif'} {_COUNTER.is_in(beat, beat)}",
             "candidates": [
                 {"number": more, **_length_candidate(frame.payload_bytes + more, beat, stream)}
                 for more in range(frame.trailing_bytes + 1)
@@ -208,7 +208,7 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
     """That a byte of the stream has a value; `keep` is its lane's bit of tkeep."""
     lane = stream.lane(byte)
     return {
-        "position": at_beat(stream.beat(byte), stream.beat(byte), start=_FIRST),
+        "position": _COUNTER.is_in(stream.beat(byte), stream.beat(byte)),
         "keep": lane,
         "is_kept": stream.lanes > 1,
         "bits": "" if stream.lanes == 1 else f"({stream.data(lane)})",
@@ -221,7 +221,7 @@ def _end(stream: Stream, last_byte: int, number: int | None) -> Configuration:
     lane = stream.lane(last_byte)
     match = "" if number is None else f"match({number}) = '1' and "
     return {
-        "condition": f"{match}{at_beat(stream.beat(last_byte), stream.beat(last_byte), start=_FIRST)}",
+        "condition": f"{match}{_COUNTER.is_in(stream.beat(last_byte), stream.beat(last_byte))}",
         "lane": lane,
         "is_kept": stream.lanes > 1,
         "has_lane_behind": lane + 1 < stream.lanes,

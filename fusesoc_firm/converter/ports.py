@@ -20,7 +20,7 @@ _TAKEN = """
     std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
 """.split()
 # Those of one store of several.
-_NUMBERED = re.compile(r"(store|fields)_\d+(_\w+)?", re.IGNORECASE)
+_NUMBERED = re.compile(r"(store|fields|turns?|used)_\d+(_\w+)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
