@@ -65,14 +65,8 @@ architecture rtl of axis_to_awkward_msgs_carry254 is
   signal ready          : std_logic;
   signal beat           : std_logic;
   -- The bytes of the fields; those of a new beat push the others down.
-  signal store_0    : std_logic;
-  signal fields_0_r : std_logic_vector(511 downto 0);
-  signal store_1    : std_logic;
-  signal fields_1_r : std_logic_vector(511 downto 0);
-  signal store_2    : std_logic;
-  signal fields_2_r : std_logic_vector(511 downto 0);
-  signal store_3    : std_logic;
-  signal fields_3_r : std_logic_vector(463 downto 0);
+  signal store    : std_logic;
+  signal fields_r : std_logic_vector(1999 downto 0);
 
 begin
 
@@ -86,23 +80,11 @@ begin
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
 
-  store_0 <= '1' when
-      (position_r >= 8 and position_r <= 71) else '0';
-
-  store_1 <= '1' when
-      (position_r >= 72 and position_r <= 135) else '0';
-
-  store_2 <= '1' when
-      (position_r >= 136 and position_r <= 199) else '0';
-
-  store_3 <= '1' when
-      (position_r >= 200 and position_r <= 257) else '0';
+  store <= '1' when
+      (position_r >= 8 and position_r <= 257) else '0';
 
   -- Each field as it lies among the bytes that were stored.
-  data(511 downto 0)     <= fields_0_r(511 downto 0);
-  data(1023 downto 512)  <= fields_1_r(511 downto 0);
-  data(1535 downto 1024) <= fields_2_r(511 downto 0);
-  data(1999 downto 1536) <= fields_3_r(463 downto 0);
+  data <= fields_r(1999 downto 0);
 
   segment_valid    <= (others => is_waiting);
   msg_valid        <= is_waiting;
@@ -261,25 +243,10 @@ begin
       if beat = '1' then
         position_r <= next_position;
         match_r    <= match;
-        if store_0 = '1' then
-          fields_0_r <=
+        if store = '1' then
+          fields_r <=
               s_axis_tdata(7 downto 0) &
-              fields_0_r(511 downto 8);
-        end if;
-        if store_1 = '1' then
-          fields_1_r <=
-              s_axis_tdata(7 downto 0) &
-              fields_1_r(511 downto 8);
-        end if;
-        if store_2 = '1' then
-          fields_2_r <=
-              s_axis_tdata(7 downto 0) &
-              fields_2_r(511 downto 8);
-        end if;
-        if store_3 = '1' then
-          fields_3_r <=
-              s_axis_tdata(7 downto 0) &
-              fields_3_r(463 downto 8);
+              fields_r(1999 downto 8);
         end if;
       elsif is_told = '1' or (is_waiting = '1' and msg_ready = '1') then
         position_r <= (others => '0');
