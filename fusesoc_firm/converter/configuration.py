@@ -6,23 +6,33 @@ arithmetic and no choice beyond 'is this there'.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 from fusesoc_firm.converter.limits import check_fixed_size
-from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
+from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.converter.slices import Slice, slices_of, windows_of
-from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, ranges, stores_of
+from fusesoc_firm.converter.storing import Counter, joints, store_configuration, store_names
+from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, stores_of
 from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
+from fusesoc_firm.frame.defaults import default_bytes
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Fixed, Frame
 from fusesoc_firm.naming import entity_name
 
 Configuration = dict[str, Any]
 
 SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
-_LARGEST_FRAME = (2**31 - 1) // 8
+# VHDL counts the bits of a publisher's frame, and of up to three bytes in front of it, up to 2**31-1.
+_LARGEST_FRAME = (2**31 - 1) // 8 - 3
+# A position tells 2**3 states that are no beats; while a message waits, the next beat is the first one.
+_STATE_BITS = 3
+_COUNTER = Counter(start="is_first = '1'")
+# Bytes of a literal in a line.
+_ROW = 16
+_ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
 
 
 def subscriber_entity(frame: Frame) -> str:
@@ -44,26 +54,40 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     windows = windows_of(frame)
     stores = stores_of(stream, windows)
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
-    # Until then nothing of the message that waits is touched, and none can follow it.
-    hold_position = min(stream.beat(stream.payload_start), stream.beat(ends[0]))
+    inputs = ["s_axis_tdata"] + ([] if stream.lanes == 1 else ["s_axis_tkeep"])
     return {
         **_common(frame, stream, subscriber_entity(frame), "out"),
+        **store_configuration(stores, _COUNTER),
+        **_states(stream.beat(ends[-1])),
         "is_byte_wide": stream.lanes == 1,
         "has_void_lane": stream.length_start > 0,
-        "last_position": stream.beat(ends[-1]),
-        "position_high": max(1, stream.beat(ends[-1]).bit_length()) - 1,
-        "hold_position": hold_position,
-        "has_slack": hold_position > 0,
-        "has_fields": bool(windows),
-        "stores": [_store(store, name) for store, name in zip(stores, _store_names(stores), strict=True)],
-        "store_signals": _store_signals(stores),
         "assignments": _subscriber_assignments(frame, stream, stores),
         "has_trailing": frame.trailing_bytes > 0,
         "match_high": frame.trailing_bytes,
         "length_beats": _length_beats(frame, stream),
         "has_encoding": frame.checked_prefix > 0,
         "prefix_checks": [_byte_check(stream, *item) for item in _prefix_bytes(frame, stream)],
-        "ends": [_end(stream, number, byte) for number, byte in enumerate(ends)],
+        "ends": [_end(stream, byte, number if len(ends) > 1 else None) for number, byte in enumerate(ends)],
+        "compared": ", ".join(["position_r", "is_first", *inputs, *(["match_r"] if frame.trailing_bytes else [])]),
+        "checked": ", ".join(["position_r", "is_first", *inputs, "s_axis_tlast", "match"]),
+    }
+
+
+def _states(last_position: int) -> Configuration:
+    """The values of the position that are no beats: as few highest bits as can tell them are ones.
+
+    Below these, bit 2 tells whether the frame has ended, bits 1 and 0 hold a code.
+    """
+    bits = max(_STATE_BITS + 1, (last_position + 2**_STATE_BITS).bit_length())
+    ones = next(count for count in range(1, bits) if last_position < 2**bits - 2 ** (bits - count))
+    high = "1" * ones + "0" * (bits - ones - _STATE_BITS)
+    return {
+        "position_high": bits - 1,
+        "beyond": "1" * ones,
+        "beyond_low": bits - ones,
+        "broken": f"{high}000",
+        "ended": f"{high}100",
+        "complete": f"{high}010",
     }
 
 
@@ -75,15 +99,27 @@ def publisher_configuration(frame: Frame, width: int) -> Configuration:
     stream = Stream(width)
     beats = stream.beat(frame.frame_bytes - 1) + 1
     last_lanes = stream.lane(frame.frame_bytes - 1) + 1
+    start = _first_position(stream)
+    position_bits = max(1, (start + beats - 1).bit_length())
     return {
         **_common(frame, stream, publisher_entity(frame), "in"),
-        "frame_beats": beats,
-        "frame_high": beats * width - 1,
-        "position_high": max(1, (beats - 1).bit_length()) - 1,
+        "first_position": start,
+        "last_position": start + beats - 1,
+        "frame_high": (start + beats) * width - 1,
+        "position_bits": position_bits,
+        "position_high": position_bits - 1,
         "has_partial_beat": last_lanes < stream.lanes,
         "last_keep": "0" * (stream.lanes - last_lanes) + "1" * last_lanes,
-        "pieces": _publisher_pieces(frame, beats * stream.lanes),
+        "pieces": _publisher_pieces(frame, start * stream.lanes, beats * stream.lanes),
     }
+
+
+def _first_position(stream: Stream) -> int:
+    """Where a publisher's position starts: at 8 bits so that the payload's bytes begin at a multiple of four.
+
+    Four of them share a LUT of the multiplexer, and the constant bytes in front need none; a third less in all.
+    """
+    return -(ID_BYTES + LENGTH_BYTES) % 4 if stream.lanes == 1 else 0
 
 
 def check_width(width: int) -> None:
@@ -96,7 +132,7 @@ def _check_size(frame: Frame) -> None:
     if frame.frame_bytes > _LARGEST_FRAME:
         fail(
             f"{frame.message} takes {frame.payload_bytes} bytes, too many for a converter",
-            hint=f"at most {_LARGEST_FRAME - ID_BYTES - LENGTH_BYTES}: VHDL counts the bits of a frame up to 2**31-1",
+            hint=f"at most {_LARGEST_FRAME - ID_BYTES - LENGTH_BYTES}, since VHDL counts bits up to 2**31-1",
         )
 
 
@@ -143,8 +179,7 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
     return [
         {
             "position": beat,
-            "condition": "if" if beat == beats[0] else "elsif",
-            "is_first": beat == beats[0],
+            "condition": f"{'if' if beat == beats[0] else 'elsif'} {_COUNTER.is_in(beat, beat)}",
             "candidates": [
                 {"number": more, **_length_candidate(frame.payload_bytes + more, beat, stream)}
                 for more in range(frame.trailing_bytes + 1)
@@ -162,8 +197,8 @@ def _length_candidate(length: int, beat: int, stream: Stream) -> Configuration:
         for index, byte in enumerate(data)
         if stream.beat(stream.length_start + index) == beat
     ]
-    joints = _joints(len(checks), " or", "")
-    return {"checks": [{**check, "joint": joint} for check, joint in zip(checks, joints, strict=True)]}
+    ends = joints(len(checks), " or", "")
+    return {"checks": [{**check, "joint": joint} for check, joint in zip(checks, ends, strict=True)]}
 
 
 def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
@@ -174,7 +209,7 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
     """That a byte of the stream has a value; `keep` is its lane's bit of tkeep."""
     lane = stream.lane(byte)
     return {
-        "position": stream.beat(byte),
+        "position": _COUNTER.is_in(stream.beat(byte), stream.beat(byte)),
         "keep": lane,
         "is_kept": stream.lanes > 1,
         "bits": "" if stream.lanes == 1 else f"({stream.data(lane)})",
@@ -182,12 +217,12 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
     }
 
 
-def _end(stream: Stream, number: int, last_byte: int) -> Configuration:
-    """Where a frame ends of which bit `number` of `match` tells the length."""
+def _end(stream: Stream, last_byte: int, number: int | None) -> Configuration:
+    """Where a frame ends, of which bit `number` of `match` tells the length; None if there is but one length."""
     lane = stream.lane(last_byte)
+    match = "" if number is None else f"match({number}) = '1' and "
     return {
-        "number": number,
-        "position": stream.beat(last_byte),
+        "condition": f"{match}{_COUNTER.is_in(stream.beat(last_byte), stream.beat(last_byte))}",
         "lane": lane,
         "is_kept": stream.lanes > 1,
         "has_lane_behind": lane + 1 < stream.lanes,
@@ -195,43 +230,9 @@ def _end(stream: Stream, number: int, last_byte: int) -> Configuration:
     }
 
 
-def _store_names(stores: Sequence[Store]) -> list[str]:
-    """What tells the stores apart in names: nothing if there is but one."""
-    return [""] if len(stores) == 1 else [f"_{number}" for number in range(len(stores))]
-
-
-def _store(store: Store, suffix: str) -> Configuration:
-    lanes = ranges(store.lanes)
-    register = f"fields{suffix}_r"
-    data = [f"s_axis_tdata({8 * last + 7} downto {8 * first})" for first, last in reversed(lanes)]
-    if len(store.beats) > 1:
-        data.append(f"{register}({store.bits - 1} downto {store.beat_bits})")
-    windows = ranges(store.beats)
-    return {
-        "store": f"store{suffix}",
-        "register": register,
-        "data": [
-            {"piece": piece, "joint": joint} for piece, joint in zip(data, _joints(len(data), " &", ";"), strict=True)
-        ],
-        "windows": [
-            {"first": first, "last": last, "is_one": first == last, "joint": joint}
-            for (first, last), joint in zip(windows, _joints(len(windows), " or", " else '0';"), strict=True)
-        ],
-    }
-
-
-def _store_signals(stores: Sequence[Store]) -> list[Configuration]:
-    """The declaration of each store and of what makes it take a beat, in columns."""
-    declared = []
-    for store, suffix in zip(stores, _store_names(stores), strict=True):
-        declared += [(f"store{suffix}", vhdl_type(None)), (f"fields{suffix}_r", vhdl_type(store.bits))]
-    column = max((len(name) for name, _ in declared), default=0)
-    return [{"name": name.ljust(column), "type": type_} for name, type_ in declared]
-
-
 def _subscriber_assignments(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Configuration]:
     """`port <= fields_r(...)` for every piece of a port that lies in one piece in a store."""
-    names = _store_names(stores)
+    names = store_names(stores)
     places = StoreMap(stream, stores)
     pairs: list[tuple[str, str]] = []
     for port in field_ports(frame):
@@ -262,13 +263,16 @@ def _is_bit(piece: Slice) -> bool:
     return piece.port.field.type.bits == 1
 
 
-def _publisher_pieces(frame: Frame, size: int) -> list[Configuration]:
-    """`frame(...) <= value` for every part of the frame: the header, constant bytes, fields, and zeros up to `size`."""
+def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Configuration]:
+    """`frame(...) <= value` for every part: zeros up to byte `start`, where a frame of `size` bytes begins.
+
+    This is header, constant bytes, fields, and zeros behind its end.
+    """
     header = ID_BYTES + LENGTH_BYTES
     pieces = [
         (0, ID_BYTES, f"std_logic_vector(to_unsigned(ID, {8 * ID_BYTES}))"),
-        (ID_BYTES, LENGTH_BYTES, _hex(frame.payload_bytes.to_bytes(LENGTH_BYTES, "little"))),
-        *((header + offset, len(data), _hex(data)) for offset, data in _constant_bytes(frame)),
+        (ID_BYTES, LENGTH_BYTES, _literal(frame.payload_bytes.to_bytes(LENGTH_BYTES, "little"))),
+        *((header + offset, len(data), _literal(data)) for offset, data in _constant_bytes(frame)),
         *(
             (header + piece.offset, piece.bytes, f'"0000000" & {_target(piece)}' if _is_bit(piece) else _target(piece))
             for port in field_ports(frame)
@@ -276,30 +280,30 @@ def _publisher_pieces(frame: Frame, size: int) -> list[Configuration]:
         ),
     ]
     if size > frame.frame_bytes:
-        pieces.append((frame.frame_bytes, size - frame.frame_bytes, "(others => '0')"))
-    targets = [f"frame({8 * (first + count) - 1} downto {8 * first})" for first, count, _ in pieces]
+        pieces.append((frame.frame_bytes, size - frame.frame_bytes, _literal(bytes(size - frame.frame_bytes))))
+    if start:
+        pieces.insert(0, (-start, start, _literal(bytes(start))))
+    targets = [f"frame({8 * (start + first + count) - 1} downto {8 * (start + first)})" for first, count, _ in pieces]
     column = max(map(len, targets))
     return [
         {"target": target.ljust(column), "value": value} for target, (_, _, value) in zip(targets, pieces, strict=True)
     ]
 
 
-def _hex(data: bytes) -> str:
-    """Bytes as a VHDL literal, the first one lowest."""
-    return f'x"{data[::-1].hex()}"'
+def _literal(data: bytes) -> str:
+    """Bytes as a VHDL literal, the first one lowest; many zeros in short."""
+    return f'x"{data[::-1].hex()}"' if any(data) or len(data) <= _ROW else "(others => '0')"
 
 
-def _constant_bytes(frame: Frame) -> list[tuple[int, bytes]]:
-    """The parts of the payload that hold no field, with what a publisher sends there: the prefix, else zeros."""
-    parts = []
+def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:
+    """The parts of the payload that no port drives, with what a publisher sends there.
+
+    This is the prefix, the defaults of fields that are not used, else zeros; in rows, and long runs of zeros at once.
+    """
+    payload = b"".join(default_bytes(node) for node in frame.nodes if isinstance(node, Fixed))
+    payload = frame.prefix + payload[len(frame.prefix) :]
     cursor = 0
     for first, end in [*windows_of(frame), (frame.payload_bytes, frame.payload_bytes)]:
-        if first > cursor:
-            data = (frame.prefix + bytes(frame.payload_bytes))[cursor:first]
-            parts.append((cursor, data))
+        for part in _ROWS.finditer(payload, cursor, first):
+            yield part.start(), part[0]
         cursor = end
-    return parts
-
-
-def _joints(count: int, between: str, behind: str) -> list[str]:
-    return [between] * (count - 1) + [behind] if count else []

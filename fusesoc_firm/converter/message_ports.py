@@ -166,25 +166,30 @@ class _Naming:
     taken: set[str] = field(default_factory=lambda: set(reserved_names(*_TEMPLATES)))
 
     def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
+        """Name all parts, also those that are not used: what else is used does not change a name."""
         for node in nodes:
             match node:
                 case Fixed(fields=fields):
                     for leaf in fields:
                         self.leaf(leaf)
-                case Data() if node.is_used:
+                case Data():
                     names = (*node.names, "element") if scope and scope[-1].path == node.path else node.names
-                    self.parts["data", node.path] = StreamPorts(node, self.name(names, _STREAM))
-                case Loop() if node.is_used:
+                    self.add(("data", node.path), StreamPorts(node, self.name(names, _STREAM)), is_used=node.is_used)
+                case Loop():
                     inner = (*scope, node)
                     segments = self.program.segments(inner) if _has_parts(node) else None
-                    self.parts["loop", node.path] = ElementPorts(
-                        node, self.name(node.names, _ELEMENT), segments or None
-                    )
+                    ports = ElementPorts(node, self.name(node.names, _ELEMENT), segments or None)
+                    self.add(("loop", node.path), ports, is_used=node.is_used)
                     self.nodes(node.body, inner)
 
     def leaf(self, leaf: FrameField) -> None:
-        if leaf.count and leaf.is_used and ("field", leaf.path) not in self.parts:
-            self.parts["field", leaf.path] = FieldPort(self.name(leaf.names, ("",)), port_width(leaf), leaf)
+        if leaf.count and leaf.first == 0:
+            port = FieldPort(self.name(leaf.names, ("",)), port_width(leaf), leaf)
+            self.add(("field", leaf.path), port, is_used=leaf.is_used)
+
+    def add(self, key: tuple[str, Path], ports: FieldPort | StreamPorts | ElementPorts, *, is_used: bool) -> None:
+        if is_used:
+            self.parts[key] = ports
 
     def name(self, names: Sequence[str], suffixes: Sequence[str]) -> str:
         """The first of `a_b`, `a_b_2`, `a_b_3`, ... with which no port gets a name that is taken."""

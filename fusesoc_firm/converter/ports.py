@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import Frame, FrameField, Path
-from fusesoc_firm.naming import distinct_identifiers
+from fusesoc_firm.naming import distinct_identifiers, identifier
 
 # What the templates declare or use by name: a field of that name gets another port name.
 _TAKEN = """
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
     segment_valid msg_valid msg_ready frame_error frame_error_code
-    id code_t no_fault bad_length short_frame long_frame bad_encoding last_position no_length frame_beats
-    position_r position_last match match_r compare fields_r fault_r msg_valid_r fault beat_fault ready beat store frame
-    check receive send u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
+    id code_t no_fault bad_length short_frame long_frame bad_encoding no_length frame_beats first_position last_position
+    position_t position_r position_last next_position broken ended complete beyond is_first is_waiting is_told
+    match match_r compare fault ready beat store fields_r frame check follow receive send
+    u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
     std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
 """.split()
-# A wide stream has up to one store a lane.
-_TAKEN += [name for number in range(64) for name in (f"store_{number}", f"fields_{number}_r")]
+# Those of one store of several.
+_NUMBERED = re.compile(r"(store|fields|turns?|used)_\d+(_\w+)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -46,10 +48,13 @@ def vhdl_type(width: int | None) -> str:
 
 
 def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
-    """A port for every leaf that has a value, in wire order."""
+    """A port for every leaf that has a value and is used, in wire order; what else is used does not change its name."""
     fields = [field for field in frame.fields if field.count]
-    names = distinct_identifiers((field.names for field in fields), reserved=_TAKEN)
-    return tuple(FieldPort(name, port_width(field), field) for name, field in zip(names, fields, strict=True))
+    numbered = (name for field in fields if _NUMBERED.fullmatch(name := identifier(*field.names)))
+    names = distinct_identifiers((field.names for field in fields), reserved=[*_TAKEN, *numbered])
+    return tuple(
+        FieldPort(name, port_width(field), field) for name, field in zip(names, fields, strict=True) if field.is_used
+    )
 
 
 def port_width(field: FrameField) -> int | None:

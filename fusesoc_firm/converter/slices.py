@@ -41,10 +41,13 @@ def slices_of(port: FieldPort) -> Iterator[Slice]:
 
 
 def windows_of(frame: Frame) -> list[tuple[int, int]]:
-    """The parts of the payload that hold values, as (first, end) offsets in order, touching parts joined."""
+    """The parts of the payload that hold fields in use, as (first, end) offsets in order, touching parts joined."""
     windows: list[tuple[int, int]] = []
     for first, end in sorted(
-        (run.offset, run.offset + run.count * field.type.size) for field in frame.fields for run in field.runs
+        (run.offset, run.offset + run.count * field.type.size)
+        for field in frame.fields
+        if field.is_used
+        for run in field.runs
     ):
         if windows and windows[-1][1] == first:
             windows[-1] = (windows[-1][0], end)

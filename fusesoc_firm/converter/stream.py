@@ -6,11 +6,13 @@ id's byte is still there, in the lowest lane of the first beat, and void (docs/a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 
+# A larger store is parted, at the cost of one more enable: in simulation, each beat that is taken moves a whole store.
+_MOST_BITS = 2048
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
 
 
@@ -78,7 +80,16 @@ def stores_of(stream: Stream, windows: Sequence[tuple[int, int]]) -> list[Store]
     lanes: dict[tuple[int, ...], list[int]] = {}
     for lane in sorted(beats):
         lanes.setdefault(tuple(beats[lane]), []).append(lane)
-    return [Store(tuple(found), key) for key, found in lanes.items()]
+    return [
+        Store(tuple(found), part)
+        for key, found in lanes.items()
+        for part in _parts(key, max(1, _MOST_BITS // (8 * len(found))))
+    ]
+
+
+def _parts(beats: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
+    for start in range(0, len(beats), most):
+        yield beats[start : start + most]
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ entity axis_to_geometry_msgs_quaternion is
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
     -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it went on behind its length,
-    -- 4 its encoding is unknown
+    -- 4 its encoding is unknown; the code counts while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -37,36 +37,47 @@ end entity;
 
 architecture rtl of axis_to_geometry_msgs_quaternion is
 
-  subtype code_t is std_logic_vector(3 downto 0);
-  constant NO_FAULT     : code_t := "0000";
-  constant BAD_LENGTH   : code_t := "0001";
-  constant SHORT_FRAME  : code_t := "0010";
-  constant LONG_FRAME   : code_t := "0011";
+  subtype code_t is std_logic_vector(2 downto 0);
+  constant NO_FAULT     : code_t := "000";
+  constant BAD_LENGTH   : code_t := "001";
+  constant SHORT_FRAME  : code_t := "010";
+  constant LONG_FRAME   : code_t := "011";
+  constant NO_LENGTH    : std_logic_vector(0 downto 0) := (others => '0');
 
-  -- The beat with the last byte that a frame may have, counted from the length's.
-  constant LAST_POSITION : natural := 35;
-  constant NO_LENGTH     : std_logic_vector(0 downto 0) := (others => '0');
+  -- The beat on s_axis, counted from the length's. From BROKEN on it is no beat, but tells what became of the frame:
+  -- BROKEN + code    it has a fault, and is skipped up to its end
+  -- ENDED + code     it has ended, and its fault is told
+  -- COMPLETE         its message waits to be taken; a frame that ended early is not skipped, so that code is free
+  -- Two bits hold a code.
+  subtype position_t is unsigned(5 downto 0);
+  constant BROKEN       : position_t := "110000";
+  constant ENDED        : position_t := "110100";
+  constant COMPLETE     : position_t := "110010";
+  signal position_r     : position_t := (others => '0');
+  signal next_position  : position_t;
+  signal beyond         : std_logic;
+  signal is_first       : std_logic;
+  signal is_waiting     : std_logic;
+  signal is_told        : std_logic;
 
-  -- The beat on s_axis; rests at LAST_POSITION until tlast.
-  signal position_r : unsigned(5 downto 0) := (others => '0');
-  -- Whether the bytes of the length so far are right.
-  signal match      : std_logic_vector(0 downto 0);
-  signal match_r    : std_logic_vector(0 downto 0) := (others => '0');
-
-  signal ready, beat   : std_logic;
-  -- The fault of this beat, and the frame's first fault so far.
-  signal beat_fault    : code_t;
-  signal fault         : code_t;
-  signal fault_r       : code_t := NO_FAULT;
-  signal msg_valid_r   : std_logic := '0';
+  -- Whether the bytes of the length on this beat are right.
+  signal match          : std_logic_vector(0 downto 0);
+  signal fault          : code_t;
+  signal ready          : std_logic;
+  signal beat           : std_logic;
   -- The bytes of the fields; those of a new beat push the others down.
   signal store    : std_logic;
   signal fields_r : std_logic_vector(255 downto 0);
 
 begin
 
-  -- A message that waits to be taken stops the next one's payload, not its length.
-  ready         <= '0' when msg_valid_r = '1' and position_r >= 4 else '1';
+  beyond     <= '1' when position_r(5 downto 4) = "11" else '0';
+  is_waiting <= '1' when beyond = '1' and position_r(2 downto 0) = COMPLETE(2 downto 0) else '0';
+  is_told    <= beyond and position_r(2);
+  is_first   <= '1' when position_r = 0 or is_waiting = '1' else '0';
+
+  -- The next frame starts in the cycle in which the message is taken, but not in the one in which a fault is told.
+  ready         <= not is_told and (msg_ready or not is_waiting);
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
 
@@ -79,14 +90,15 @@ begin
   z <= fields_r(191 downto 128);
   w <= fields_r(255 downto 192);
 
-  segment_valid <= (others => msg_valid_r);
-  msg_valid     <= msg_valid_r;
+  segment_valid    <= (others => is_waiting);
+  msg_valid        <= is_waiting;
+  frame_error      <= is_told;
+  frame_error_code <= "00" & std_logic_vector(position_r(1 downto 0));
 
-  compare : process (position_r, s_axis_tdata, match_r)
+  compare : process (position_r, is_first, s_axis_tdata)
   begin
-    match <= match_r;
-    if position_r = 0 then
-      match <= (others => '1');
+    match <= (others => '1');
+    if is_first = '1' then
       if
           s_axis_tdata /= x"20"
       then
@@ -113,65 +125,57 @@ begin
     end if;
   end process;
 
-  check : process (position_r, s_axis_tlast, match, fault_r, beat_fault)
+  check : process (position_r, is_first, s_axis_tdata, s_axis_tlast, match)
   begin
-    beat_fault <= NO_FAULT;
+    fault <= NO_FAULT;
     if match = NO_LENGTH then
-      beat_fault <= BAD_LENGTH;
-    elsif match(0) = '1' and position_r = 35 then
+      fault <= BAD_LENGTH;
+    elsif position_r = 35 then
       if s_axis_tlast = '0' then
-        beat_fault <= LONG_FRAME;
+        fault <= LONG_FRAME;
       end if;
     elsif s_axis_tlast = '1' then
-      beat_fault <= SHORT_FRAME;
+      fault <= SHORT_FRAME;
     end if;
+  end process;
 
-    -- The first fault of a frame is the one that is told.
-    fault <= fault_r;
-    if fault_r = NO_FAULT then
-      fault <= beat_fault;
+  follow : process (position_r, beyond, is_first, s_axis_tlast, fault)
+  begin
+    if beyond = '1' and is_first = '0' then
+      -- The first fault of a frame is the one that is told.
+      next_position <= position_r;
+      if s_axis_tlast = '1' then
+        next_position <= position_r or ENDED;
+      end if;
+    elsif fault /= NO_FAULT then
+      next_position <= BROKEN or resize(unsigned(fault(1 downto 0)), position_t'length);
+      if s_axis_tlast = '1' then
+        next_position <= ENDED or resize(unsigned(fault(1 downto 0)), position_t'length);
+      end if;
+    elsif s_axis_tlast = '1' then
+      next_position <= COMPLETE;
+    elsif is_first = '1' then
+      next_position <= to_unsigned(1, position_t'length);
+    else
+      next_position <= position_r + 1;
     end if;
   end process;
 
   receive : process (clk)
   begin
     if rising_edge(clk) then
-      frame_error <= '0';
-      if msg_ready = '1' then
-        msg_valid_r <= '0';
-      end if;
-
       if beat = '1' then
-        if s_axis_tlast = '1' then
-          position_r <= (others => '0');
-          fault_r    <= NO_FAULT;
-          if fault = NO_FAULT then
-            msg_valid_r <= '1';
-          else
-            frame_error      <= '1';
-            frame_error_code <= fault;
-          end if;
-        else
-          fault_r <= fault;
-          if position_r /= LAST_POSITION then
-            position_r <= position_r + 1;
-          end if;
-        end if;
-        match_r <= match;
-
+        position_r <= next_position;
         if store = '1' then
           fields_r <=
               s_axis_tdata(7 downto 0) &
               fields_r(255 downto 8);
         end if;
+      elsif is_told = '1' or (is_waiting = '1' and msg_ready = '1') then
+        position_r <= (others => '0');
       end if;
-
       if rst_n = '0' then
-        position_r       <= (others => '0');
-        fault_r          <= NO_FAULT;
-        msg_valid_r      <= '0';
-        frame_error      <= '0';
-        frame_error_code <= NO_FAULT;
+        position_r <= (others => '0');
       end if;
     end if;
   end process;

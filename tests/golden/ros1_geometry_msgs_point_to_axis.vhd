@@ -35,12 +35,13 @@ end entity;
 
 architecture rtl of geometry_msgs_point_to_axis is
 
-  constant FRAME_BEATS : natural := 29;
+  constant FIRST_POSITION : natural := 3;
+  constant LAST_POSITION  : natural := 31;
 
-  -- The whole frame, its first byte lowest.
-  signal frame         : std_logic_vector(231 downto 0);
+  -- The whole frame, its first byte lowest; the first beat is number FIRST_POSITION.
+  signal frame         : std_logic_vector(255 downto 0);
   -- The beat on m_axis.
-  signal position_r    : unsigned(4 downto 0) := (others => '0');
+  signal position_r    : unsigned(4 downto 0) := to_unsigned(FIRST_POSITION, 5);
   signal position_last : std_logic;
 
 begin
@@ -49,17 +50,18 @@ begin
     report "geometry_msgs_point_to_axis: ID is " & integer'image(ID) & "; legal are 0 to 255"
     severity failure;
 
-  frame(7 downto 0)     <= std_logic_vector(to_unsigned(ID, 8));
-  frame(39 downto 8)    <= x"00000018";
-  frame(103 downto 40)  <= x;
-  frame(167 downto 104) <= y;
-  frame(231 downto 168) <= z;
+  frame(23 downto 0)    <= x"000000";
+  frame(31 downto 24)   <= std_logic_vector(to_unsigned(ID, 8));
+  frame(63 downto 32)   <= x"00000018";
+  frame(127 downto 64)  <= x;
+  frame(191 downto 128) <= y;
+  frame(255 downto 192) <= z;
 
-  position_last <= '1' when position_r = FRAME_BEATS - 1 else '0';
+  position_last <= '1' when position_r = LAST_POSITION else '0';
 
   u_select : entity firm.firm_axis_select
     generic map (
-      WORDS => FRAME_BEATS,
+      WORDS => LAST_POSITION + 1,
       WIDTH => 8
     )
     port map (
@@ -77,10 +79,10 @@ begin
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
-        position_r <= (others => '0');
+        position_r <= to_unsigned(FIRST_POSITION, position_r'length);
       elsif segment_valid(0) = '1' and m_axis_tready = '1' then
         if position_last = '1' then
-          position_r <= (others => '0');
+          position_r <= to_unsigned(FIRST_POSITION, position_r'length);
         else
           position_r <= position_r + 1;
         end if;

@@ -36,12 +36,13 @@ end entity;
 
 architecture rtl of geometry_msgs_quaternion_to_axis is
 
-  constant FRAME_BEATS : natural := 6;
+  constant FIRST_POSITION : natural := 0;
+  constant LAST_POSITION  : natural := 5;
 
-  -- The whole frame, its first byte lowest.
+  -- The whole frame, its first byte lowest; the first beat is number FIRST_POSITION.
   signal frame         : std_logic_vector(383 downto 0);
   -- The beat on m_axis.
-  signal position_r    : unsigned(2 downto 0) := (others => '0');
+  signal position_r    : unsigned(2 downto 0) := to_unsigned(FIRST_POSITION, 3);
   signal position_last : std_logic;
 
 begin
@@ -57,13 +58,13 @@ begin
   frame(199 downto 136) <= y;
   frame(263 downto 200) <= z;
   frame(327 downto 264) <= w;
-  frame(383 downto 328) <= (others => '0');
+  frame(383 downto 328) <= x"00000000000000";
 
-  position_last <= '1' when position_r = FRAME_BEATS - 1 else '0';
+  position_last <= '1' when position_r = LAST_POSITION else '0';
 
   u_select : entity firm.firm_axis_select
     generic map (
-      WORDS => FRAME_BEATS,
+      WORDS => LAST_POSITION + 1,
       WIDTH => 64
     )
     port map (
@@ -81,10 +82,10 @@ begin
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
-        position_r <= (others => '0');
+        position_r <= to_unsigned(FIRST_POSITION, position_r'length);
       elsif segment_valid(0) = '1' and m_axis_tready = '1' then
         if position_last = '1' then
-          position_r <= (others => '0');
+          position_r <= to_unsigned(FIRST_POSITION, position_r'length);
         else
           position_r <= position_r + 1;
         end if;

@@ -40,12 +40,13 @@ end entity;
 
 architecture rtl of awkward_msgs_gaps_to_axis is
 
-  constant FRAME_BEATS : natural := 97;
+  constant FIRST_POSITION : natural := 3;
+  constant LAST_POSITION  : natural := 99;
 
-  -- The whole frame, its first byte lowest.
-  signal frame         : std_logic_vector(775 downto 0);
+  -- The whole frame, its first byte lowest; the first beat is number FIRST_POSITION.
+  signal frame         : std_logic_vector(799 downto 0);
   -- The beat on m_axis.
-  signal position_r    : unsigned(6 downto 0) := (others => '0');
+  signal position_r    : unsigned(6 downto 0) := to_unsigned(FIRST_POSITION, 7);
   signal position_last : std_logic;
 
 begin
@@ -54,35 +55,36 @@ begin
     report "awkward_msgs_gaps_to_axis: ID is " & integer'image(ID) & "; legal are 0 to 255"
     severity failure;
 
-  frame(7 downto 0)     <= std_logic_vector(to_unsigned(ID, 8));
-  frame(39 downto 8)    <= x"0000005c";
-  frame(71 downto 40)   <= x"00000100";
-  frame(135 downto 80)  <= x"00000000000000";
-  frame(263 downto 216) <= x"000000000000";
-  frame(391 downto 344) <= x"000000000000";
-  frame(471 downto 464) <= x"00";
-  frame(583 downto 528) <= x"00000000000000";
-  frame(711 downto 656) <= x"00000000000000";
-  frame(79 downto 72)   <= "0000000" & elements_flag(0);
-  frame(215 downto 208) <= "0000000" & elements_flag(1);
-  frame(343 downto 336) <= "0000000" & elements_flag(2);
-  frame(199 downto 136) <= elements_value(63 downto 0);
-  frame(327 downto 264) <= elements_value(127 downto 64);
-  frame(455 downto 392) <= elements_value(191 downto 128);
-  frame(207 downto 200) <= elements_tail(7 downto 0);
-  frame(335 downto 328) <= elements_tail(15 downto 8);
-  frame(463 downto 456) <= elements_tail(23 downto 16);
-  frame(519 downto 472) <= triple;
-  frame(527 downto 520) <= "0000000" & single_flag;
-  frame(647 downto 584) <= single_value;
-  frame(655 downto 648) <= single_tail;
-  frame(775 downto 712) <= last;
+  frame(23 downto 0)    <= x"000000";
+  frame(31 downto 24)   <= std_logic_vector(to_unsigned(ID, 8));
+  frame(63 downto 32)   <= x"0000005c";
+  frame(95 downto 64)   <= x"00000100";
+  frame(159 downto 104) <= x"00000000000000";
+  frame(287 downto 240) <= x"000000000000";
+  frame(415 downto 368) <= x"000000000000";
+  frame(495 downto 488) <= x"00";
+  frame(607 downto 552) <= x"00000000000000";
+  frame(735 downto 680) <= x"00000000000000";
+  frame(103 downto 96)  <= "0000000" & elements_flag(0);
+  frame(239 downto 232) <= "0000000" & elements_flag(1);
+  frame(367 downto 360) <= "0000000" & elements_flag(2);
+  frame(223 downto 160) <= elements_value(63 downto 0);
+  frame(351 downto 288) <= elements_value(127 downto 64);
+  frame(479 downto 416) <= elements_value(191 downto 128);
+  frame(231 downto 224) <= elements_tail(7 downto 0);
+  frame(359 downto 352) <= elements_tail(15 downto 8);
+  frame(487 downto 480) <= elements_tail(23 downto 16);
+  frame(543 downto 496) <= triple;
+  frame(551 downto 544) <= "0000000" & single_flag;
+  frame(671 downto 608) <= single_value;
+  frame(679 downto 672) <= single_tail;
+  frame(799 downto 736) <= last;
 
-  position_last <= '1' when position_r = FRAME_BEATS - 1 else '0';
+  position_last <= '1' when position_r = LAST_POSITION else '0';
 
   u_select : entity firm.firm_axis_select
     generic map (
-      WORDS => FRAME_BEATS,
+      WORDS => LAST_POSITION + 1,
       WIDTH => 8
     )
     port map (
@@ -100,10 +102,10 @@ begin
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
-        position_r <= (others => '0');
+        position_r <= to_unsigned(FIRST_POSITION, position_r'length);
       elsif segment_valid(0) = '1' and m_axis_tready = '1' then
         if position_last = '1' then
-          position_r <= (others => '0');
+          position_r <= to_unsigned(FIRST_POSITION, position_r'length);
         else
           position_r <= position_r + 1;
         end if;

@@ -10,6 +10,7 @@ and not by the templates' configuration.
 
 from __future__ import annotations
 
+import json
 import random
 import re
 import struct
@@ -24,6 +25,7 @@ from fusesoc_firm.converter.generator import publisher_files, subscriber_files
 from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.frame.codec import used_bytes
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.render import render
 from tests.sim.frames import write_expected, write_stimulus
@@ -41,25 +43,41 @@ _LONGEST_TAIL = {RosVersion.ROS1: 0, RosVersion.ROS2: 3}
 
 
 @dataclass(frozen=True)
+class Selection:
+    """The fields of both converters, and the values that a publisher must send for others; as JSON, for a key."""
+
+    include: tuple[str, ...] = ()
+    exclude: tuple[str, ...] = ()
+    defaults: str = ""
+
+
+EVERYTHING = Selection()
+
+
+@dataclass(frozen=True)
 class ConverterBench:
     """GHDL's libraries in one directory: `firm`, and one for the converters of each ROS version and width."""
 
     directory: Path
     oracles: Mapping[RosVersion, Oracle] = field(default_factory=lambda: {r: Oracle(r, AWKWARD[r]) for r in RosVersion})
-    pairs: dict[tuple[RosVersion, str, int], Pair] = field(default_factory=dict)
+    pairs: dict[tuple[RosVersion, str, int, Selection], Pair] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(
             core_files("axis/axis", "sched/fixed_priority", "manager/manager", "sim/host")
         )
 
-    def pair(self, ros: RosVersion, name: str, width: int = 8) -> Pair:
+    def pair(self, ros: RosVersion, name: str, width: int = 8, selection: Selection = EVERYTHING) -> Pair:
         """The converters of a message with their bench, generated and analysed once."""
-        if (ros, name, width) not in self.pairs:
-            pair = Pair(Library(f"ros{int(ros)}_{width}", self.directory), self.oracles[ros], name, width)
+        key = ros, name, width, selection
+        if key not in self.pairs:
+            # Entities of other fields have the same names.
+            number = sum(other[3] != EVERYTHING for other in self.pairs)
+            library = f"ros{int(ros)}_{width}" if selection == EVERYTHING else f"selection_{number}"
+            pair = Pair(Library(library, self.directory), self.oracles[ros], name, width, selection)
             pair.analyse()
-            self.pairs[ros, name, width] = pair
-        return self.pairs[ros, name, width]
+            self.pairs[key] = pair
+        return self.pairs[key]
 
 
 @dataclass(frozen=True)
@@ -80,10 +98,12 @@ class Pair:
     oracle: Oracle
     name: str
     width: int = 8
+    selection: Selection = EVERYTHING
 
     @cached_property
     def frame(self) -> Frame:
-        return self.oracle.frame(self.name)
+        chosen = self.selection
+        return select(self.oracle.frame(self.name), dict.fromkeys(chosen.include), dict.fromkeys(chosen.exclude))
 
     @property
     def entities(self) -> tuple[str, str]:
@@ -182,7 +202,7 @@ class Pair:
         used = used_bytes(self.frame, sent_payload)
         payload = bytes(byte if is_used else 0 for byte, is_used in zip(sent_payload, used, strict=True))
         payload = payload[: self._size]
-        payload = self._with_bools_of_one(payload)
+        payload = self._with_defaults(self._with_bools_of_one(payload))
         assert len(payload) == self._size
         return bytes([PUBLISHER]) + self._size.to_bytes(LENGTH_BYTES, "little") + self._with_whole_prefix(payload)
 
@@ -194,6 +214,16 @@ class Pair:
         """Random bytes may be any bool; a publisher sends 0 or 1."""
         flags = {offset for leaf in self.frame.fields if leaf.type.bits == 1 for offset in leaf.offsets}
         return bytes(min(byte, 1) if offset in flags else byte for offset, byte in enumerate(payload))
+
+    def _with_defaults(self, payload: bytes) -> bytes:
+        """What no port drives is as rosbags serialises the defaults that the test gives; zeros where it gives none."""
+        chosen = self.selection.defaults
+        undriven = self.oracle.serialise(self.name, json.loads(chosen)) if chosen else bytes(len(payload))
+        mixed = bytearray(payload)
+        for leaf in self.frame.fields:
+            for offset in leaf.offsets if not leaf.is_used else ():
+                mixed[offset : offset + leaf.type.size] = undriven[offset : offset + leaf.type.size]
+        return bytes(mixed)
 
     def _configuration(self) -> dict[str, object]:
         fields, low = [], 0

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- One word out of many: a tree of 4-to-1 multiplexers, each of which fits a 6-input LUT a bit. A dynamic array
--- index costs about twice of it through `ghdl --synth`. An index beyond the last word reads zero.
+-- One word out of many: a tree of multiplexers, two levels of which fit a 6-input LUT a bit. A dynamic array index costs
+-- about twice of it through `ghdl --synth`. An index beyond the last word reads any of them.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -18,46 +18,28 @@ end entity firm_axis_select;
 
 architecture rtl of firm_axis_select is
 
-  -- Levels of multiplexers; each takes two bits of the index, the one at the leaves the lowest.
-  constant LEVELS : natural := (clog2(WORDS) + 1) / 2;
-
-  -- The number of the first node of a level of the tree. It is a heap: 0 is the root, node n has the children 4n+1 to 4n+4.
-  function first_node(level : natural) return natural is
+  -- Parts the words by the highest bit of the number that tells them apart. Simulation goes only the way to the word, so
+  -- thousands of them take no more time than a few.
+  function chosen(candidates, number : std_logic_vector) return std_logic_vector is
+    constant COUNT : positive := candidates'length / WIDTH;
+    -- The largest power of two below COUNT; 0 for one word, for which GHDL evaluates it, too.
+    constant HALF  : natural  := 2**clog2(COUNT) / 2;
+    constant LOW   : natural  := candidates'low;
   begin
-    return (4**level - 1) / 3;
-  end function first_node;
-
-  constant FIRST_LEAF : natural := first_node(LEVELS);
-
-  type tree_t is array (natural range 0 to first_node(LEVELS+1)-1) of std_logic_vector(WIDTH-1 downto 0);
-  signal tree   : tree_t;
-  signal digits : std_logic_vector(2*LEVELS+1 downto 0);
+    if COUNT = 1 then
+      return candidates;
+    elsif number(clog2(COUNT)-1) = '0' then
+      return chosen(candidates(LOW+HALF*WIDTH-1 downto LOW), number);
+    else
+      return chosen(candidates(LOW+COUNT*WIDTH-1 downto LOW+HALF*WIDTH), number);
+    end if;
+  end function chosen;
 
 begin
 
-  digits(2*LEVELS+1 downto index'length) <= (others => '0');
-  digits(index'length-1 downto 0)        <= index;
-
-  leaves : for leaf in natural range 0 to 4**LEVELS-1 generate
-    used : if leaf < WORDS generate
-      tree(FIRST_LEAF+leaf) <= words_in((leaf+1)*WIDTH-1 downto leaf*WIDTH);
-    end generate used;
-    unused : if leaf >= WORDS generate
-      tree(FIRST_LEAF+leaf) <= (others => '0');
-    end generate unused;
-  end generate leaves;
-
-  levels_of_tree : for level in 0 to LEVELS-1 generate
-    nodes : for node in first_node(level) to first_node(level+1)-1 generate
-      constant DIGIT : natural := 2*(LEVELS-1-level);
-    begin
-      tree(node) <= tree(4*node+1) when digits(DIGIT+1) = '0' and digits(DIGIT) = '0' else
-                    tree(4*node+2) when digits(DIGIT+1) = '0' else
-                    tree(4*node+3) when digits(DIGIT) = '0' else
-                    tree(4*node+4);
-    end generate nodes;
-  end generate levels_of_tree;
-
-  word <= tree(0);
+  -- An illegal number is for the entity above to name.
+  legal : if WORDS >= 1 generate
+    word <= chosen(words_in, index);
+  end generate legal;
 
 end architecture rtl;

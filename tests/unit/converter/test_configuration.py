@@ -193,23 +193,40 @@ def test_the_lengths_of_ros1_and_ros2() -> None:
 )
 def test_where_a_frame_may_end(width: int, last_beats: list[int], last_lanes: list[int]) -> None:
     configuration = subscriber_configuration(layout(ROS2, "uint8 a\n"), width)
-    assert [end["position"] for end in configuration["ends"]] == last_beats
+    places = ["is_first = '1'" if beat == 0 else f"position_r = {beat}" for beat in last_beats]
+    matches = [f"match({number}) = '1' and {place}" for number, place in enumerate(places)]
+    assert [end["condition"] for end in configuration["ends"]] == matches
     assert [end["lane"] for end in configuration["ends"]] == last_lanes
-    assert configuration["last_position"] == last_beats[-1]
 
 
-@pytest.mark.parametrize(("width", "hold"), [(8, 4), (16, 2), (32, 1), (64, 0), (512, 0)])
-def test_what_a_waiting_message_lets_pass(width: int, hold: int) -> None:
-    configuration = subscriber_configuration(layout(ROS1, "float64[4] a\n"), width)
-    assert configuration["hold_position"] == hold
-    assert configuration["has_slack"] is (hold > 0)
+@pytest.mark.parametrize(
+    ("size", "broken", "ended", "complete"),
+    [
+        # Beats 0 to 7 of 16 values leave the highest bit to the states, 0 to 55 of 64 the highest three.
+        (1, "1000", "1100", "1010"),
+        (4, "1000", "1100", "1010"),
+        (5, "10000", "10100", "10010"),
+        (32, "110000", "110100", "110010"),
+        (52, "111000", "111100", "111010"),
+        (53, "1000000", "1000100", "1000010"),
+    ],
+)
+def test_the_states_beyond_the_beats(size: int, broken: str, ended: str, complete: str) -> None:
+    configuration = subscriber_configuration(layout(ROS1, f"uint8[{size}] a\n"), 8)
+    assert [configuration[name] for name in ("broken", "ended", "complete")] == [broken, ended, complete]
+    assert len(broken) == configuration["position_high"] + 1
+    # The last beat, behind 4 bytes of length, is none of them, and all of them have the same bits above the lowest.
+    assert size + 3 < int(broken, 2)
+    assert size + 3 < int("1" * (len(broken) - configuration["beyond_low"]) + "0" * configuration["beyond_low"], 2)
 
 
-@pytest.mark.parametrize(("width", "beats", "keep"), [(8, 13, "1"), (32, 4, "0001"), (64, 2, "00011111")])
-def test_the_publishers_last_beat(width: int, beats: int, keep: str) -> None:
+@pytest.mark.parametrize(
+    ("width", "first", "last", "keep"), [(8, 3, 15, "1"), (32, 0, 3, "0001"), (64, 0, 1, "00011111")]
+)
+def test_the_publishers_beats(width: int, first: int, last: int, keep: str) -> None:
     configuration = publisher_configuration(layout(ROS1, "float64 a\n"), width)
-    assert (configuration["frame_beats"], configuration["last_keep"]) == (beats, keep)
-    assert configuration["frame_high"] == beats * width - 1
+    assert [configuration[name] for name in ("first_position", "last_position", "last_keep")] == [first, last, keep]
+    assert configuration["frame_high"] == (last + 1) * width - 1
     assert configuration["has_partial_beat"] is ("0" in keep)
 
 
@@ -221,8 +238,8 @@ def test_widths_without_a_template_are_refused() -> None:
 
 
 def test_a_frame_of_more_bits_than_vhdl_counts_is_refused() -> None:
-    largest = layout(ROS1, "uint8[268435450] a\n")
+    largest = layout(ROS1, "uint8[268435447] a\n")
     assert publisher_configuration(largest, 8)["frame_high"] == 8 * (2**28 - 1) - 1
     for configuration in (subscriber_configuration, publisher_configuration):
-        with pytest.raises(InputError, match=r"p/M takes 268435451 bytes, too many for a converter"):
-            configuration(layout(ROS1, "uint8[268435451] a\n"), 8)
+        with pytest.raises(InputError, match=r"p/M takes 268435448 bytes, too many for a converter"):
+            configuration(layout(ROS1, "uint8[268435448] a\n"), 8)

@@ -49,7 +49,12 @@ _ROS1 = {
 }
 
 # The payload is 4 bytes longer; these and their up to 3 trailing bytes lie round a carry of the length's lowest byte.
-_ROS2 = {f"Carry{payload}": f"uint8[{payload - 4}] data\n" for payload in (252, 253, 254, 255, 256, 511, 1021)}
+_ROS2 = {
+    "Tuned": "uint8 gain 7\nfloat32 rate 0.5\n",
+    "Defaults": """float64 x 1.5\nint16[3] triple [1, -2, 3]\nbool flag true\nuint8 plain\nTuned tuned\nTuned[2] pair
+        int64 big -5\nbool[2] flags [true, false]\nchar letter 65\nfloat32[2] small [-0.25, 1e10]\n""",
+}
+_ROS2 |= {f"Carry{payload}": f"uint8[{payload - 4}] data\n" for payload in (252, 253, 254, 255, 256, 511, 1021)}
 
 AWKWARD: Mapping[RosVersion, Mapping[str, str]] = {
     RosVersion.ROS1: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS1}.items()},

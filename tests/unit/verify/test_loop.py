@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from fusesoc_firm.converter.message_ports import MessagePort
 from fusesoc_firm.verify.loop import gates
-from fusesoc_firm.verify.ports import MessagePort
 
 
 def stream(name: str) -> list[MessagePort]:
@@ -32,13 +32,15 @@ def element(name: str, inner: list[MessagePort], segments: int = 0) -> list[Mess
 def test_every_handshake_has_a_gate() -> None:
     # A field that is called as a handshake is none.
     ports = [MessagePort("door_ready", None), *stream("label"), *element("points", [MessagePort("points_x", 64)])]
-    found = gates(ports, 2)
+    found = gates(ports, 2, has_msg_valid=True)
     assert [gate.name for gate in found] == [
         "segment_valid(0)",
         "segment_valid(1)",
         "label_axis_tvalid",
         "points_valid",
+        "msg_valid",
     ]
+    assert found[4].valid == "sub_msg_valid and pub_segment_valid(0) and pub_segment_valid(1)"
     assert found[1].ready == "msg_ready"
     assert found[2].assignments == (
         ("pub_label_axis_tvalid", "sub_label_axis_tvalid and is_open(2)"),
@@ -47,7 +49,8 @@ def test_every_handshake_has_a_gate() -> None:
 
 
 def test_an_element_is_shown_behind_its_segments() -> None:
-    found = gates(element("points", [*stream("points_name"), MessagePort("points_x", 64)], segments=2), 1)
+    ports = element("points", [*stream("points_name"), MessagePort("points_x", 64)], segments=2)
+    found = gates(ports, 1, has_msg_valid=False)
     names = ["segment_valid(0)", "points_name_axis_tvalid", "points_segment_valid(0)", "points_segment_valid(1)"]
     assert [gate.name for gate in found] == [*names, "points_valid"]
     assert found[2].ready == "pub_points_valid and pub_points_ready"
