@@ -228,7 +228,12 @@ class _Publisher:
         match step:
             case Header():
                 yield 0, ID_BYTES, f"std_logic_vector(to_unsigned(ID, {8 * ID_BYTES}))"
-                yield ID_BYTES, LENGTH_BYTES, "payload_length"
+                # The port may change once the message is withdrawn.
+                here = min(LENGTH_BYTES, self.lanes - ID_BYTES)
+                if here:
+                    yield ID_BYTES, here, f"payload_length({8 * here - 1} downto 0)"
+                if here < LENGTH_BYTES:
+                    yield ID_BYTES + here, LENGTH_BYTES - here, f"announced(31 downto {8 * here})"
             case Count(part=part):
                 length = self.side.length(part)
                 more = part.terminator if isinstance(part, Data) else 0
@@ -253,7 +258,7 @@ class _Publisher:
 
     def _supplies(self) -> list[tuple[int, str]]:
         """(last place, what the places up to it wait for)."""
-        found = []
+        found = [(0, "segment_valid(0)")]
         for area in self._areas:
             signal = self._supply(area.step)
             closing = self.program.steps[area.number + 1]
@@ -276,7 +281,8 @@ class _Publisher:
         return "'1'"
 
     def _segment(self, segment: Segment | None) -> str:
-        if segment is None:
+        """The first segment is there at all places but the first, or the message is withdrawn."""
+        if segment is None or segment == Segment((), 0):
             return "'1'"
         if not segment.scope:
             return f"segment_valid({segment.number})"

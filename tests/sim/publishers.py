@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity
-from fusesoc_firm.converter.message_ports import ElementPorts, StreamPorts, message_ports, message_side
+from fusesoc_firm.converter.message_ports import StreamPorts, message_ports, message_side
 from fusesoc_firm.converter.program import Block, Count, Header, Scope, publisher_program
 from fusesoc_firm.converter.variable_publisher import (
     VARIABLE_PUBLISHER_TEMPLATE,
@@ -31,13 +31,16 @@ from fusesoc_firm.frame.values import leaf_of, part_of, units_of
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.render import render
+from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL, Stimuli
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.unit.frame.oracle import Oracle
-from fusesoc_firm.verify.stimuli import Stimuli
-from tests.unit.frame.variable_samples import VARIABLE
+from tests.unit.frame.variable_samples import PACKAGE, VARIABLE
 
 ID = 0xA5
+# rosbags knows no wstring: the second one is the same on the wire.
+WIDE, UNITS = f"{PACKAGE}/Wides", f"{PACKAGE}/Units"
 BAD_LENGTH, SHORT, LONG = 1, 2, 3
+KINDS = (TYPICAL, EXTREME, EMPTY, TYPICAL)
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,32 @@ class Message:
     error: int = 0
     exact: int | None = None
     lifetime: int = 0
+
+
+@dataclass
+class Cut:
+    """The `chosen`-th array of `loop` that has elements has only the first `kept`."""
+
+    loop: Loop
+    chosen: int
+    kept: int
+
+
+@dataclass(frozen=True)
+class Played:
+    """The streams and elements of a message as they are collected."""
+
+    streams: dict[int, list[Sequence[Beat]]]
+    elements: dict[int, list[tuple[bool, str]]]
+    cut: Cut | None
+
+    def elements_of(self, loop: Loop, found: Sequence[Any]) -> Sequence[Any]:
+        """The elements that are given."""
+        if self.cut and found and loop.path == self.cut.loop.path:
+            self.cut.chosen -= 1
+            if self.cut.chosen == -1:
+                return found[: self.cut.kept]
+        return found
 
 
 @dataclass(frozen=True)
@@ -226,20 +255,25 @@ class Publisher:
 
     # --- messages -----------------------------------------------------------------------------------------------
 
-    def values(self, count: int, source: random.Random, longest: int = 4) -> list[dict[str, Any]]:
-        """Empty, typical and extreme values by turns."""
+    def values(
+        self, count: int, source: random.Random, kinds: Sequence[str] = KINDS, longest: int = 4
+    ) -> list[dict[str, Any]]:
+        """Values of these kinds by turns."""
         name = parse_name(self.name)
         stimuli = Stimuli(self.oracle.closure(self.name), self.oracle.ros, source, longest)
-        kinds = ("typical", "extreme", "empty", "typical")
         return [stimuli.message(name, kinds[number % len(kinds)]) for number in range(count)]
 
     def good(self, value: Mapping[str, Any]) -> Message:
         """A message with nothing wrong."""
-        payload = self.oracle.serialise(self.name, value)
-        streams: dict[int, list[Sequence[Beat]]] = {number: [] for number in range(len(self.streams))}
-        elements: dict[int, list[tuple[bool, str]]] = {number: [] for number in range(1, len(self.groups))}
-        self._play(self.frame.nodes, value, 0, (), streams, elements)
-        return Message(self._bits(0, value, 0, len(payload)), payload, streams, elements)
+        payload = self._payload(value)
+        played = self._played(value)
+        return Message(self._bits(0, value, 0, len(payload)), payload, played.streams, played.elements)
+
+    def _payload(self, value: Mapping[str, Any]) -> bytes:
+        if self.name != WIDE:
+            return self.oracle.serialise(self.name, value)
+        texts = [{"units": _units(text)} for text in value["texts"]]
+        return self.oracle.serialise(UNITS, {**value, "text": _units(value["text"]), "texts": texts})
 
     def announced(self, message: Message, length: int) -> Message:
         """The same with another `payload_length`."""
@@ -248,29 +282,110 @@ class Publisher:
         error = 0 if 0 <= slack <= self.frame.trailing_bytes else BAD_LENGTH
         return replace(message, bits=message.bits[:-32] + f"{length:032b}", payload=payload, error=error)
 
-    def _play(
-        self,
-        nodes: Sequence[Node],
-        value: Any,
-        depth: int,
-        scope: Scope,
-        streams: dict[int, list[Sequence[Beat]]],
-        elements: dict[int, list[tuple[bool, str]]],
-    ) -> None:
+    def faulty(self, value: Mapping[str, Any], source: random.Random) -> Message:
+        """A message with one thing wrong, or with nothing."""
+        message = self.good(value)
+        streams = [(part, place) for part, found in message.streams.items() for place in range(len(found))]
+        loops = [part for part, found in message.elements.items() if found]
+        match source.randrange(8):
+            case 0:
+                length = source.choice((0, 1, 2, 3, 2**16)) if source.random() < 0.3 else len(message.payload)
+                return self.announced(message, max(0, length + source.choice((-9, -2, -1, 1, 2, 3, 4, 5, 300))))
+            case 1 if streams:
+                return self._with_short_stream(value, message, *source.choice(streams), source)
+            case 2 if streams:
+                return self._with_long_stream(message, *source.choice(streams), source)
+            case 3 if loops:
+                return self._without_last(message, source.choice(loops), source)
+            case 4 if loops:
+                return self._with_early_last(value, message, source.choice(loops), source)
+            case 5:
+                return replace(message, lifetime=source.randint(1, 200), error=SHORT, exact=0)
+        return message
+
+    def _with_short_stream(
+        self, value: Mapping[str, Any], message: Message, part: int, place: int, source: random.Random
+    ) -> Message:
+        """A stream ends early: its rest are zeros."""
+        data = b"".join(beat.data for beat in message.streams[part][place])
+        size = source.randrange(len(data))
+        zeroed = copy.deepcopy(value)
+        self._zero(self.frame.nodes, zeroed, 0, self.streams[part].part, [place], size)
+        streams = {**message.streams, part: list(message.streams[part])}
+        # What holds no byte is still closed.
+        streams[part][place] = self.beats(data[:size]) or [Beat(b"", True)]
+        return replace(message, streams=streams, payload=self._payload(zeroed), error=SHORT)
+
+    def _zero(self, nodes: Sequence[Node], value: Any, depth: int, part: Data, left: list[int], size: int) -> None:
+        """Zeros in place of all behind the first `size` bytes of stream number `left[0]` of `part`."""
+        for node in nodes:
+            if isinstance(node, Loop) and node.path == part.path[: len(node.path)]:
+                elements = part_of(value, node, depth)
+                for place, element in enumerate(elements):
+                    if left[0] < 0:
+                        return
+                    if isinstance(element, str):
+                        elements[place] = _zeroed(part, element, left, size)
+                    else:
+                        self._zero(node.body, element, len(node.path), part, left, size)
+            elif isinstance(node, Data) and node.path == part.path:
+                for step in node.path[depth:-1]:
+                    value = value[step.name]
+                name = node.path[-1].name
+                value[name] = _zeroed(part, value[name], left, size)
+
+    def _with_long_stream(self, message: Message, part: int, place: int, source: random.Random) -> Message:
+        """A stream goes on behind its length: that is dropped."""
+        data = b"".join(beat.data for beat in message.streams[part][place])
+        streams = {**message.streams, part: list(message.streams[part])}
+        streams[part][place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
+        return replace(message, streams=streams, error=LONG)
+
+    def _without_last(self, message: Message, part: int, source: random.Random) -> Message:
+        """The last element of an array does not say so."""
+        elements = list(message.elements[part])
+        place = source.choice([place for place, (is_last, _) in enumerate(elements) if is_last])
+        elements[place] = False, elements[place][1]
+        return replace(message, elements={**message.elements, part: elements}, error=LONG)
+
+    def _with_early_last(self, value: Mapping[str, Any], message: Message, part: int, source: random.Random) -> Message:
+        """An array ends before its length is reached: what follows the element is zeros."""
+        loop = self.groups[part].scope[-1]
+        total = len(message.elements[part])
+        starts = [0, *(place + 1 for place, (is_last, _) in enumerate(message.elements[part]) if is_last)]
+        chosen = source.randrange(len(starts) - 1)
+        count = starts[chosen + 1] - starts[chosen]
+        if count < 2:
+            return message
+        kept = source.randrange(1, count)
+        played = self._played(value, Cut(loop, chosen, kept))
+        assert len(played.elements[part]) == total - count + kept
+        return replace(message, streams=played.streams, elements=played.elements, error=SHORT, exact=0)
+
+    def _played(self, value: Any, cut: Cut | None = None) -> Played:
+        played = Played(
+            {number: [] for number in range(len(self.streams))},
+            {number: [] for number in range(1, len(self.groups))},
+            cut,
+        )
+        self._play(self.frame.nodes, value, 0, (), played)
+        return played
+
+    def _play(self, nodes: Sequence[Node], value: Any, depth: int, scope: Scope, played: Played) -> None:
         for node in nodes:
             if isinstance(node, Data) and node.is_used:
                 number = [port.part.path for port in self.streams].index(node.path)
                 data = data_bytes(node, part_of(value, node, depth))
                 if data:
-                    streams[number].append(self.beats(data))
+                    played.streams[number].append(self.beats(data))
             elif isinstance(node, Loop) and node.is_used and node.body:
                 inner = (*scope, node)
                 number = [group.scope for group in self.groups].index(inner)
-                found = part_of(value, node, depth)
+                found = played.elements_of(node, part_of(value, node, depth))
                 for place, element in enumerate(found):
-                    self._play(node.body, element, len(node.path), inner, streams, elements)
+                    self._play(node.body, element, len(node.path), inner, played)
                     bits = self._bits(number, element, len(node.path), 0)
-                    elements[number].append((place == len(found) - 1, bits))
+                    played.elements[number].append((place == len(found) - 1, bits))
 
     def beats(self, data: bytes) -> list[Beat]:
         """Full beats but the last."""
@@ -305,13 +420,21 @@ class Publisher:
     def run(self, directory: Path, messages: Sequence[Message], **generics: Generic) -> RunResult:
         """Give the messages; the run fails unless their frames and errors come, and nothing else."""
         self._write(directory, messages)
-        result = self.library.run(f"{self.entity}_tb", generics, directory=directory)
+        # A frame that is cut goes on inside for as long as its message.
+        quiet = 500 + 20 * max(len(message.bits) + self._given_bytes(message) for message in messages)
+        result = self.library.run(f"{self.entity}_tb", {"QUIET": quiet, **generics}, directory=directory)
         output = result.output
         assert result.exit_code == 0, output[-3000:]
         assert output.splitlines()[-1] == "over", output[-3000:]
         assert "waiting" not in output, output[-3000:]
         frames = [bytes.fromhex(digits) for digits in re.findall(r"^frame (\w+)$", output, re.MULTILINE)]
         errors = [int(code) for code in re.findall(r"^error (\d+)$", output, re.MULTILINE)]
+        taken = [int(number) for number in re.findall(r"^taken (\d+)", output, re.MULTILINE)]
+        # One that is to be withdrawn may be taken before.
+        messages = [
+            replace(message, lifetime=0, error=0, exact=None) if message.lifetime and number in taken else message
+            for number, message in enumerate(messages)
+        ]
         expected_errors = []
         for number, message in enumerate(messages):
             frame = frames[0] if frames else b""
@@ -323,13 +446,17 @@ class Publisher:
             frames.pop(0)
             expected_errors += [message.error] if message.error else []
         assert not frames
-        assert errors == expected_errors
+        assert errors == expected_errors, (errors, expected_errors)
         left = {int(number) for number in re.findall(r"^left of message (\d+)$", output, re.MULTILINE)}
         assert left <= {number for number, message in enumerate(messages) if message.lifetime}
-        taken = [int(number) for number in re.findall(r"^taken (\d+)", output, re.MULTILINE)]
         assert taken == [number for number, message in enumerate(messages) if not message.lifetime]
         assert not re.search(r"^(?!.*@0ms).*warning", output, re.MULTILINE), output[-3000:]
         return result
+
+    @staticmethod
+    def _given_bytes(message: Message) -> int:
+        streams = sum(len(beat.data) for found in message.streams.values() for beats in found for beat in beats)
+        return streams + sum(len(bits) // 8 for found in message.elements.values() for _, bits in found)
 
     def _write(self, directory: Path, messages: Sequence[Message]) -> None:
         lines: dict[str, list[str]] = {"values_0": []}
@@ -356,6 +483,24 @@ def data_bytes(data: Data, value: Any) -> bytes:
     if data.kind is DataKind.ARRAY:
         return struct.pack(f"<{len(value)}{data.element.code}", *value)
     return bytes(units_of(data, value))
+
+
+def _zeroed(data: Data, value: Any, left: list[int], size: int) -> Any:
+    """The value of a stream, or that with zeros from byte `size` on if it is stream number `left[0]`."""
+    sent = data_bytes(data, value)
+    left[0] -= bool(sent)
+    if not sent or left[0] != -1:
+        return value
+    zeros = sent[:size] + bytes(len(sent) - size)
+    if data.kind is DataKind.STRING:
+        return zeros.decode()
+    numbers = struct.unpack(f"<{len(value)}{data.element.code}", zeros)
+    return "".join(map(chr, numbers)) if data.kind is DataKind.WSTRING else list(numbers)
+
+
+def _units(text: str) -> list[int]:
+    units = text.encode("utf-16-le")
+    return list(struct.unpack(f"<{len(units) // 2}H", units))
 
 
 def _scopes(nodes: Sequence[Node], scope: Scope) -> Iterator[Scope]:

@@ -17,10 +17,12 @@ entity firm_axis_trim is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- The bytes that shall follow the header. `header` says that the bytes offered belong to it: they pass uncounted,
-    -- and `length` is taken with them.
-    length : in std_logic_vector(31 downto 0);
-    header : in std_logic;
+    -- The bytes that shall follow the header: `start` takes them, and with them the first bytes of a frame. Bytes under
+    -- `header` belong to it and pass uncounted; until it is over, `announced` is the length that was taken.
+    length    : in  std_logic_vector(31 downto 0);
+    start     : in  std_logic;
+    header    : in  std_logic;
+    announced : out std_logic_vector(31 downto 0);
 
     -- As at firm_axis_pack, but `last` comes without bytes: the frame ends in front of it. What stands on `data` then
     -- fills up a frame that is too short, and shall be zeros.
@@ -72,6 +74,8 @@ begin
     end if;
   end process pass;
 
+  announced <= std_logic_vector(not left_r);
+
   m_data  <= data;
   m_last  <= last and exceeds;
   m_valid <= valid;
@@ -84,11 +88,13 @@ begin
   count_down : process (clk)
   begin
     if rising_edge(clk) and valid = '1' and m_ready = '1' then
-      left_r <= sum(31 downto 0);
-      if header = '1' then
+      if start = '1' then
         left_r <= not unsigned(length);
-      elsif exceeds = '1' then
-        left_r <= (others => '1');
+      elsif header = '0' then
+        left_r <= sum(31 downto 0);
+        if exceeds = '1' then
+          left_r <= (others => '1');
+        end if;
       end if;
     end if;
   end process count_down;

@@ -37,6 +37,9 @@ _SHARED = {
 }
 _ROS1 = {"Times": "time stamp\ntime[2] stamps\nstring text\nduration[3] spans\nuint8[] data\n"}
 _ROS2 = {
+    # The same on the wire: rosbags knows no wstring, but numbers of four bytes.
+    "Units": "uint32[] text\nUnit[] texts\nuint8 last\n",
+    "Unit": "uint32[] units\n",
     "Wides": "wstring text\nwstring[] texts\nuint8 last\n",
     "Bounded": "string<=5 text\nuint32[<=3] few\nstring<=4[<=2] texts\nfloat64[<=2] last\n",
 }
