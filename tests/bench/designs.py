@@ -27,7 +27,7 @@ _PORT = re.compile(r"^ +(\w+) *: (in|out) +std_logic(?:_vector\((\d+) downto 0\)
 _PORTS = re.compile(r"^  port \((.*?)^  \);", re.MULTILINE | re.DOTALL)
 
 
-class NotConverted(Exception):
+class NotConvertedError(Exception):
     """A message that no converter is made of, or whose definition is not at hand; the text says which."""
 
 
@@ -60,12 +60,12 @@ class Converter:
         return f"{self.message}{used}, {self.direction}"
 
     def frame(self) -> Frame:
-        """The message's frame; raises `NotConverted` where its definition is not at hand."""
+        """The message's frame; raises `NotConvertedError` where its definition is not at hand."""
         ros, name = RosVersion(self.ros), parse_name(self.message)
         folder = Path(os.environ[CORPUS], f"ros{self.ros}") if os.environ.get(CORPUS) else None
         library = MessageLibrary(ros, [folder] if folder and folder.is_dir() else [])
         if name not in library.names():
-            raise NotConverted(f"no definition; {CORPUS} may name a folder with one")
+            raise NotConvertedError(f"no definition; {CORPUS} may name a folder with one")
         frame = frame_of(name, library.closure(name))
         return select(frame, dict.fromkeys(self.include)) if self.include else frame
 
@@ -91,14 +91,14 @@ def is_field(port: Port) -> bool:
 
 
 def generate(converter: Converter, directory: Path) -> Design:
-    """The converter, in the library `work` of `directory`; raises `NotConverted`."""
+    """The converter, in the library `work` of `directory`; raises `NotConvertedError`."""
     frame = converter.frame()
     is_subscriber = converter.direction == SUBSCRIBER
     make, name = (subscriber_files, subscriber_entity) if is_subscriber else (publisher_files, publisher_entity)
     try:
         files = make([frame], converter.width)
     except InputError as error:
-        raise NotConverted(str(error)) from error
+        raise NotConvertedError(str(error)) from error
     directory.mkdir(parents=True, exist_ok=True)
     Library("firm", directory).analyse(core_files(*CORES))
     work = Library("work", directory)
