@@ -53,4 +53,5 @@ def _tell(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

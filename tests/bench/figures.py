@@ -9,27 +9,25 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests.bench import area, cycles, fuzz, yosys
-from tests.bench.tables import Table
+from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
 FIGURES = REPOSITORY / "docs" / "figures.md"
 
 _HEADINGS = {"area": "Area", "cycles": "Cycles", "fuzz": "Fuzzing"}
 _METHODS = {
-    "area": f"LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1 to\n"
-    "LUT6 and inverters, one each; FF are FDRE, FDSE, FDCE and FDPE. A design with a latch fails. The dissertation's are\n"
-    "Vivado's on an UltraScale+, LUT/FF.",
+    "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
+        to LUT6 and the inverters, one each; FF are FDRE, FDSE, FDCE and FDPE. A design with a latch fails. The
+        dissertation's are Vivado's on an UltraScale+, LUT/FF.""",
     "cycles": "Counted in a simulation of the netlist that `ghdl --synth` makes, by Verilator.",
-    "fuzz": "Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.\n"
-    "Every good one must be delivered as it is, no other, and each broken one must give one frame_error.",
+    "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
+        Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
 }
-_INTRODUCTION = """\
-# Figures
-
-Written by `make bench`; `make bench BENCH='area'` measures a part of it anew (`area`, `cycles`, `fuzz`). 'not converted' is a
-message that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a
-folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar, the most it may take.
-"""
+_INTRODUCTION = """
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `cycles`, `fuzz`). 'not converted'
+    is a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR`
+    names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar, the most it may take.
+    """
 
 
 def parts() -> tuple[str, ...]:
@@ -45,7 +43,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
 def section(part: str, tables: Sequence[Table]) -> str:
     """The text of a part: heading, method, versions, tables."""
     body = "\n".join(str(table) for table in tables)
-    return f"## {_HEADINGS[part]}\n\n{_METHODS[part]}\n\n{_versions(part)}\n\n{body}"
+    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{_versions(part)}\n\n{body}"
 
 
 def write(sections: Mapping[str, str]) -> None:
@@ -53,7 +51,7 @@ def write(sections: Mapping[str, str]) -> None:
     before = FIGURES.read_text(encoding="utf-8") if FIGURES.is_file() else ""
     known = {part: text for part in parts() if (text := _section_of(before, _HEADINGS[part]))} | dict(sections)
     ordered = [known[part] for part in parts() if part in known]
-    FIGURES.write_text("\n".join([_INTRODUCTION, *ordered]), encoding="utf-8")
+    FIGURES.write_text("\n".join([f"# Figures\n\n{filled(_INTRODUCTION)}\n", *ordered]), encoding="utf-8")
 
 
 def _section_of(text: str, heading: str) -> str:

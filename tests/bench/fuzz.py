@@ -36,10 +36,9 @@ MESSAGES = (
 WIDTHS = (8, 64)
 _LENGTH_BYTES = 4
 _COLUMNS = ("subscriber", "ROS", "bits", "broken", "good", "delivered", "frame_error", "cycles", "result")
-_NOTE = (
-    "Cut, lengthened, with lengths, counts and other bytes that lie, of another message, and all in company; 'frame_error'\n"
-    f"counts its cycles. Every stream waits in {STALL_PERCENT} % of the cycles; seed {{seed}}."
-)
+_NOTE = f"""
+    Cut, lengthened, with lengths, counts and other bytes that lie, of another message, and all in company;
+    'frame_error' counts its cycles. Every stream waits in {STALL_PERCENT} % of the cycles. Seed """
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def measure(seed: int, tell: Tell, broken: int = BROKEN_FRAMES) -> list[Table]:
             tell(f"{name}: {FAILED}: {tally.fault}")
         numbers = (tally.broken, tally.good, tally.delivered, tally.errors, tally.cycles)
         lines.append((*_key(converter), *map(str, numbers), FAILED if tally.fault else MET))
-    return [Table(TITLE, _COLUMNS, tuple(lines), _NOTE.format(seed=seed))]
+    return [Table(TITLE, _COLUMNS, tuple(lines), f"{_NOTE}{seed}.")]
 
 
 def fuzz(converter: Converter, folder: Path, broken: int, seed: int, tell: Tell) -> Tally:
@@ -142,7 +141,7 @@ def troubled_frames(payloads: Payloads, width: int, seed: int) -> Iterator[FuzzF
     source = random.Random(f"{seed} {width}")
     while True:
         payload = payloads.draw(source)
-        frame = fuzz_frame(payloads, _trouble(payload, source))
+        frame = fuzz_frame(payloads, trouble(payload, source))
         if frame.body or width > 8:
             yield frame
 
@@ -164,7 +163,7 @@ def _framed(payload: bytes, announced: int | None = None) -> bytes:
     return length.to_bytes(_LENGTH_BYTES, "little") + payload
 
 
-def _trouble(payload: bytes, source: random.Random) -> bytes:
+def trouble(payload: bytes, source: random.Random) -> bytes:
     """A frame of the payload; three in five are troubled, some more than once."""
     body = _framed(payload)
     if source.random() < 0.4:

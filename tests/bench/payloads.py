@@ -166,7 +166,8 @@ class _Reader:
 
 @cache
 def _dtype(name: str) -> np.dtype[Any]:
-    return np.dtype({"char": "u1", "byte": "u1", "bool": "?"}.get(name, name))
+    # rosbags packs a lone `byte` as a signed number.
+    return np.dtype({"char": "u1", "byte": "i1", "bool": "?"}.get(name, name))
 
 
 def _numbers(name: str, count: int, source: random.Random) -> Any:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 NOT_CONVERTED = "not converted"
 MET, MISSED, FAILED = "met", "MISSED", "FAILED"
+
+_LINE_LENGTH = 120
 
 # Called with a line for whoever waits.
 Tell = Callable[[str], None]
@@ -28,7 +31,7 @@ class Table:
         rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (width + 1) + ":" for width in widths[1:]), ""])
         heading, *body = (_line(line, widths) for line in lines)
         text = "\n".join([f"### {self.title}", "", heading, rule, *body])
-        return f"{text}\n\n{self.note}\n" if self.note else f"{text}\n"
+        return f"{text}\n\n{filled(self.note)}\n" if self.note else f"{text}\n"
 
     @property
     def is_good(self) -> bool:
@@ -39,6 +42,11 @@ class Table:
         kept = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
         rows = (tuple(row[index] for index in kept) for row in self.rows)
         return Table(self.title, tuple(self.columns[index] for index in kept), tuple(rows), self.note)
+
+
+def filled(text: str) -> str:
+    """A paragraph in lines as long as docs have them."""
+    return textwrap.fill(" ".join(text.split()), _LINE_LENGTH)
 
 
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
