@@ -9,7 +9,7 @@
 
 #include "verilated.h"
 
-static const uint64_t WATCHDOG = 20000;  // cycles without any handshake
+static const uint64_t WATCHDOG = 20000;  // cycles without a beat of a frame
 
 static uint64_t cycle = 0;
 

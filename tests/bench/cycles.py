@@ -40,7 +40,8 @@ _LATENCY_COLUMNS = ("converter", "ROS", "bits", "beats", "first to last", "messa
 _LATENCY_NOTE = f"""
     No side ever waits; the slowest of {MESSAGES} messages in a row. 'first to last' are the cycles from the first beat
     to the last, both included; 'message', for a subscriber, those from the last beat to msg_valid, for a publisher
-    those from segment_valid to the first beat. The bar: no cycle beyond the beats, and at most {MOST_BEHIND} for the message.
+    those from segment_valid to the first beat. The bar: no cycle beyond the beats, and at most {MOST_BEHIND} for the
+    message.
     """
 _IMAGE_COLUMNS = ("converter", "ROS", "bits", "start lanes", "beats", "most cycles", "beats used", "bar", "result")
 _IMAGE_NOTE = """
