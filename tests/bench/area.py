@@ -202,7 +202,7 @@ def _converters() -> Iterator[Row]:
 
 def _converter(converter: Converter, bar: Bar | None) -> Row:
     def make(folder: Path) -> Subject:
-        design = generate(converter, folder)
+        (design,) = generate(folder, converter)
         return Subject(design.library, design.entity, {}, design.field_bits, design.lines)
 
     return Row(str(converter), str(converter.ros), converter.width, make, bar=bar)
@@ -224,9 +224,8 @@ def _use_cases() -> Iterator[Row]:
 
 def _use_case(message: str, width: int) -> Callable[[Path], Subject]:
     def make(folder: Path) -> Subject:
-        subscriber, publisher = (
-            generate(Converter(1, message, direction, width), folder) for direction in (SUBSCRIBER, PUBLISHER)
-        )
+        directions = (SUBSCRIBER, PUBLISHER)
+        subscriber, publisher = generate(folder, *(Converter(1, message, each, width) for each in directions))
         sides = {
             prefix: [port for port in design.ports if not port.name.startswith(("clk", "rst_n", f"{stream}_axis_t"))]
             for prefix, stream, design in (("sub", "s", subscriber), ("pub", "m", publisher))

@@ -90,8 +90,14 @@ def is_field(port: Port) -> bool:
     return not re.search(r"^(clk|rst_n|frame_error|frame_error_code)$|_axis_t|(^|_)(valid|ready|last)$", port.name)
 
 
-def generate(converter: Converter, directory: Path) -> Design:
-    """The converter, in the library `work` of `directory`; raises `NotConvertedError`."""
+def generate(directory: Path, *converters: Converter) -> list[Design]:
+    """Converters of any messages, in the library `work` of `directory`; raises `NotConvertedError`."""
+    directory.mkdir(parents=True, exist_ok=True)
+    Library("firm", directory).analyse(core_files(*CORES))
+    return [_generate(directory, converter) for converter in converters]
+
+
+def _generate(directory: Path, converter: Converter) -> Design:
     frame = converter.frame()
     is_subscriber = converter.direction == SUBSCRIBER
     make, name = (subscriber_files, subscriber_entity) if is_subscriber else (publisher_files, publisher_entity)
@@ -99,16 +105,12 @@ def generate(converter: Converter, directory: Path) -> Design:
         files = make([frame], converter.width)
     except InputError as error:
         raise NotConvertedError(str(error)) from error
-    directory.mkdir(parents=True, exist_ok=True)
-    Library("firm", directory).analyse(core_files(*CORES))
-    work = Library("work", directory)
-    texts = {}
     for file, generated in files.items():
-        texts[file] = str(generated.content)
-        (directory / file).write_text(texts[file], encoding="ascii")
+        (directory / file).write_text(str(generated.content), encoding="ascii")
+    work = Library("work", directory)
     work.analyse(directory / file for file in files)
     entity = name(frame)
-    text = texts[f"{entity}.vhd"]
+    text = (directory / f"{entity}.vhd").read_text(encoding="ascii")
     return Design(work, entity, ports_of(text), text.count("\n"))
 
 

@@ -17,8 +17,8 @@ FIGURES = REPOSITORY / "docs" / "figures.md"
 _HEADINGS = {"area": "Area", "cycles": "Cycles", "fuzz": "Fuzzing"}
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
-        to LUT6 and the inverters, one each; FF are FDRE, FDSE, FDCE and FDPE. A design with a latch fails. The
-        dissertation's are Vivado's on an UltraScale+, LUT/FF.""",
+        to LUT6, and inverters but for those of resets, which a slice has; FF are FDRE, FDSE, FDCE and FDPE. A design
+        with a latch fails. The dissertation's are Vivado's on an UltraScale+, LUT/FF.""",
     "cycles": "Counted in a simulation of the netlist that `ghdl --synth` makes, by Verilator.",
     "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",

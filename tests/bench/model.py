@@ -103,7 +103,7 @@ class Publisher:
 
 def subscriber_model(converter: Converter, folder: Path) -> Subscriber:
     """Generate, synthesise and compile a subscriber in `folder`; raises `NotConvertedError` and `ModelError`."""
-    design = generate(converter, folder)
+    (design,) = generate(folder, converter)
     elements = [port.name.removesuffix("_ready") for port in design.ports if _is_element(port, design.ports)]
     fields = [port for port in design.ports if is_field(port)]
     streams = _streams(design)
@@ -127,7 +127,7 @@ def publisher_model(converter: Converter, folder: Path) -> Publisher:
 
     Its fields and streams are those of a message without arrays of messages.
     """
-    design = generate(converter, folder)
+    (design,) = generate(folder, converter)
     fields = [port.name for port in design.ports if is_field(port)]
     streams = _streams(design)
     configuration = {

