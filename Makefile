@@ -19,13 +19,15 @@ TOOLS :=
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
+# Parts of the bench, all if empty: BENCH='area cycles fuzz'.
+BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
 
-.PHONY: help sim test corpus lint setup tools clean distclean
+.PHONY: help sim test bench corpus lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -37,7 +39,7 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIO
 	  $(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)") 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog
+test: TOOLS = iverilog verilator
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -53,6 +55,10 @@ else
 	    --report build/corpus_ros$$ros.json $(VERIFY_OPTIONS) || status=1; \
 	done; exit $$status
 endif
+
+bench: TOOLS = verilator
+bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area cycles fuzz'
+	@$(BIN)/python -m tests.bench $(BENCH)
 
 lint: setup ## Check style and types
 	@$(BIN)/ruff check .
@@ -71,6 +77,12 @@ $(VENV)/.installed: pyproject.toml | tools
 	@echo "Installing Python packages into $(VENV)"
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]' || \
 	  { echo "pip could not install what pyproject.toml lists; its message is above." >&2; exit 1; }
+	@touch $@
+
+# Yosys alone is as large as all the rest.
+$(VENV)/.bench: $(VENV)/.installed
+	@echo "Installing Yosys into $(VENV)"
+	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	@touch $@
 
 clean: ## Remove what was built; .venv stays

@@ -1,0 +1,57 @@
+"""`make bench`: measure, print the tables, write docs/figures.md.
+
+    python -m tests.bench [area] [cycles] [fuzz] [--seed N] [--broken N]
+
+Progress goes to the standard error, tables to the standard output. The exit code is 1 if a design cannot be measured,
+a converter fails or a bar is missed; messages that are not converted yet are none of these.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from tests.bench import area, cycles, figures, fuzz
+from tests.bench.tables import Table
+from tests.bench.yosys import Yosys
+from tests.sim.ghdl import REPOSITORY
+
+SEED = 1
+
+
+def main() -> int:
+    """Measure what the arguments name."""
+    parser = argparse.ArgumentParser(prog="tests.bench", description="Measure converters, Manager and schedulers.")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(figures.parts())}; all if none is named")
+    parser.add_argument("--seed", type=int, default=SEED, help="of random payloads and faults (default: %(default)s)")
+    parser.add_argument(
+        "--broken", type=int, default=fuzz.BROKEN_FRAMES, help="broken frames for each converter (default: %(default)s)"
+    )
+    arguments = parser.parse_args()
+    if unknown := set(arguments.parts) - set(figures.parts()):
+        parser.error(f"no part {', '.join(sorted(unknown))}; there are {', '.join(figures.parts())}")
+    sections = {}
+    is_good = True
+    for part in figures.parts():
+        if arguments.parts and part not in arguments.parts:
+            continue
+        tables = _measure(part, arguments.seed, arguments.broken)
+        is_good = is_good and all(table.is_good for table in tables)
+        sections[part] = figures.section(part, tables)
+        print(sections[part], flush=True)
+    figures.write(sections)
+    return 0 if is_good else 1
+
+
+def _measure(part: str, seed: int, broken: int) -> list[Table]:
+    if part == "area":
+        return area.measure(Yosys(REPOSITORY / "build" / "bench"), _tell)
+    return cycles.measure(seed, _tell) if part == "cycles" else fuzz.measure(seed, _tell, broken)
+
+
+def _tell(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

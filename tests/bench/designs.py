@@ -1,0 +1,123 @@
+"""The converters that are measured: generated, analysed, and their ports read from what was generated."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.generator import publisher_files, subscriber_files
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import select
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.parser import parse_name
+from tests.sim.ghdl import Library, core_files
+
+SUBSCRIBER, PUBLISHER = "subscriber", "publisher"
+CORES = ("axis/axis", "sched/fixed_priority", "manager/manager")
+# A folder of ros1/<package>/msg/*.msg and ros2/..., for messages that no distribution holds.
+CORPUS = "CORPUS"
+
+_PORT = re.compile(r"^ +(\w+) *: (in|out) +std_logic(?:_vector\((\d+) downto 0\))?", re.MULTILINE)
+_PORTS = re.compile(r"^  port \((.*?)^  \);", re.MULTILINE | re.DOTALL)
+
+
+class NotConvertedError(Exception):
+    """A message that no converter is made of, or whose definition is not at hand; the text says which."""
+
+
+@dataclass(frozen=True)
+class Port:
+    """A port of an entity; `is_bit` tells a std_logic from a vector of one bit."""
+
+    name: str
+    is_input: bool
+    bits: int
+    is_bit: bool
+
+    @property
+    def vhdl_type(self) -> str:
+        return "std_logic" if self.is_bit else f"std_logic_vector({self.bits - 1} downto 0)"
+
+
+@dataclass(frozen=True)
+class Converter:
+    """A converter of `message` (`pkg/Type`) for streams of `width` bits; `include` names the fields used, none all."""
+
+    ros: int
+    message: str
+    direction: str
+    width: int
+    include: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        used = f" ({', '.join(self.include)})" if self.include else ""
+        return f"{self.message}{used}, {self.direction}"
+
+    def frame(self) -> Frame:
+        """The message's frame; raises `NotConvertedError` where its definition is not at hand."""
+        ros, name = RosVersion(self.ros), parse_name(self.message)
+        folder = Path(os.environ[CORPUS], f"ros{self.ros}") if os.environ.get(CORPUS) else None
+        library = MessageLibrary(ros, [folder] if folder and folder.is_dir() else [])
+        if name not in library.names():
+            raise NotConvertedError(f"no definition; {CORPUS} may name a folder with one")
+        frame = frame_of(name, library.closure(name))
+        return select(frame, dict.fromkeys(self.include)) if self.include else frame
+
+
+@dataclass(frozen=True)
+class Design:
+    """A converter in VHDL, in a library of its own; `lines` are those of its own file."""
+
+    library: Library
+    entity: str
+    ports: tuple[Port, ...]
+    lines: int
+
+    @property
+    def field_bits(self) -> int:
+        """Bits of the message side's fields and lengths."""
+        return sum(port.bits for port in self.ports if is_field(port))
+
+
+def is_field(port: Port) -> bool:
+    """Whether a port carries a field or a length, and no stream or handshake."""
+    return not re.search(r"^(clk|rst_n|frame_error|frame_error_code)$|_axis_t|(^|_)(valid|ready|last)$", port.name)
+
+
+def generate(directory: Path, *converters: Converter) -> list[Design]:
+    """Converters of any messages, in the library `work` of `directory`; raises `NotConvertedError`."""
+    directory.mkdir(parents=True, exist_ok=True)
+    Library("firm", directory).analyse(core_files(*CORES))
+    return [_generate(directory, converter) for converter in converters]
+
+
+def _generate(directory: Path, converter: Converter) -> Design:
+    frame = converter.frame()
+    is_subscriber = converter.direction == SUBSCRIBER
+    make, name = (subscriber_files, subscriber_entity) if is_subscriber else (publisher_files, publisher_entity)
+    try:
+        files = make([frame], converter.width)
+    except InputError as error:
+        raise NotConvertedError(str(error)) from error
+    for file, generated in files.items():
+        (directory / file).write_text(str(generated.content), encoding="ascii")
+    work = Library("work", directory)
+    work.analyse(directory / file for file in files)
+    entity = name(frame)
+    text = (directory / f"{entity}.vhd").read_text(encoding="ascii")
+    return Design(work, entity, ports_of(text), text.count("\n"))
+
+
+def ports_of(vhdl: str) -> tuple[Port, ...]:
+    """The ports of the first entity in a generated file."""
+    found = _PORTS.search(vhdl)
+    assert found, "no entity with ports"
+    return tuple(
+        Port(name, direction == "in", int(high or 0) + 1, not high) for name, direction, high in _PORT.findall(found[1])
+    )

@@ -1,0 +1,76 @@
+"""docs/figures.md: what the bench measured, a section for each part of it, with the versions of the tools."""
+
+from __future__ import annotations
+
+import platform
+import re
+import subprocess
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+
+from tests.bench import area, cycles, fuzz, yosys
+from tests.bench.tables import Table, filled
+from tests.sim.ghdl import REPOSITORY
+
+FIGURES = REPOSITORY / "docs" / "figures.md"
+
+_HEADINGS = {"area": "Area", "cycles": "Cycles", "fuzz": "Fuzzing"}
+_METHODS = {
+    "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
+        to LUT6, and inverters but for those of resets, which a slice has; FF are FDRE, FDSE, FDCE and FDPE. A design
+        with a latch fails. The dissertation's are Vivado's on an UltraScale+, LUT/FF.""",
+    "cycles": "Counted in a simulation of the netlist that `ghdl --synth` makes, by Verilator.",
+    "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
+        Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
+}
+_INTRODUCTION = """
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `cycles`, `fuzz`). 'not converted'
+    is a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR`
+    names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar, the most it may
+    take.
+    """
+
+
+def parts() -> tuple[str, ...]:
+    """The parts of the bench, in order."""
+    return tuple(_HEADINGS)
+
+
+def keys() -> dict[str, list[tuple[str, ...]]]:
+    """The first cells of every row that docs/figures.md must hold, by the title of the table."""
+    return area.keys() | cycles.keys() | fuzz.keys()
+
+
+def section(part: str, tables: Sequence[Table]) -> str:
+    """The text of a part: heading, method, versions, tables."""
+    body = "\n".join(str(table) for table in tables)
+    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{_versions(part)}\n\n{body}"
+
+
+def write(sections: Mapping[str, str]) -> None:
+    """Put sections in the place of those of the same part; the others stay."""
+    before = FIGURES.read_text(encoding="utf-8") if FIGURES.is_file() else ""
+    known = {part: text for part in parts() if (text := _section_of(before, _HEADINGS[part]))} | dict(sections)
+    ordered = [known[part] for part in parts() if part in known]
+    FIGURES.write_text("\n".join([f"# Figures\n\n{filled(_INTRODUCTION)}\n", *ordered]), encoding="utf-8")
+
+
+def _section_of(text: str, heading: str) -> str:
+    found = re.search(rf"^## {heading}\n.*?(?=\n^## |\Z)", text, re.MULTILINE | re.DOTALL)
+    return found[0] if found else ""
+
+
+def _versions(part: str) -> str:
+    tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
+    if part == "area":
+        tools.append(f"{yosys.PACKAGE} {yosys.version()}")
+    else:
+        tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
+    return f"With {', '.join(tools)}."
+
+
+def _first_line(program: str) -> str:
+    """`GHDL 2.0.0`, `Verilator 5.006`."""
+    output = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    name, version, *_ = output.split()
+    return f"{name} {version}"

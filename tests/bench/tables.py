@@ -1,0 +1,55 @@
+"""Tables of figures, as Markdown that is aligned: the same text for the terminal and for docs/figures.md."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+NOT_CONVERTED = "not converted"
+MET, MISSED, FAILED = "met", "MISSED", "FAILED"
+
+_LINE_LENGTH = 120
+
+# Called with a line for whoever waits.
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A title, the columns' headings, the rows, and what must be said about them."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+    def __str__(self) -> str:
+        table = self._without_empty_columns()
+        lines = [table.columns, *table.rows]
+        widths = [max(len(line[column]) for line in lines) for column in range(len(table.columns))]
+        rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (width + 1) + ":" for width in widths[1:]), ""])
+        heading, *body = (_line(line, widths) for line in lines)
+        text = "\n".join([f"### {self.title}", "", heading, rule, *body])
+        return f"{text}\n\n{filled(self.note)}\n" if self.note else f"{text}\n"
+
+    @property
+    def is_good(self) -> bool:
+        """Whether no row failed and none missed its bar."""
+        return not any(cell in (MISSED, FAILED) for row in self.rows for cell in row)
+
+    def _without_empty_columns(self) -> Table:
+        kept = [index for index in range(len(self.columns)) if any(row[index] for row in self.rows)]
+        rows = (tuple(row[index] for index in kept) for row in self.rows)
+        return Table(self.title, tuple(self.columns[index] for index in kept), tuple(rows), self.note)
+
+
+def filled(text: str) -> str:
+    """A paragraph in lines as long as docs have them."""
+    return textwrap.fill(" ".join(text.split()), _LINE_LENGTH)
+
+
+def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
+    aligned = [cells[0].ljust(widths[0])]
+    aligned += [cell.rjust(width) for cell, width in zip(cells[1:], widths[1:], strict=True)]
+    return f"| {' | '.join(aligned)} |"

