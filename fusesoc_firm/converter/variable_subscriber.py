@@ -30,6 +30,7 @@ from fusesoc_firm.converter.program import (
     Step,
     Tail,
     comment,
+    has_bytes,
     subscriber_program,
 )
 from fusesoc_firm.converter.program import (
@@ -108,6 +109,7 @@ class _Subscriber:
             "has_data": self._has(StreamStep),
             "has_opens": any(map(_is_counted, self.steps)),
             "has_text": any(map(_is_text, self.steps)),
+            "has_hollow": any(map(_is_hollow, self.steps)),
             "step_sets": self._step_sets(),
             **self._tables(),
             **self._lengths(),
@@ -148,6 +150,7 @@ class _Subscriber:
             ("STEP_IS_OPEN", "Knows a count.", self._places(_is_counted)),
             ("STEP_IS_TEXT", "Its count includes a closing zero.", self._places(_is_text)),
             ("STEP_CLOSES_TEXT", "Begins with that zero.", self._places(_closes_text)),
+            ("STEP_IS_HOLLOW", "Its elements take no bytes.", self._places(_is_hollow)),
             ("STEP_OPENS_DATA", "A stream follows.", self._places(_opens_data)),
             *((f"STEP_HAS_{size}", f"Its elements have {size} bytes.", places) for size, places in sizes.items()),
         ]
@@ -503,6 +506,10 @@ def _is_counted(step: Step) -> bool:
 
 def _opens_data(step: Step) -> bool:
     return isinstance(step, Open) and isinstance(step.part, Data)
+
+
+def _is_hollow(step: Step) -> bool:
+    return isinstance(step, Open) and isinstance(step.part, Loop) and not has_bytes(step.part)
 
 
 def _terminator(part: Data | Loop) -> int:

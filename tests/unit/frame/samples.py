@@ -71,6 +71,7 @@ _VARIABLE_SHARED = {
     "Tails": "Tail[] tails\nuint32 number\n",
     "Tail": "uint8 kind\nfloat64[] values\n",
     "Hollows": "Nothing[] nothings\nuint8[] behind\n",
+    "Hollow": "Nothing[] nothings\n",
     "Nothing": "",
     "Halves": "int16[] halves\nint64[] longs\nuint32[] words\nbool[] flags\nfloat32[] floats\n",
     "Clashes": (
