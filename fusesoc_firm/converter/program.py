@@ -397,6 +397,8 @@ def _is_used(step: Step) -> bool:
             return part.is_used or completes is not None
         case Stream(part=part):
             return part.is_used
+        case Close(loop=loop):
+            return loop.is_used
     return False
 
 
