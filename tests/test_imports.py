@@ -33,7 +33,7 @@ ALLOWED: dict[str, set[str]] = {
     "store": set(),
     "library_path": set(),
     "yaml_text": {"diagnostics"},
-    "generation": set(),
+    "generation": {"diagnostics"},
     "requesting_core": {"diagnostics", "yaml_text"},
     "parameters": {"diagnostics", "generation", "requesting_core"},
 }

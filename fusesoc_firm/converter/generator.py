@@ -16,6 +16,7 @@ from fusesoc_firm.converter.configuration import (
 )
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import select
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -44,7 +45,7 @@ def generate(request: Request) -> GeneratedCore:
     """The converters in the direction that the request names. Raises `InputError`."""
     library, name = _message(request)
     definitions = library.closure(name)
-    frame = frame_of(name, definitions)
+    frame = select(frame_of(name, definitions), request.listed("include"), request.listed("exclude"))
     direction, width = request.parameters["direction"], request.parameters["width"]
     assert isinstance(width, int)
     directions = ("subscriber", "publisher") if direction == "both" else (direction,)
