@@ -57,21 +57,21 @@ def generate(request: Request) -> GeneratedCore:
     return GeneratedCore(f"Converters of {name} (ROS {int(library.ros)}, {signature(name, definitions)})", files)
 
 
-def subscriber_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
-    """`axis_to_<pkg>_<type>.vhd` of each frame."""
+def subscriber_files(frames: Iterable[Frame], width: int, suffix: str = "") -> dict[str, GeneratedFile]:
+    """`axis_to_<pkg>_<type><suffix>.vhd` of each frame."""
     return {
-        f"{subscriber_entity(frame)}.vhd": GeneratedFile(
-            render(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width)), VHDL
+        f"{subscriber_entity(frame, suffix)}.vhd": GeneratedFile(
+            render(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, suffix)), VHDL
         )
         for frame in frames
     }
 
 
-def publisher_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
-    """`<pkg>_<type>_to_axis.vhd` of each frame."""
+def publisher_files(frames: Iterable[Frame], width: int, suffix: str = "") -> dict[str, GeneratedFile]:
+    """`<pkg>_<type>_to_axis<suffix>.vhd` of each frame."""
     return {
-        f"{publisher_entity(frame)}.vhd": GeneratedFile(
-            render(PUBLISHER_TEMPLATE, publisher_configuration(frame, width)), VHDL
+        f"{publisher_entity(frame, suffix)}.vhd": GeneratedFile(
+            render(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, suffix)), VHDL
         )
         for frame in frames
     }
