@@ -86,11 +86,13 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("ros", "int", "the ROS version whose wire format is spoken", is_required=True, choices=(1, 2)),
             Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
             Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter("include", "list", "fields that get ports, such as pose.position; all unless given"),
+            Parameter("exclude", "list", "fields that get none of these; a publisher sends their defaults"),
             Parameter(
                 "config",
                 "str",
                 "a file that lists messages and the names of their interfaces, relative to the core",
-                replaces=("message", "ros", "direction", "width"),
+                replaces=("message", "ros", "direction", "width", "include", "exclude"),
             ),
             _PATHS,
             _DISTRO,
@@ -140,7 +142,9 @@ def read_request(command: str, path: Path, parameters: tuple[Parameter, ...]) ->
     except (OSError, yaml.YAMLError, KeyError, TypeError) as error:
         fail(f"{path} is no file of FuseSoC's generator call: {error}")
     origin = find_requesting_core(files_root, vlnv.split(":")[2])
-    return Request(command, vlnv, files_root, check_parameters(given, parameters, origin))
+    checked = check_parameters(given, parameters, origin)
+    places = {name: origin.items(name) for name, value in checked.items() if isinstance(value, list)}
+    return Request(command, vlnv, files_root, checked, places)
 
 
 def _write(request: Request, generator: Generator) -> bool:

@@ -5,11 +5,13 @@ It knows no stage, so `converter` and `system` can return what `gapi` writes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import yaml
+
+from fusesoc_firm.diagnostics import SourceRef
 
 Plain = str | int | bool | list[str] | None
 """What a generator's parameter can be; None is one that was not given and has no default."""
@@ -17,17 +19,28 @@ Plain = str | int | bool | list[str] | None
 
 @dataclass(frozen=True)
 class Request:
-    """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's."""
+    """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's.
+
+    `places` tells where the items of a list parameter stand, as far as that is known; they are no part of the request.
+    """
 
     command: str
     vlnv: str
     files_root: Path
     parameters: Mapping[str, Plain]
+    places: Mapping[str, Sequence[SourceRef]] = field(default_factory=dict, compare=False)
 
     @property
     def name(self) -> str:
         """The new core's name, `<requesting core>-<instance>`."""
         return self.vlnv.split(":")[2]
+
+    def listed(self, parameter: str) -> dict[str, SourceRef | None]:
+        """The items of a list parameter, each with its place; none where it is not given."""
+        items = self.parameters.get(parameter) or []
+        assert isinstance(items, list)
+        places = self.places.get(parameter, ())
+        return dict(zip(items, places if len(places) == len(items) else [None] * len(items), strict=True))
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,13 @@ class RequestingCore:
         found = self._parameter(parameter)
         return self._reference(found[1]) if found else self.instance()
 
+    def items(self, parameter: str) -> list[SourceRef]:
+        """The place of each item of a list; none where it was not found."""
+        found = self._parameter(parameter)
+        if self.text is None or not found or not isinstance(found[1], yaml.SequenceNode):
+            return []
+        return [self.text.source(node) for node in found[1].value]
+
     def _parameter(self, name: str) -> tuple[yaml.Node, yaml.Node] | None:
         parameters = _item(self.entry[1], "parameters") if self.entry else None
         return _item(parameters[1], name) if parameters else None

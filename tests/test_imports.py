@@ -37,7 +37,7 @@ ALLOWED: dict[str, set[str]] = {
     "library_path": set(),
     "yaml_text": {"diagnostics"},
     "yaml_sections": {"diagnostics", "yaml_text"},
-    "generation": set(),
+    "generation": {"diagnostics"},
     "requesting_core": {"diagnostics", "yaml_text"},
     "parameters": {"diagnostics", "generation", "requesting_core"},
 }

@@ -17,8 +17,8 @@ from fusesoc_firm.converter.slices import Slice, slices_of, windows_of
 from fusesoc_firm.converter.storing import Counter, joints, store_configuration, store_names
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, stores_of
 from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.frame.defaults import default_bytes
-from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Fixed, Frame
+from fusesoc_firm.frame.defaults import default_payload
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
 from fusesoc_firm.naming import entity_name
 
 Configuration = dict[str, Any]
@@ -35,18 +35,18 @@ _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
 
 
-def subscriber_entity(frame: Frame) -> str:
-    """`axis_to_<pkg>_<type>`."""
-    return f"axis_to_{entity_name(frame.message.package, frame.message.name)}"
+def subscriber_entity(frame: Frame, suffix: str = "") -> str:
+    """`axis_to_<pkg>_<type>`; a suffix tells converters of other fields apart."""
+    return f"axis_to_{entity_name(frame.message.package, frame.message.name)}{suffix}"
 
 
-def publisher_entity(frame: Frame) -> str:
-    """`<pkg>_<type>_to_axis`."""
-    return f"{entity_name(frame.message.package, frame.message.name)}_to_axis"
+def publisher_entity(frame: Frame, suffix: str = "") -> str:
+    """`<pkg>_<type>_to_axis`; a suffix tells converters of other fields apart."""
+    return f"{entity_name(frame.message.package, frame.message.name)}_to_axis{suffix}"
 
 
-def subscriber_configuration(frame: Frame, width: int) -> Configuration:
-    """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
+def subscriber_configuration(frame: Frame, width: int, suffix: str = "") -> Configuration:
+    """The configuration of the entity `subscriber_entity` for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -56,7 +56,7 @@ def subscriber_configuration(frame: Frame, width: int) -> Configuration:
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
     inputs = ["s_axis_tdata"] + ([] if stream.lanes == 1 else ["s_axis_tkeep"])
     return {
-        **_common(frame, stream, subscriber_entity(frame), "out"),
+        **_common(frame, stream, subscriber_entity(frame, suffix), "out"),
         **store_configuration(stores, _COUNTER),
         **_states(stream.beat(ends[-1])),
         "is_byte_wide": stream.lanes == 1,
@@ -91,8 +91,8 @@ def _states(last_position: int) -> Configuration:
     }
 
 
-def publisher_configuration(frame: Frame, width: int) -> Configuration:
-    """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
+def publisher_configuration(frame: Frame, width: int, suffix: str = "") -> Configuration:
+    """The configuration of the entity `publisher_entity` for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -102,7 +102,7 @@ def publisher_configuration(frame: Frame, width: int) -> Configuration:
     start = _first_position(stream)
     position_bits = max(1, (start + beats - 1).bit_length())
     return {
-        **_common(frame, stream, publisher_entity(frame), "in"),
+        **_common(frame, stream, publisher_entity(frame, suffix), "in"),
         "first_position": start,
         "last_position": start + beats - 1,
         "frame_high": (start + beats) * width - 1,
@@ -300,8 +300,7 @@ def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:
 
     This is the prefix, the defaults of fields that are not used, else zeros; in rows, and long runs of zeros at once.
     """
-    payload = b"".join(default_bytes(node) for node in frame.nodes if isinstance(node, Fixed))
-    payload = frame.prefix + payload[len(frame.prefix) :]
+    payload = default_payload(frame)
     cursor = 0
     for first, end in [*windows_of(frame), (frame.payload_bytes, frame.payload_bytes)]:
         for part in _ROWS.finditer(payload, cursor, first):

@@ -14,7 +14,7 @@ from fusesoc_firm.converter.constants import (
     constants_package,
 )
 from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_configuration
-from fusesoc_firm.converter.order import ENTITIES, Order, order_of_config, order_of_message
+from fusesoc_firm.converter.order import ENTITIES, Order, Selection, order_of_config, order_of_message
 from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
@@ -65,14 +65,16 @@ def constants_files(messages: Sequence[tuple[MessageName, Definitions]]) -> dict
     return files
 
 
-def subscriber_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
-    """`axis_to_<pkg>_<type>.vhd` of each frame."""
-    return {f"{subscriber_entity(frame)}.vhd": _file(subscriber_source(frame, width)) for frame in frames}
+def subscriber_files(frames: Iterable[Frame], width: int, suffix: str = "") -> dict[str, GeneratedFile]:
+    """`axis_to_<pkg>_<type><suffix>.vhd` of each frame."""
+    return {
+        f"{subscriber_entity(frame, suffix)}.vhd": _file(subscriber_source(frame, width, suffix)) for frame in frames
+    }
 
 
-def publisher_files(frames: Iterable[Frame], width: int) -> dict[str, GeneratedFile]:
-    """`<pkg>_<type>_to_axis.vhd` of each frame."""
-    return {f"{publisher_entity(frame)}.vhd": _file(publisher_source(frame, width)) for frame in frames}
+def publisher_files(frames: Iterable[Frame], width: int, suffix: str = "") -> dict[str, GeneratedFile]:
+    """`<pkg>_<type>_to_axis<suffix>.vhd` of each frame."""
+    return {f"{publisher_entity(frame, suffix)}.vhd": _file(publisher_source(frame, width, suffix)) for frame in frames}
 
 
 def _file(source: ConverterSource) -> GeneratedFile:
@@ -86,7 +88,9 @@ def _order(request: Request) -> Order:
         return order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
     assert isinstance(ros, int) and isinstance(width, int)
     library = MessageLibrary(RosVersion(ros), *library_sources(request))
-    return order_of_message(str(request.parameters["message"]), str(request.parameters["direction"]), width, library)
+    message, direction = str(request.parameters["message"]), str(request.parameters["direction"])
+    selection = Selection(request.listed("include"), request.listed("exclude"))
+    return order_of_message(message, direction, width, library, selection)
 
 
 def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:

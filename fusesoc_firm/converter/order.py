@@ -6,15 +6,16 @@ It is asked by the parameters of a core, for a message, a service or an action, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from fusesoc_firm.converter.config_file import MessageInterfaces, read_config
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import constants_package
-from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import Paths, select
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_full_name, parse_name
@@ -56,17 +57,31 @@ class Order:
     files: tuple[Path, ...]
 
 
-def order_of_message(text: str, direction: str, width: int, library: MessageLibrary) -> Order:
+@dataclass(frozen=True)
+class Selection:
+    """The fields of a message that get ports, as `select` takes them."""
+
+    include: Paths = field(default_factory=dict)
+    exclude: Paths = field(default_factory=dict)
+
+
+def order_of_message(
+    text: str, direction: str, width: int, library: MessageLibrary, selection: Selection | None = None
+) -> Order:
     """The converters of one message, or of those that the two ends of a service or an action exchange.
 
-    `direction` is one of `ENTITIES`, or "both". Raises `InputError`.
+    `direction` is one of `ENTITIES`, or "both"; `selection` is of a single message's fields. Raises `InputError`.
     """
+    selection = selection or Selection()
     kind, name = parse_full_name(text)
     interface = library.interface(name, kind)
     names = interface.exchanged if interface else (name,)
     definitions = library.joint_closure(names)
     directions = dict.fromkeys(ENTITIES if direction == "both" else (direction,), ())
-    messages = tuple(Wanted(frame_of(each, definitions), definitions, directions) for each in names)
+    if len(names) > 1:
+        _check_no_selection(selection, text)
+    frames = [select(frame_of(each, definitions), selection.include, selection.exclude) for each in names]
+    messages = tuple(Wanted(frame, definitions, directions) for frame in frames)
     facts = [f"ROS {int(library.ros)}"]
     if interface is None:
         facts.append(signature(name, definitions))
@@ -74,6 +89,11 @@ def order_of_message(text: str, direction: str, width: int, library: MessageLibr
         facts.append(signature(name, library.joint_closure(interface.messages), interface.kind))
     title = f"{interface or name} ({', '.join(facts)})"
     return Order(title, width, messages, tuple(library.files(definitions)))
+
+
+def _check_no_selection(selection: Selection, text: str) -> None:
+    for source in (*selection.include.values(), *selection.exclude.values()):
+        fail(f"'{text}' is several messages, of which no fields can be selected", source, "name one of them instead")
 
 
 def order_of_config(path: Path, libraries: Mapping[RosVersion, MessageLibrary]) -> Order:

@@ -26,19 +26,19 @@ class ConverterSource(NamedTuple):
     configuration: Configuration
 
 
-def subscriber_source(frame: Frame, width: int) -> ConverterSource:
-    """`axis_to_<pkg>_<type>` for a stream of `width` bits. Raises `InputError` for what no converter is made for."""
+def subscriber_source(frame: Frame, width: int, suffix: str = "") -> ConverterSource:
+    """`axis_to_<pkg>_<type><suffix>` on `width` bits. Raises `InputError` for what no converter is made for."""
     check_width(width)
     if frame.is_fixed_size:
-        return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width))
-    configuration = variable_subscriber_configuration(frame, width, subscriber_entity(frame))
+        return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, suffix))
+    configuration = variable_subscriber_configuration(frame, width, subscriber_entity(frame, suffix))
     return ConverterSource(VARIABLE_SUBSCRIBER_TEMPLATE, configuration)
 
 
-def publisher_source(frame: Frame, width: int) -> ConverterSource:
-    """`<pkg>_<type>_to_axis` for a stream of `width` bits. Raises `InputError` for what no converter is made for."""
+def publisher_source(frame: Frame, width: int, suffix: str = "") -> ConverterSource:
+    """`<pkg>_<type>_to_axis<suffix>` on `width` bits. Raises `InputError` for what no converter is made for."""
     check_width(width)
     if frame.is_fixed_size:
-        return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width))
-    configuration = variable_publisher_configuration(frame, width, publisher_entity(frame))
+        return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, suffix))
+    configuration = variable_publisher_configuration(frame, width, publisher_entity(frame, suffix))
     return ConverterSource(VARIABLE_PUBLISHER_TEMPLATE, configuration)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
-from fusesoc_firm.frame.model import Fixed, Frame, Loop, NameTree, Node, Pad
+from fusesoc_firm.frame.model import Fixed, Frame, Loop, NameTree, Node, Pad, all_nodes
 from fusesoc_firm.frame.values import dotted
 
 # Dotted paths, each with the place where the user wrote it.
 Paths = Mapping[str, SourceRef | None]
+# The names on the way to a leaf.
+Names = tuple[str, ...]
 
 
 def select(frame: Frame, include: Paths | None = None, exclude: Paths | None = None) -> Frame:
@@ -27,13 +29,29 @@ def select(frame: Frame, include: Paths | None = None, exclude: Paths | None = N
         if path not in known:
             faults.error(f"{frame.message} has no field '{path}'", source, nearest(path, known))
     faults.raise_if_any()
-    return replace(frame, nodes=_Selection(include, exclude).marked(frame.nodes))
+    return replace(frame, nodes=_Marking(lambda names: _is_chosen(names, include, exclude)).marked(frame.nodes))
+
+
+def names_in_use(frame: Frame) -> frozenset[Names]:
+    """The names of every leaf that is used."""
+    return frozenset(names for node in all_nodes(frame.nodes) for names, is_used in _leaves(node) if is_used)
+
+
+def with_names_in_use(frame: Frame, names: Collection[Names]) -> Frame:
+    """The frame with just the leaves of these names used."""
+    return replace(frame, nodes=_Marking(lambda leaf: leaf in names).marked(frame.nodes))
+
+
+def _is_chosen(names: Names, include: Collection[str], exclude: Collection[str]) -> bool:
+    above = {dotted(names[: length + 1]) for length in range(len(names))}
+    return (not include or not above.isdisjoint(include)) and above.isdisjoint(exclude)
 
 
 @dataclass(frozen=True)
-class _Selection:
-    include: Collection[str]
-    exclude: Collection[str]
+class _Marking:
+    """Marks every leaf for which `has` holds, and what is around it."""
+
+    has: Callable[[Names], bool]
 
     def marked(self, nodes: tuple[Node, ...]) -> tuple[Node, ...]:
         return tuple(self._marked(node) for node in nodes)
@@ -43,18 +61,14 @@ class _Selection:
             case Pad():
                 return node
             case Fixed():
-                fields = (replace(leaf, is_used=self._has(leaf.names)) for leaf in node.fields)
+                fields = (replace(leaf, is_used=self.has(leaf.names)) for leaf in node.fields)
                 return replace(node, fields=tuple(fields))
             case Loop():
                 body = self.marked(node.body)
                 inner = [is_used for part in body for is_used in _uses(part)]
                 # The elements of an array of empty messages hold nothing: only their number can be used.
-                return replace(node, body=body, is_used=any(inner) if inner else self._has(node.names))
-        return replace(node, is_used=self._has(node.names))
-
-    def _has(self, names: tuple[str, ...]) -> bool:
-        above = {dotted(names[: length + 1]) for length in range(len(names))}
-        return (not self.include or not above.isdisjoint(self.include)) and above.isdisjoint(self.exclude)
+                return replace(node, body=body, is_used=any(inner) if inner else self.has(node.names))
+        return replace(node, is_used=self.has(node.names))
 
 
 def _uses(node: Node) -> Iterator[bool]:
@@ -62,6 +76,16 @@ def _uses(node: Node) -> Iterator[bool]:
         yield from (leaf.is_used for leaf in node.fields)
     elif not isinstance(node, Pad):
         yield node.is_used
+
+
+def _leaves(node: Node) -> Iterator[tuple[Names, bool]]:
+    """The names of what a node holds itself; an array of empty messages is a leaf."""
+    if isinstance(node, Fixed):
+        yield from ((leaf.names, leaf.is_used) for leaf in node.fields)
+    elif not isinstance(node, Pad) and not (
+        isinstance(node, Loop) and any(True for part in node.body for _ in _uses(part))
+    ):
+        yield node.names, node.is_used
 
 
 def _all_names(tree: NameTree, above: tuple[str, ...]) -> Iterator[tuple[str, ...]]:

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fusesoc_firm.diagnostics import SourceRef, fail, nearest
-from fusesoc_firm.frame.codec import CodecError, encode
+from fusesoc_firm.frame.codec import CodecError
+from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.host.stimuli import Stimulus
 from fusesoc_firm.system.derived import Converter
 
@@ -84,7 +85,7 @@ class _Model:
             )
         publisher = known[block]
         try:
-            return Response(publisher, encode(publisher.frame, message), dict(message), cause)
+            return Response(publisher, encode_used(publisher.frame, message), dict(message), cause)
         except CodecError as error:
             self._fail(f"for {when}, what 'respond' gave to '{block}' does not fit: {error}")
 

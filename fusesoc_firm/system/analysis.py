@@ -14,14 +14,16 @@ from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import Names, names_in_use, select, with_names_in_use
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MIDDLEWARES, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.naming import identifier
-from fusesoc_firm.system.connections import Wiring
+from fusesoc_firm.system.connections import Wiring, places
 from fusesoc_firm.system.derived import (
     AcceleratorBlock,
     AcceleratorType,
+    Connection,
     Converter,
     DerivedSystem,
     MessageSide,
@@ -58,8 +60,8 @@ def derive(specification: Specification, folder: Path, libraries: Libraries, fau
         fpga_part=str(project.fpga_part or ""),
         width=project.width,
         scheduler=str(project.scheduler),
-        subscribers=analysis.converters("subscriber"),
-        publishers=analysis.converters("publisher"),
+        subscribers=analysis.converters("subscriber", connections),
+        publishers=analysis.converters("publisher", connections),
         accelerators=tuple(
             AcceleratorBlock(str(block.name), analysis.types[block.type])
             for block in specification.blocks
@@ -140,20 +142,20 @@ class _Analysis:
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
         """The message sides of an interface, numbered if there are several; None if a message is wrong."""
-        frames = [self._frame(item.middleware, item.message) for item in interface]
+        frames = [self._frame(item.middleware, item.message, item.include, item.exclude) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
         sides = [MessageSide(prefix, frame) for prefix, frame in zip(prefixes, frames, strict=True) if frame]
         return tuple(sides) if len(sides) == len(frames) else None
 
-    def _frame(self, middleware: Text, message: Text) -> Frame | None:
-        """The frame of a message, or None where it has a fault, which is noted at the specification's word."""
+    def _frame(self, middleware: Text, message: Text, include: Sequence[Text], exclude: Sequence[Text]) -> Frame | None:
+        """The frame of a message's fields, or None where it has a fault, which is noted at the specification's word."""
         if not middleware or not message:
             return None
         library = self.libraries[MIDDLEWARES[middleware]]
         try:
             name = parse_name(message)
             library.get(name, message.source)
-            frame = frame_of(name, library.closure(name))
+            frame = select(frame_of(name, library.closure(name)), places(include), places(exclude))
         except InputError as error:
             self.faults.take(error, message.source)
             return None
@@ -186,10 +188,10 @@ class _Analysis:
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
             self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, nearest(block.type, names))
-        for key in ("middleware", "mode", "message"):
-            value = getattr(block, key)
-            if value is not None:
-                self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", value.source)
+        for key in ("middleware", "mode", "message", "include", "exclude"):
+            if value := getattr(block, key):
+                source = value[0].source if isinstance(value, tuple) else value.source
+                self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", source)
         if found := self.types.get(block.type):
             self.inputs[block.name] = found.inputs
             self.outputs[block.name] = found.outputs
@@ -204,7 +206,7 @@ class _Analysis:
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, hint)
             return
         assert block.middleware is not None and block.message is not None
-        frame = self._frame(block.middleware, block.message)
+        frame = self._frame(block.middleware, block.message, block.include, block.exclude)
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
             self.inputs[block.name] = () if is_subscriber else (MessageSide("", frame),)
@@ -236,11 +238,25 @@ class _Analysis:
             has_more_messages=self.specification.is_cut
             or bool(lost)
             or any(block.name not in self.outputs for block in unsound),
-            strays={side.frame for block in unsound for side in self.outputs.get(block.name, ())},
+            strays={side.kind for block in unsound for side in self.outputs.get(block.name, ())},
             ambiguous={block.name for block in lost},
         )
 
-    def converters(self, mode: str) -> tuple[Converter, ...]:
-        blocks = [block for block in self.specification.blocks if block.type is None and block.mode == mode]
+    def converters(self, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
+        """The converters with the fields that connections carry: what nobody takes or drives needs no port."""
+        names: dict[str, set[Names]] = {}
+        for connection in connections:
+            for sink, frame in zip(connection.sinks, connection.frames, strict=True):
+                end = connection.source if mode == "subscriber" else sink
+                names.setdefault(end.block, set()).update(names_in_use(frame))
         sides = self.outputs if mode == "subscriber" else self.inputs
-        return tuple(Converter(str(block.name), sides[block.name][0].frame, n) for n, block in enumerate(blocks))
+        blocks = [block for block in self.specification.blocks if block.type is None and block.mode == mode]
+        suffixes: dict[Frame, str] = {}
+        found = []
+        for number, block in enumerate(blocks):
+            whole = select(sides[block.name][0].frame)
+            frame = with_names_in_use(whole, names[block.name])
+            # Blocks of the same fields share the entity of the first.
+            suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(block.name).lower()}")
+            found.append(Converter(str(block.name), frame, number, suffix))
+        return tuple(found)

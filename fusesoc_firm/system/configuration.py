@@ -82,7 +82,7 @@ def system_configuration(system: DerivedSystem) -> Configuration:
         "subscribers": [_subscriber(names, converter) for converter in system.subscribers],
         "publishers": [_publisher(names, converter, system.width) for converter in system.publishers],
         "accelerators": [_accelerator(names, block) for block in system.accelerators],
-        "connections": [_connection(names, connection) for connection in system.connections],
+        "connections": _connections(names, system.connections),
     }
 
 
@@ -141,8 +141,8 @@ class _Names:
         label_names = distinct_identifiers(labels, _TAKEN)
         self._labels = dict(zip(labels, label_names, strict=True))
 
-        entities = {subscriber_entity(item.frame) for item in system.subscribers}
-        entities |= {publisher_entity(item.frame) for item in system.publishers}
+        entities = {subscriber_entity(item.frame, item.suffix) for item in system.subscribers}
+        entities |= {publisher_entity(item.frame, item.suffix) for item in system.publishers}
         entities |= {accelerator_entity(item) for item in system.accelerator_types}
         reserved = {*_TAKEN, system.entity, *entities, *label_names}
         # A fork's signals have keys of three parts, so no field of a message can have the same.
@@ -192,7 +192,7 @@ def _subscriber(names: _Names, converter: Converter) -> Configuration:
     low, high = _ERROR_CODE_BITS * number, _ERROR_CODE_BITS * (number + 1) - 1
     ports = side_ports(converter.frame, gives=True, has_valid=True)
     return {
-        **_instance(names, converter.block, subscriber_entity(converter.frame)),
+        **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
         "id": number,
         "ports": port_map(
@@ -217,7 +217,7 @@ def _publisher(names: _Names, converter: Converter, width: int) -> Configuration
     lanes = width // 8
     ports = side_ports(converter.frame, gives=False, has_valid=False)
     return {
-        **_instance(names, converter.block, publisher_entity(converter.frame)),
+        **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
         "message": str(converter.frame.message),
         "id": number,
         "ports": port_map(
@@ -249,20 +249,36 @@ def _instance(names: _Names, block: str, entity: str) -> Configuration:
     return {"block": block, "label": names.label(block), "entity": entity}
 
 
-def _connection(names: _Names, connection: Connection) -> Configuration:
-    """The assignments of a connection; with several sinks, a fork lets each take the message in its own time."""
+def _connections(names: _Names, connections: Iterable[Connection]) -> list[Configuration]:
+    """The assignments of every connection. A sink of several sources takes their parts of a message together."""
+    waiting: dict[End, list[str]] = {}
+    for connection in connections:
+        for sink, (valid, _) in zip(connection.sinks, _handshakes(names, connection), strict=True):
+            waiting.setdefault(sink, []).append(valid)
+    return [_connection(names, connection, waiting) for connection in connections]
+
+
+def _connection(names: _Names, connection: Connection, waiting: Mapping[End, list[str]]) -> Configuration:
+    """The assignments of a connection; with several sinks, a fork lets each take the message in its own time.
+
+    `waiting` are the valids of all sources of each sink; what they make together is assigned with the last one.
+    """
     source, sinks = connection.source, connection.sinks
-    fields = field_ports(connection.frame)
     pairs: list[tuple[str, str]] = []
-    for sink, (valid, ready) in zip(sinks, _handshakes(names, connection), strict=True):
+    handshakes = _handshakes(names, connection)
+    for sink, frame, (valid, ready) in zip(sinks, connection.frames, handshakes, strict=True):
+        fields = field_ports(frame)
         pairs += [(names.at(sink, port.name), names.at(source, port.name)) for port in fields]
-        pairs.append((f"{names.at(sink, 'segment_valid')}(0)", valid))
-        if sink.prefix:
-            pairs.append((names.at(sink, "msg_valid"), valid))
-        pairs.append((ready, names.at(sink, "msg_ready")))
+        sink_valid, sink_ready = f"{names.at(sink, 'segment_valid')}(0)", names.at(sink, "msg_ready")
+        if valid == waiting[sink][-1]:
+            whole = " and ".join(waiting[sink])
+            pairs.append((sink_valid, whole))
+            if sink.prefix:
+                pairs.append((names.at(sink, "msg_valid"), whole))
+        pairs.append((ready, sink_ready if len(waiting[sink]) == 1 else f"{sink_ready} and {sink_valid}"))
     column = max(len(target) for target, _ in pairs)
     return {
-        "message": str(connection.frame.message),
+        "message": str(connection.frames[0].message),
         "source": source.block,
         "sinks": ", ".join(sink.block for sink in sinks),
         "fork": _fork(names, source, len(sinks)) if len(sinks) > 1 else None,

@@ -1,4 +1,4 @@
-"""Which message goes where: the ports that each `outgoing` means, and what is wrong with the data flow.
+"""Which message goes where: the ports and fields that each `outgoing` means, and what is wrong with the data flow.
 
 A connection that cannot be made is one fault. What lacks a message only because of it is not reported as well.
 """
@@ -9,13 +9,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 
-from fusesoc_firm.diagnostics import Diagnostics, nearest
+from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import Names, Paths, names_in_use, select, with_names_in_use
+from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.system.derived import Connection, End, MessageSide
 from fusesoc_firm.system.specification import Block, Outgoing
+from fusesoc_firm.yaml_text import Text
 
 Sides = Mapping[str, tuple[MessageSide, ...]]
 Pair = tuple[MessageSide, MessageSide]
+
+# Stands for the fields of a message that has none.
+_NO_FIELD: Names = ()
 
 
 @dataclass
@@ -33,11 +40,12 @@ class Wiring:
     faults: Diagnostics
     has_more_blocks: bool = False
     has_more_messages: bool = False
-    strays: set[Frame] = field(default_factory=set)
+    strays: set[tuple[MessageName, RosVersion]] = field(default_factory=set)
     ambiguous: set[str] = field(default_factory=set)
-    sinks: dict[End, list[End]] = field(default_factory=dict)
+    # The fields that go from each source to each of its sinks, and who drives each field of a sink.
+    sinks: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)
     frames: dict[End, Frame] = field(default_factory=dict)
-    driven: dict[End, Outgoing] = field(default_factory=dict)
+    driven: dict[End, dict[Names, Outgoing]] = field(default_factory=dict)
     # The two ends of connections that could not be made.
     broken_sources: set[str] = field(default_factory=set)
     broken_sinks: set[str] = field(default_factory=set)
@@ -53,7 +61,12 @@ class Wiring:
             self._check_sinks()
         self._check_sources()
         self._check_cycles()
-        return tuple(Connection(self.frames[source], source, tuple(ends)) for source, ends in self.sinks.items())
+        return tuple(
+            Connection(
+                source, tuple(ends), tuple(with_names_in_use(self.frames[source], names) for names in ends.values())
+            )
+            for source, ends in self.sinks.items()
+        )
 
     def _connect(self, block: Block, outgoing: Outgoing) -> bool:
         """Make one connection; False where there is none, with the fault noted unless it is already."""
@@ -62,16 +75,21 @@ class Wiring:
         pairs = self._pairs(block, outgoing)
         if not pairs:
             return False
-        free = [pair for pair in pairs if self._sink(outgoing, pair) not in self.driven]
+        free = [pair for pair in pairs if self._rivals(outgoing, pair, pairs[pair]) is None]
         if not free:
-            first = self.driven[self._sink(outgoing, pairs[0])].name.source
-            if outgoing.name not in self.ambiguous:
-                hint = f"an input takes its messages from one block; this one is named at {first}"
-                self.faults.error(f"'{outgoing.name}' gets this message already", outgoing.name.source, hint)
+            rival = self._rivals(outgoing, *next(iter(pairs.items())))
+            if outgoing.name not in self.ambiguous and rival:
+                name, first = rival
+                what = f"'{dotted(name)}'" if outgoing.include or outgoing.exclude else "this message"
+                hint = f"a field comes from one block; this one is named at {first.name.source}"
+                self.faults.error(f"'{outgoing.name}' gets {what} already", outgoing.name.source, hint)
             return False
-        source, sink = self._chosen(block, outgoing, free)
-        self.driven[sink] = outgoing
-        self.sinks.setdefault(source, []).append(sink)
+        pair = self._chosen(block, free)
+        source, sink = self._source(block, pair), self._sink(outgoing, pair)
+        self.frames[source] = pair[0].frame
+        self.driven.setdefault(sink, {}).update(dict.fromkeys(pairs[pair], outgoing))
+        ends = self.sinks.setdefault(source, {})
+        ends[sink] = ends.get(sink, frozenset()) | pairs[pair]
         return True
 
     def _are_known(self, block: Block, outgoing: Outgoing) -> bool:
@@ -81,7 +99,7 @@ class Wiring:
         if name not in self.blocks:
             if not self.has_more_blocks:
                 self.faults.error(f"no block is called '{name}'", name.source, nearest(name, self.blocks))
-            self.strays |= {side.frame for side in self.outputs.get(block.name, ())}
+            self.strays |= {side.kind for side in self.outputs.get(block.name, ())}
             return False
         target = self.blocks[name]
         if block.type is None and block.mode == "publisher":
@@ -92,25 +110,40 @@ class Wiring:
             return False
         return block.name in self.outputs and name in self.inputs
 
-    def _pairs(self, block: Block, outgoing: Outgoing) -> list[Pair]:
-        """The sides at both ends that carry the same message."""
+    def _pairs(self, block: Block, outgoing: Outgoing) -> dict[Pair, frozenset[Names]]:
+        """The sides at both ends that carry the same message, each with the fields that go this way."""
         gives, takes = self.outputs[block.name], self.inputs[outgoing.name]
-        pairs = [(given, taken) for given in gives for taken in takes if given.frame == taken.frame]
-        if not pairs:
+        alike = [(given, taken) for given in gives for taken in takes if given.kind == taken.kind]
+        if not alike:
             self.faults.error(
                 f"'{block.name}' gives {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
                 outgoing.name.source,
             )
+            return {}
+        try:
+            pairs = {pair: _fields(outgoing, *pair) for pair in alike}
+        except InputError as error:
+            self.faults.found += [fault for fault in error.diagnostics if fault not in self.faults.found]
+            return {}
+        pairs = {pair: names for pair, names in pairs.items() if names}
+        if not pairs:
+            self.faults.error(
+                f"no field goes from '{block.name}' to '{outgoing.name}'",
+                outgoing.name.source,
+                "what both ends have and 'include' and 'exclude' leave goes there",
+            )
         return pairs
 
-    def _chosen(self, block: Block, outgoing: Outgoing, free: Sequence[Pair]) -> tuple[End, End]:
+    def _rivals(self, outgoing: Outgoing, pair: Pair, names: Iterable[Names]) -> tuple[Names, Outgoing] | None:
+        """A field that the sink gets already, and by which connection."""
+        driven = self.driven.get(self._sink(outgoing, pair), {})
+        return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
+
+    def _chosen(self, block: Block, free: Sequence[Pair]) -> Pair:
         """The first pair with an output that goes nowhere yet; else the last output that fits gets one more sink."""
         unused = [pair for pair in free if self._source(block, pair) not in self.sinks]
         last = free[-1][0]
-        given, taken = unused[0] if unused else next(pair for pair in free if pair[0] == last)
-        source = End(str(block.name), given.prefix)
-        self.frames[source] = given.frame
-        return source, End(str(outgoing.name), taken.prefix)
+        return unused[0] if unused else next(pair for pair in free if pair[0] == last)
 
     @staticmethod
     def _source(block: Block, pair: Pair) -> End:
@@ -123,13 +156,25 @@ class Wiring:
     def _check_sinks(self) -> None:
         for block in self.blocks.values():
             for side in self.inputs.get(block.name, ()):
-                is_excused = block.name in self.broken_sinks or side.frame in self.strays
-                if not is_excused and End(str(block.name), side.prefix) not in self.driven:
-                    self.faults.error(
-                        f"nothing goes to {_words('input', side)} of '{block.name}' ({side.frame.message})",
-                        block.name.source,
-                        f"name '{block.name}' as 'outgoing' of a block that gives {side.frame.message}",
-                    )
+                if block.name not in self.broken_sinks and side.kind not in self.strays:
+                    self._check_sink(block, side)
+
+    def _check_sink(self, block: Block, side: MessageSide) -> None:
+        """A publisher sends defaults for fields that it does not get; an accelerator needs all of its input."""
+        driven = self.driven.get(End(str(block.name), side.prefix), {})
+        missing = sorted(dotted(name) for name in _names(side.frame) - driven.keys())
+        if not driven:
+            self.faults.error(
+                f"nothing goes to {_words('input', side)} of '{block.name}' ({side.frame.message})",
+                block.name.source,
+                f"name '{block.name}' as 'outgoing' of a block that gives {side.frame.message}",
+            )
+        elif missing and block.type is not None:
+            self.faults.error(
+                f"{_words('input', side)} of '{block.name}' ({side.frame.message}) lacks {', '.join(missing)}",
+                block.name.source,
+                "let a connection include it, or the accelerator's interface exclude it",
+            )
 
     def _check_sources(self) -> None:
         for block in self.blocks.values():
@@ -166,6 +211,21 @@ def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
         # Each is the predecessor of the next; the first comes again at the end.
         return list(error.args[1][:-1])
     return []
+
+
+def _fields(outgoing: Outgoing, given: MessageSide, taken: MessageSide) -> frozenset[Names]:
+    """The fields that go from one side to another. Raises `InputError` for a path that is none."""
+    chosen = select(given.frame, *(places(paths) for paths in (outgoing.include, outgoing.exclude)))
+    return _names(given.frame) & _names(taken.frame) & _names(chosen)
+
+
+def places(paths: Iterable[Text]) -> Paths:
+    """The paths of `include` or `exclude`, as `select` takes them."""
+    return {path: path.source for path in paths}
+
+
+def _names(frame: Frame) -> frozenset[Names]:
+    return names_in_use(frame) if frame.names else frozenset({_NO_FIELD})
 
 
 def _messages(sides: Sequence[MessageSide]) -> str:

@@ -8,16 +8,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.system.specification import Accelerator
 
 
 @dataclass(frozen=True)
 class Converter:
-    """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks."""
+    """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks.
+
+    The fields that are used in `frame` are its ports. One without all of them has an entity with a `suffix`.
+    """
 
     block: str
     frame: Frame
     id: int
+    suffix: str = ""
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,11 @@ class MessageSide:
 
     prefix: str
     frame: Frame
+
+    @property
+    def kind(self) -> tuple[MessageName, RosVersion]:
+        """What connects two sides: the message, whichever fields of it they use."""
+        return self.frame.message, self.frame.ros
 
 
 @dataclass(frozen=True)
@@ -55,11 +65,14 @@ class End:
 
 @dataclass(frozen=True)
 class Connection:
-    """A message's way from where it arises to all who take it, in the order of the specification."""
+    """A message's way from where it arises to all who take it, in the order of the specification.
 
-    frame: Frame
+    `frames` is the message for each sink: the fields that are used in it go there from here.
+    """
+
     source: End
     sinks: tuple[End, ...]
+    frames: tuple[Frame, ...]
 
 
 @dataclass(frozen=True)

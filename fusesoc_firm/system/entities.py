@@ -46,9 +46,9 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
 def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
     """The entity of each converter, its block and its frame."""
     for converter in system.subscribers:
-        yield subscriber_entity(converter.frame), converter.block, converter.frame
+        yield subscriber_entity(converter.frame, converter.suffix), converter.block, converter.frame
     for converter in system.publishers:
-        yield publisher_entity(converter.frame), converter.block, converter.frame
+        yield publisher_entity(converter.frame, converter.suffix), converter.block, converter.frame
 
 
 def _entities(accelerator: AcceleratorType) -> Iterator[str]:

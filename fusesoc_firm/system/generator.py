@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -14,7 +13,6 @@ from fusesoc_firm.converter.generator import (
     subscriber_files,
 )
 from fusesoc_firm.diagnostics import Diagnostics
-from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -23,7 +21,7 @@ from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
 from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
-from fusesoc_firm.system.derived import AcceleratorType, Converter, DerivedSystem
+from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import wrapper_file
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
 
@@ -80,20 +78,16 @@ def generate(request: Request) -> GeneratedCore:
     """The system as a core, its files in the order in which a tool reads them. Raises `InputError`."""
     loaded = load_requested(request)
     system = loaded.system
-    files = {
-        **constants_files(loaded.messages()),
-        **subscriber_files(_frames(system.subscribers), system.width),
-        **publisher_files(_frames(system.publishers), system.width),
-    }
+    files = constants_files(loaded.messages())
+    for converter in system.subscribers:
+        files |= subscriber_files([converter.frame], system.width, converter.suffix)
+    for converter in system.publishers:
+        files |= publisher_files([converter.frame], system.width, converter.suffix)
     sources: set[Path] = set()
     for accelerator in system.accelerator_types:
         files |= _accelerator_files(accelerator, loaded.folder, sources)
     files[f"{system.entity}.vhd"] = GeneratedFile(render(SYSTEM_TEMPLATE, system_configuration(system)), VHDL)
     return GeneratedCore(f"System {system.name}", files)
-
-
-def _frames(converters: Iterable[Converter]) -> list[Frame]:
-    return list(dict.fromkeys(converter.frame for converter in converters))
 
 
 def _accelerator_files(type_: AcceleratorType, folder: Path, taken: set[Path]) -> dict[str, GeneratedFile]:

@@ -22,8 +22,10 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "scheduler": system.scheduler,
         },
         "Converters": {
-            "AXIS_to_msg": [_converter(item, subscriber_entity(item.frame)) for item in system.subscribers],
-            "msg_to_AXIS": [_converter(item, publisher_entity(item.frame)) for item in system.publishers],
+            "AXIS_to_msg": [
+                _converter(item, subscriber_entity(item.frame, item.suffix)) for item in system.subscribers
+            ],
+            "msg_to_AXIS": [_converter(item, publisher_entity(item.frame, item.suffix)) for item in system.publishers],
         },
         "Accelerators": [
             {
@@ -51,9 +53,9 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
 
 def _connections(connections: Iterable[Connection]) -> Iterator[dict[str, str]]:
     for connection in connections:
-        ports = [port.name for port in field_ports(connection.frame)]
         source = connection.source
-        for sink in connection.sinks:
+        for sink, frame in zip(connection.sinks, connection.frames, strict=True):
+            ports = [port.name for port in field_ports(frame)]
             for port in [*ports, "segment_valid"]:
                 yield {"from": f"{source.block}/{source.prefix}{port}", "to": f"{sink.block}/{sink.prefix}{port}"}
             yield {

@@ -21,6 +21,8 @@ ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 MODES = ("subscriber", "publisher")
 SCHEDULERS = ("fixed_priority",)
 
+_INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
+_EXCLUDE = {"form": "texts", "meaning": "none of these fields"}
 _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
 
@@ -41,6 +43,8 @@ class InterfaceType(Section):
 
     middleware: Text = key("whose message it is", **_MIDDLEWARE)
     message: Text = key("the message's type, such as geometry_msgs/Quaternion", is_required=True)
+    include: tuple[Text, ...] = key(**_INCLUDE)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE)
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class Outgoing(Section):
     """A connection from the block it stands in."""
 
     name: Text = key("the block that the message goes to", is_required=True)
+    include: tuple[Text, ...] = key(**_INCLUDE)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE)
 
 
 @dataclass(frozen=True)
@@ -77,6 +83,8 @@ class Block(Section):
     middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES))
     mode: Text | None = key("which way a converter works", choices=MODES)
     message: Text | None = key("a converter's message")
+    include: tuple[Text, ...] = key(**_INCLUDE)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE)
     outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
 
 

@@ -74,14 +74,6 @@ architecture rtl of axis_to_awkward_msgs_gaps is
   -- The bytes of the fields; those of a new beat push the others down.
   signal store    : std_logic;
   signal fields_r : std_logic_vector(431 downto 0);
-  -- The beats behind which a field that is used begins or ends, the next of these, and whether this beat is within one.
-  type turns_0_t is array (natural range 0 to 14) of natural range 0 to 95;
-  constant TURNS_0 : turns_0_t := (
-    7, 8, 15, 25, 31, 41, 47, 56, 57, 64, 71, 80,
-    87, 95, 95
-  );
-  signal turn_0_r : unsigned(3 downto 0) := (others => '0');
-  signal used_0   : std_logic;
 
 begin
 
@@ -95,10 +87,14 @@ begin
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
 
-  used_0 <= turn_0_r(0);
-
   store <= '1' when
-      used_0 = '1' else '0';
+      position_r = 8 or
+      (position_r >= 16 and position_r <= 25) or
+      (position_r >= 32 and position_r <= 41) or
+      (position_r >= 48 and position_r <= 56) or
+      (position_r >= 58 and position_r <= 64) or
+      (position_r >= 72 and position_r <= 80) or
+      (position_r >= 88 and position_r <= 95) else '0';
 
   -- Each field as it lies among the bytes that were stored.
   elements_flag(0)               <= '0' when fields_r(7 downto 0) = x"00" else '1';
@@ -273,12 +269,6 @@ begin
       if beat = '1' then
         position_r <= next_position;
         match_r    <= match;
-        if position_r = TURNS_0(to_integer(turn_0_r)) then
-          turn_0_r <= turn_0_r + 1;
-        end if;
-        if s_axis_tlast = '1' then
-          turn_0_r <= (others => '0');
-        end if;
         if store = '1' then
           fields_r <=
               s_axis_tdata(7 downto 0) &
@@ -289,7 +279,6 @@ begin
       end if;
       if rst_n = '0' then
         position_r <= (others => '0');
-        turn_0_r <= (others => '0');
       end if;
     end if;
   end process;

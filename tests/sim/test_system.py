@@ -88,6 +88,53 @@ def test_names_that_mean_something_else(tmp_path: Path) -> None:
     assert system.work.latches(system.entity) == []
 
 
+# --- parts of messages ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module", params=["ROS1", "ROS2"])
+def parts_system(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> GeneratedSystem:
+    folder = tmp_path_factory.mktemp("parts")
+    spec = in_version(DATA / "parts.yaml", request.param, folder / "spec")
+    stimuli = write_stimuli(folder / "stimuli.yaml", list(poses(24)))
+    return build(call(spec, stimuli, DATA / "parts_model.py"), folder / "work")
+
+
+def poses(count: int) -> Iterator[tuple[str, Message]]:
+    source = random.Random(SEED)
+    for number in range(count):
+        # `second` waits for both of the others.
+        for block in ("part_sub", "other_sub", "pose_sub")[:: 1 if number % 2 else -1]:
+            yield block, {"position": numbers(source, "x", "y", "z"), "orientation": numbers(source, *"xyzw")}
+
+
+@pytest.mark.parametrize(("seed", "stall_percent"), [(1, 0), (2, 25), (3, 60), (4, 90)])
+def test_messages_of_which_blocks_use_parts(parts_system: GeneratedSystem, seed: int, stall_percent: int) -> None:
+    assert parts_system.passes(SEED=seed, STALL_PERCENT=stall_percent)
+
+
+def test_parts_cost_what_is_used(parts_system: GeneratedSystem) -> None:
+    """What nobody takes or drives has no port."""
+    converters = {path.stem: path.read_text("utf-8") for path in parts_system.files if "geometry_msgs" in path.stem}
+    ports = {
+        name: re.findall(r"^    ((?:position|orientation)_\w)", text, re.MULTILINE) for name, text in converters.items()
+    }
+    position, orientation = [f"position_{axis}" for axis in "xyz"], [f"orientation_{axis}" for axis in "xyzw"]
+    assert ports == {
+        "axis_to_geometry_msgs_pose": position + orientation,
+        "axis_to_geometry_msgs_pose_part_sub": ["position_x", *orientation],
+        "axis_to_geometry_msgs_pose_other_sub": position,
+        "geometry_msgs_pose_to_axis": position + orientation,
+        "geometry_msgs_pose_to_axis_turn_pub": orientation,
+        "geometry_msgs_pose_to_axis_w_pub": ["orientation_w"],
+        "geometry_msgs_pose_to_axis_place_pub": position,
+        "geometry_msgs_pose_to_axis_swapped_pub": ["position_x", "position_y"],
+    }
+    assert parts_system.work.latches(parts_system.entity) == []
+
+
+# --- throughput ----------------------------------------------------------------------------------------------------
+
+
 def test_full_throughput(tmp_path: Path) -> None:
     """An accelerator that keeps a message lets frames follow each other without a gap, in and out."""
     spec = simple_specification(tmp_path, "rotate")
