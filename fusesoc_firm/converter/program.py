@@ -362,15 +362,27 @@ class _Builder:
         if self.is_valued:
             segment = Segment(self.scope, self.numbers[-1])
             self.numbers[-1] += 1
-            completing = [p for p in self.open_steps if isinstance(self.steps[p], Header | Block | Open)][-1:]
+            last = max(place for place in self.open_steps if _is_valued(self.steps[place]))
             for place in self.open_steps:
                 step = self.steps[place]
-                if isinstance(step, Header | Block | Count):
+                if isinstance(step, Header | Block | Count) and place <= last:
                     self.steps[place] = step = replace(step, segment=segment)
-                if place in completing and isinstance(step, Header | Block | Open):
+                if isinstance(step, Header | Block | Open) and place == last:
                     self.steps[place] = replace(step, completes=segment)
         self.open_steps = []
         self.is_valued = False
+
+
+def _is_valued(step: Step) -> bool:
+    """Whether a segment may end with the step."""
+    match step:
+        case Header():
+            return True
+        case Block(fields=fields):
+            return bool(fields)
+        case Open(part=part):
+            return part.is_used
+    return False
 
 
 def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:

@@ -6,7 +6,6 @@ import pytest
 
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node, Pad, all_nodes
-from fusesoc_firm.frame.parts import Segment, VariablePart, parts
 from fusesoc_firm.frame.position import Position
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
@@ -112,9 +111,6 @@ def test_elements_that_padding_parts_are_numbered_through() -> None:
     made = frame(ROS2, "string s\nCell[3] cells\n", Cell="uint8 kind\nuint16[2] pair\n")
     pieces = [leaf for node in made.nodes if isinstance(node, Fixed) for leaf in node.fields if leaf.names[1] == "kind"]
     assert [(piece.first, piece.held, piece.count) for piece in pieces] == [(0, 1, 3), (1, 2, 3)]
-    segment = list(parts(made.nodes))[-1]
-    assert isinstance(segment, Segment)
-    assert [leaf.names for leaf in segment.fields] == [("cells", "kind"), ("cells", "pair")]
 
 
 def test_ros_1_is_never_padded() -> None:
@@ -137,28 +133,6 @@ def test_what_has_no_fixed_size_has_no_offsets() -> None:
     for ask in (lambda: made.payload_bytes, lambda: made.fields, lambda: made.frame_bytes):
         with pytest.raises(ValueError, match="std_msgs/String has no fixed size"):
             ask()
-
-
-def test_segments_and_variable_parts_are_numbered_in_wire_order() -> None:
-    found = list(parts(standard(ROS2, "sensor_msgs/Image").nodes))
-    segments = [(part.number, [leaf.names[-1] for leaf in part.fields]) for part in found if isinstance(part, Segment)]
-    assert segments == [(0, ["sec", "nanosec"]), (1, ["height", "width"]), (2, ["is_bigendian", "step"])]
-    variable = [(part.number, part.node.names[-1]) for part in found if isinstance(part, VariablePart)]
-    assert variable == [(0, "frame_id"), (1, "encoding"), (2, "data")]
-
-
-def test_a_segment_without_values_has_no_number() -> None:
-    prefix, _, middle, _, last = parts(frame(ROS2, "string a\nstring b\nuint8 c\n").nodes)
-    assert [prefix.number, middle.number, last.number] == [None, None, 0]  # prefix, padding in front of a count, c
-
-
-@pytest.mark.parametrize("ros", RosVersion)
-def test_the_parts_hold_every_node_once(ros: RosVersion) -> None:
-    library = MessageLibrary(ros)
-    for name in library.names():
-        nodes = frame_of(name, library.closure(name)).nodes
-        held = [node for part in parts(nodes) for node in (part.nodes if isinstance(part, Segment) else (part.node,))]
-        assert tuple(held) == nodes
 
 
 def test_position() -> None:
