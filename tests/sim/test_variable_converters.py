@@ -13,6 +13,7 @@ import pytest
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.frame.codec import CodecError, decode, encode
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.stimuli import KINDS, TYPICAL, Stimuli
@@ -110,6 +111,41 @@ def test_messages_come_through_under_stalls(
         frames.append(framed(payload))
         expected += subscriber.events(value, len(payload))
     assert subscriber.run(tmp_path, frames, SEED=SEED % 1000, STALL_PERCENT=stall) == expected
+
+
+SELECTIONS = [
+    (ROS2, "sensor_msgs/Image", ["height"], []),
+    (ROS1, "sensor_msgs/Image", [], ["data", "header"]),
+    (ROS2, "sensor_msgs/PointCloud2", ["fields.name", "is_dense"], []),
+    (ROS1, "diagnostic_msgs/DiagnosticArray", ["status.values.key"], []),
+    (ROS2, "diagnostic_msgs/DiagnosticArray", [], ["status.values", "header.stamp"]),
+    (ROS2, "awkward_msgs/Deep", [], ["middles.pairs.value", "middles.names"]),
+    (ROS2, "awkward_msgs/Halves", ["words"], []),
+    (ROS1, "awkward_msgs/Wide", ["cells.pair", "first"], []),
+    (ROS2, "awkward_msgs/Fixtures", ["names"], []),
+]
+
+
+@pytest.mark.parametrize("width", [8, 64])
+@pytest.mark.parametrize(("ros", "name", "include", "exclude"), SELECTIONS)
+def test_what_is_not_used_is_skipped(
+    tmp_path: Path, ros: RosVersion, name: str, width: int, include: list[str], exclude: list[str]
+) -> None:
+    """The used fields come as ever; broken frames are told by what is looked at, and by their length."""
+    frame = select(ORACLES[ros].frame(name), dict.fromkeys(include), dict.fromkeys(exclude))
+    subscriber = SubscriberBench(tmp_path).subscriber(frame, width)
+    source = stimuli(ros, name, SEED)
+    frames, expected = [], []
+    for number in range(8):
+        value = source.message(parse_name(name), KINDS[number % len(KINDS)])
+        payload = serialise(ros, name, value)
+        frames += [framed(payload), framed(payload)[:-1]]
+        expected += subscriber.events(value, len(payload))
+    events = subscriber.run(tmp_path, frames, SEED=SEED % 1000, STALL_PERCENT=30)
+    assert outcomes(events) == [True, False] * 8
+    messages = [line for line in expected if line.startswith("message ")]
+    assert [line for line in events if line.startswith("message ")] == messages
+    assert subscriber.run(tmp_path, frames[::2], SEED=1) == expected
 
 
 @pytest.mark.parametrize("stall", [0, 35])
