@@ -23,6 +23,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+from fusesoc_firm.frame.defaults import default_elements
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Run
 from fusesoc_firm.frame.values import dotted, units_of
 
@@ -254,17 +255,10 @@ class _Builder:
                 runs = tuple(Run(start + run.offset, run.count) for run in leaf.runs)
                 self.block = replace(self.block, fields=(*self.block.fields, replace(leaf, runs=runs)))
                 self.is_valued = True
-            elif leaf.default is not None:
-                self._put_default(leaf, start)
+            else:
+                defaults = ((start + offset, data) for offset, data in default_elements(leaf))
+                self.block = replace(self.block, constants=(*self.block.constants, *defaults))
         self.block = replace(self.block, size=start + node.size)
-
-    def _put_default(self, leaf: FrameField, start: int) -> None:
-        values = leaf.default if isinstance(leaf.default, tuple | list) else [leaf.default]
-        number = leaf.first
-        for run in leaf.runs:
-            data = struct.pack(f"<{run.count}{leaf.type.code}", *values[number : number + run.count])
-            self.block = replace(self.block, constants=(*self.block.constants, (start + run.offset, data)))
-            number += run.count
 
     def _data(self, node: Data) -> None:
         self._count(node)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fusesoc_firm.frame.decoder import decode
 from fusesoc_firm.frame.encoder import encode
 from fusesoc_firm.frame.model import Fixed, Frame, FrameField
 from fusesoc_firm.frame.values import MessageValue, leaf_of
-from fusesoc_firm.message.model import Scalar
 
 
 def default_bytes(node: Fixed) -> bytes:
@@ -20,11 +19,17 @@ def default_bytes(node: Fixed) -> bytes:
     """
     data = bytearray(node.size)
     for leaf in node.fields:
-        if leaf.default is not None:
-            given = leaf.default if isinstance(leaf.default, tuple) else (leaf.default,)
-            for number, offset in enumerate(leaf.offsets, leaf.first):
-                data[offset : offset + leaf.type.size] = _packed(leaf, given, number)
+        for offset, value in default_elements(leaf):
+            data[offset : offset + len(value)] = value
     return bytes(data)
+
+
+def default_elements(leaf: FrameField) -> Iterator[tuple[int, bytes]]:
+    """The offset and bytes of each element of a leaf that lies here, if it has a default."""
+    if leaf.default is not None:
+        given = leaf.default if isinstance(leaf.default, tuple) else (leaf.default,)
+        for number, offset in enumerate(leaf.offsets, leaf.first):
+            yield offset, struct.pack(f"<{leaf.type.code}", given[number % len(given)])
 
 
 def default_payload(frame: Frame) -> bytes:
@@ -58,7 +63,3 @@ def _filled(default: Any, value: Any) -> Any:
     if isinstance(default, list) and isinstance(value, list | tuple) and len(default) == len(value):
         return [_filled(*pair) for pair in zip(default, value, strict=True)]
     return value
-
-
-def _packed(leaf: FrameField, given: Sequence[Scalar], number: int) -> bytes:
-    return struct.pack(f"<{leaf.type.code}", given[number % len(given)])

@@ -129,7 +129,7 @@ def test_both_converters_have_the_same_segments(ros: RosVersion) -> None:
 
 def _told(program: Program) -> dict[tuple[str, ...], tuple[Scope, int]]:
     """The segment of each used field and count."""
-    found = {}
+    found: dict[tuple[str, ...], tuple[Scope, int]] = {}
     for step in program.steps:
         if isinstance(step, Block) and step.segment:
             found |= {leaf.names: (step.segment.scope, step.segment.number) for leaf in step.fields}
