@@ -62,6 +62,10 @@ begin
       read(line_text, is_last);
       read(line_text, lifetime);
       read(line_text, content);
+      if message > number then
+        print("left of message " & integer'image(number));
+        next;
+      end if;
       values <= to_stdlogicvector(content);
       last   <= to_stdulogic(is_last);
       shown  := 0;
@@ -154,6 +158,10 @@ begin
       read(line_text, is_last);
       read(line_text, keep);
       read(line_text, content);
+      if message > number then
+        print("left of message " & integer'image(number));
+        next;
+      end if;
       uniform(random_1, random_2, draw);
       while 100.0 * draw < real(STALL_PERCENT) loop
         wait until rising_edge(clk);
