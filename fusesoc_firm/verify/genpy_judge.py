@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import pickle
 import shutil
 import subprocess
@@ -61,6 +62,11 @@ class _Server:
         except EOFError:
             self._process.wait()
             raise
+        atexit.register(self._end)
+
+    def _end(self) -> None:
+        self._requests.close()
+        self._process.wait()
 
     def ask(self, request: object) -> Any:
         with self._lock:
