@@ -192,9 +192,9 @@ def test_gates_stall_and_withdraw_nothing(gates: Library, seed: int, percent: in
     assert found.exit_code == 0, found.output
     closed = [int(line.rpartition(" ")[2]) for line in found.output.splitlines() if " closed " in line]
     assert len(closed) == 3
-    # Gate 0 is never asked, so it is closed just as often as it is said.
-    assert abs(closed[0] - 100 * percent) < 300
-    assert percent == 0 or closed[1] != closed[0]
+    # Gate 0 is never asked, so it stays as it was drawn; gate 1 is drawn anew in every cycle.
+    assert closed[0] < 10 or closed[0] > 9990
+    assert abs(closed[1] - 100 * percent) < 300
 
 
 def test_a_source_that_withdraws_is_found(gates: Library) -> None:

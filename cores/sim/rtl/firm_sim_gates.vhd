@@ -9,7 +9,7 @@ entity firm_sim_gates is
   generic (
     COUNT : integer := 1;
     SEED  : integer := 1;
-    -- The chance that a gate is closed in a cycle; 0 keeps all open.
+    -- The chance that a gate is closed in a cycle in which its source has something; 0 keeps all open.
     STALL_PERCENT : integer := 0);
   port (
     clk   : in std_logic;
@@ -42,6 +42,7 @@ begin
   open_and_close : process (clk)
     variable random     : positive range 1 to MODULUS-1 := 1 + SEED mod (MODULUS-1);
     variable is_waiting : std_logic_vector(COUNT-1 downto 0) := (others => '0');
+    variable is_asked   : boolean;
   begin
     if rising_edge(clk) then
       for gate in valid'range loop
@@ -56,7 +57,9 @@ begin
             severity failure;
           is_waiting(gate) := valid(gate) and not (is_open_r(gate) and ready(gate));
         end if;
-        if STALL_PERCENT > 0 and (is_open_r(gate) = '0' or is_waiting(gate) = '0') then
+        -- A gate that nobody asks stays as it is: hundreds of them would only slow the simulation down.
+        is_asked := rst_n = '0' or valid(gate) = '1';
+        if STALL_PERCENT > 0 and is_asked and (is_open_r(gate) = '0' or is_waiting(gate) = '0') then
           random          := FACTOR * random mod MODULUS;
           is_open_r(gate) <= '1';
           if 100 * (random - 1) < STALL_PERCENT * (MODULUS - 1) then
