@@ -315,7 +315,7 @@ class _Subscriber:
         """Whether the sink of the step's stream takes a beat; what nobody reads is always taken."""
         streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, StreamStep)]
         used = [(place, part) for place, part in streams if part.is_used]
-        found = [f"{self.side.stream(part).axis('tready')} when step_r = {place} else" for place, part in used]
+        found = [f"{self.side.stream(part).axis('tready')} when step_number = {place} else" for place, part in used]
         return [*found, "'1';"]
 
     def _checks(self) -> list[Configuration]:
@@ -325,7 +325,7 @@ class _Subscriber:
             for beat in range(-(-len(value) // self.lanes)):
                 data = value[beat * self.lanes : (beat + 1) * self.lanes]
                 bits = "window_bytes" if self.lanes == 1 else f"window_bytes({8 * len(data) - 1} downto 0)"
-                condition = f'step_r = 1 and beat_r = {beat} and {bits} /= x"{data[::-1].hex()}"'
+                condition = f'step_number = 1 and beat_r = {beat} and {bits} /= x"{data[::-1].hex()}"'
                 found.append({"condition": condition, "code": "BAD_ENCODING"})
         if any(map(_closes_text, self.steps)):
             condition = "STEP_CLOSES_TEXT(step_number) = '1' and beat_r = 0 and window_bytes(7 downto 0) /= x\"00\""
@@ -338,7 +338,7 @@ class _Subscriber:
             if isinstance(step, Open) and step.part.bound is not None:
                 most = step.part.bound + _terminator(step.part)
                 if most < _LARGEST_NATURAL:
-                    found.append(f"step_r = {place} and left_r > {most}")
+                    found.append(f"step_number = {place} and left_r > {most}")
         return [{"word": "elsif" if number else "if", "condition": condition} for number, condition in enumerate(found)]
 
     def _close(self, place: int) -> Configuration:
@@ -349,7 +349,7 @@ class _Subscriber:
         return {
             "number": self._number(step.loop),
             "about": dotted(step.loop.names),
-            "condition": f"step_r = {place}" + (f" or step_r = {place - 1}" if is_joined else ""),
+            "condition": f"step_number = {place}" + (f" or step_number = {place - 1}" if is_joined else ""),
         }
 
     def _jumps(self) -> list[tuple[str, int]]:
@@ -357,15 +357,15 @@ class _Subscriber:
         for place, step in enumerate(self.steps):
             match step:
                 case Guard():
-                    jumps.append((f"step_r = {place} and left_r = 0", self.program.behind_guard(place)))
+                    jumps.append((f"step_number = {place} and left_r = 0", self.program.behind_guard(place)))
                 case Open() if _is_counted(step) and self.program.behind(place) != place + 1:
-                    jumps.append((f"step_r = {place} and count_is_zero = '1'", self.program.behind(place)))
+                    jumps.append((f"step_number = {place} and count_is_zero = '1'", self.program.behind(place)))
                 case Close(loop=loop):
                     closing = f"closing_{self._number(loop)} = '1'"
                     jumps.append((f"{closing} and {self._register('left', loop)} = 1", place + 1))
                     jumps.append((closing, self.program.body(place)))
                 case End():
-                    jumps.append((f"step_r = {place}", place))
+                    jumps.append((f"step_number = {place}", place))
         return jumps
 
     # --- registers ----------------------------------------------------------------------------------------------
