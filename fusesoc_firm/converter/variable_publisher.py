@@ -32,6 +32,7 @@ from fusesoc_firm.converter.program import (
     publisher_program,
 )
 from fusesoc_firm.converter.slices import Slice, slices_of
+from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, FrameField, Loop
 
 Configuration = dict[str, Any]
@@ -43,6 +44,9 @@ _ROW = 4
 # A literal of zeros and ones is no longer than this: GHDL's Verilog loses the low half of some that are longer.
 _LITERAL_BYTES = 4
 _COUNTER_BITS = 32
+# About so long are lines of conditions.
+_LINE = 80
+_LARGEST_NATURAL = 2**31 - 1
 
 
 def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> Configuration:
@@ -89,6 +93,7 @@ class _Publisher:
         return self.width // 8
 
     def configuration(self) -> Configuration:
+        self._check_size()
         return {
             "message": str(self.frame.message),
             "ros": int(self.frame.ros),
@@ -120,6 +125,13 @@ class _Publisher:
             **self._opens(),
             **self._paddings(),
         }
+
+    def _check_size(self) -> None:
+        if (self.end + 1) * self.width > _LARGEST_NATURAL:
+            fail(
+                f"the fields of {self.frame.message} take {(self.end + 1) * self.lanes} bytes, too many for a converter",
+                hint=f"at most {_LARGEST_NATURAL // 8}: VHDL counts the bits of the fields up to 2**31-1",
+            )
 
     # --- places -------------------------------------------------------------------------------------------------
 
@@ -368,7 +380,10 @@ class _Publisher:
         shifts = [(area.first, self._part(area).element.size.bit_length() - 1) for area in data]  # type: ignore[union-attr]
         return {
             "has_jumps": bool(jumps),
-            "jumps": [*map(self._opening_jump, opens), *map(self._closing_jump, self._closings)],
+            "jumps": sorted(
+                [*map(self._opening_jump, opens), *map(self._closing_jump, self._closings)],
+                key=lambda jump: jump["place"],
+            ),
             "opens_data": _any_place(area.first for area in data),
             "opens_text": _any_place(area.first for area in texts),
             "has_texts": bool(texts),
@@ -535,7 +550,7 @@ def _count(part: Data | Loop) -> int | None:
 def _about(area: _Area) -> str:
     kind = {
         Header: "id and",
-        Block: f"{_size(area.step)} bytes:",
+        Block: "1 byte:" if _size(area.step) == 1 else f"{_size(area.step)} bytes:",
         Count: "count of",
         Guard: "opens",
         Open: "opens",
@@ -600,14 +615,22 @@ def _ladder(choices: Iterable[tuple[int, str]], otherwise: str) -> list[Configur
 
 def _any_place(places: Iterable[int]) -> str:
     """A condition that holds at these places only."""
-    return " or ".join(f"place_r = {place}" for place in places) or "false"
+    return _any(f"place_r = {place}" for place in places)
 
 
 def _any_range(ranges: Iterable[tuple[int, int]]) -> str:
-    return (
-        " or ".join(
-            f"place_r = {first}" if first == last else f"(place_r >= {first} and place_r <= {last})"
-            for first, last in ranges
-        )
-        or "false"
+    """A condition that holds at the places from each `first` to its `last` only."""
+    return _any(
+        f"place_r = {first}" if first == last else f"(place_r >= {first} and place_r <= {last})"
+        for first, last in ranges
     )
+
+
+def _any(conditions: Iterable[str]) -> str:
+    lines: list[str] = []
+    for condition in conditions:
+        if lines and len(lines[-1]) + len(condition) < _LINE:
+            lines[-1] += f" or {condition}"
+        else:
+            lines.append(condition)
+    return " or\n        ".join(lines) or "false"

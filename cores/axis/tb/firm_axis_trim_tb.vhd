@@ -1,0 +1,224 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Frames from a file, cut into random pieces behind their header, through the trimmer to a taker that stalls. The four
+-- bytes behind a frame's first one are the length that it announces, whatever it has. What comes out goes into a file,
+-- a line a frame: the bytes in hex, then `cut` or `filled` where the trimmer said so.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+use ieee.math_real.all;
+use std.textio.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sim_pkg.all;
+
+entity firm_axis_trim_tb is
+  generic (
+    WIDTH         : integer := 8;
+    SLACK         : natural := 0;
+    STIMULUS_FILE : string  := "stimulus.txt";
+    TRIMMED_FILE  : string  := "trimmed.txt";
+    SEED          : integer := 1;
+    -- The chances, each cycle, that nothing is offered, and that nothing is taken.
+    SOURCE_STALL_PERCENT : integer := 0;
+    SINK_STALL_PERCENT   : integer := 0;
+    -- Pieces of all lanes up to a frame's last one; otherwise of 0 and more.
+    FULL_PIECES : boolean := false;
+    WATCHDOG    : integer := 1000);
+end entity firm_axis_trim_tb;
+
+architecture simulation of firm_axis_trim_tb is
+
+  constant LANES        : positive := WIDTH/8;
+  constant COUNT_BITS   : positive := clog2(LANES+1);
+  constant HEADER_BYTES : positive := 5;
+
+  signal clk   : std_logic := '0';
+  signal rst_n : std_logic := '0';
+
+  signal length    : std_logic_vector(31 downto 0)           := (others => '0');
+  signal start     : std_logic                               := '0';
+  signal header    : std_logic                               := '0';
+  signal announced : std_logic_vector(31 downto 0);
+  signal data      : std_logic_vector(WIDTH-1 downto 0)      := (others => '0');
+  signal count     : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
+  signal last      : std_logic                               := '0';
+  signal valid     : std_logic                               := '0';
+  signal ready     : std_logic;
+  signal is_cut    : std_logic;
+  signal is_filled : std_logic;
+
+  signal m_data  : std_logic_vector(WIDTH-1 downto 0);
+  signal m_count : std_logic_vector(COUNT_BITS-1 downto 0);
+  signal m_last  : std_logic;
+  signal m_valid : std_logic;
+  signal m_ready : std_logic := '0';
+
+  signal is_done : boolean := false;
+
+begin
+
+  clk <= not clk after 5 ns when not is_done else '0';
+
+  u_trim : entity firm.firm_axis_trim
+    generic map (
+      WIDTH => WIDTH,
+      SLACK => SLACK)
+    port map (
+      clk       => clk,
+      rst_n     => rst_n,
+      length    => length,
+      start     => start,
+      header    => header,
+      announced => announced,
+      data      => data,
+      count     => count,
+      last      => last,
+      valid     => valid,
+      ready     => ready,
+      is_cut    => is_cut,
+      is_filled => is_filled,
+      m_data    => m_data,
+      m_count   => m_count,
+      m_last    => m_last,
+      m_valid   => m_valid,
+      m_ready   => m_ready);
+
+  send : process
+    variable content  : frame_file_t;
+    variable frame    : frame_ptr_t;
+    variable place    : natural;
+    variable size     : natural;
+    variable said     : std_logic_vector(31 downto 0);
+    variable waits    : natural  := 0;
+    variable random_1 : positive := SEED;
+    variable random_2 : positive := 3;
+    variable draw     : real;
+
+    impure function draw_to(highest : natural) return natural is
+    begin
+      uniform(random_1, random_2, draw);
+      return integer(floor(draw * real(highest + 1)));
+    end function draw_to;
+
+    procedure offer is
+    begin
+      loop
+        uniform(random_1, random_2, draw);
+        exit when 100.0 * draw >= real(SOURCE_STALL_PERCENT);
+        wait until falling_edge(clk);
+      end loop;
+      valid <= '1';
+      loop
+        wait until rising_edge(clk);
+        exit when ready = '1';
+        waits := waits + 1;
+      end loop;
+      wait until falling_edge(clk);
+      valid <= '0';
+      data  <= (others => 'X');
+    end procedure offer;
+
+  begin
+    read_stimulus_file(STIMULUS_FILE, content);
+    for cycle in 1 to 4 loop
+      wait until falling_edge(clk);
+    end loop;
+    rst_n <= '1';
+    frame := content.first;
+    while frame /= null loop
+      for part in 0 to 3 loop
+        said(8*part+7 downto 8*part) := to_byte(frame.bytes(part+2));
+      end loop;
+      place := 0;
+      while place < frame.size loop
+        header <= '0';
+        start  <= '0';
+        length <= not said;
+        size   := LANES;
+        if place < HEADER_BYTES then
+          header <= '1';
+          -- Of a narrow stream, the port is only right with the first bytes.
+          if place = 0 then
+            start  <= '1';
+            length <= said;
+          else
+            assert announced = said report "announced is another length" severity failure;
+          end if;
+          size := HEADER_BYTES - place;
+          if size > LANES then
+            size := LANES;
+          end if;
+        elsif not FULL_PIECES then
+          size := draw_to(LANES);
+        end if;
+        if size > frame.size - place then
+          size := frame.size - place;
+        end if;
+        data <= (others => 'X');
+        for lane in 0 to size-1 loop
+          data(8*lane+7 downto 8*lane) <= to_byte(frame.bytes(place+lane+1));
+        end loop;
+        count <= std_logic_vector(to_unsigned(size, COUNT_BITS));
+        place := place + size;
+        offer;
+      end loop;
+      header <= '0';
+      start  <= '0';
+      last   <= '1';
+      data   <= (others => '0');
+      count  <= (others => '0');
+      offer;
+      last  <= '0';
+      frame := frame.next_frame;
+    end loop;
+    print(integer'image(waits) & " waits");
+    print("PASS");
+    is_done <= true;
+    wait;
+  end process send;
+
+  take : process
+    file lines            : text open write_mode is TRIMMED_FILE;
+    variable bytes        : line;
+    variable watch        : natural := 0;
+    variable was_cut      : boolean := false;
+    variable was_filled   : boolean := false;
+    variable random_1     : positive := SEED;
+    variable random_2     : positive := 5;
+    variable draw         : real;
+  begin
+    wait until rst_n = '1';
+    loop
+      uniform(random_1, random_2, draw);
+      m_ready <= '1';
+      if 100.0 * draw < real(SINK_STALL_PERCENT) then
+        m_ready <= '0';
+      end if;
+      wait until rising_edge(clk);
+      watch := watch + 1;
+      assert watch < WATCHDOG report "nothing comes" severity failure;
+      was_cut    := was_cut or is_cut = '1';
+      was_filled := was_filled or is_filled = '1';
+      if m_valid = '1' and m_ready = '1' then
+        watch := 0;
+        for lane in 0 to to_integer(unsigned(m_count))-1 loop
+          assert is_defined(m_data(8*lane+7 downto 8*lane)) report "a byte is undefined" severity failure;
+          write(bytes, to_hex(m_data(8*lane+7 downto 8*lane)));
+        end loop;
+        if m_last = '1' then
+          if was_cut then
+            write(bytes, string'(" cut"));
+          end if;
+          if was_filled then
+            write(bytes, string'(" filled"));
+          end if;
+          writeline(lines, bytes);
+          was_cut    := false;
+          was_filled := false;
+        end if;
+      end if;
+      wait until falling_edge(clk);
+    end loop;
+  end process take;
+
+end architecture simulation;
