@@ -13,7 +13,7 @@ from typing import Any
 
 from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports
-from fusesoc_firm.converter.slices import Slice, slices_of, windows_of
+from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.storing import Counter, joints, store_configuration, store_names
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, stores_of
 from fusesoc_firm.diagnostics import fail
@@ -51,7 +51,7 @@ def subscriber_configuration(frame: Frame, width: int, suffix: str = "") -> Conf
     check_width(width)
     _check_size(frame)
     stream = Stream(width)
-    windows = windows_of(frame)
+    windows = windows_of(frame.fields)
     stores = stores_of(stream, windows)
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
     inputs = ["s_axis_tdata"] + ([] if stream.lanes == 1 else ["s_axis_tkeep"])
@@ -240,27 +240,15 @@ def _subscriber_assignments(frame: Frame, stream: Stream, stores: Sequence[Store
             low = piece.low
             for stored in places.pieces(piece.offset, piece.bytes):
                 bits = f"fields{names[stored.store]}_r({stored.high} downto {stored.low})"
-                if _is_bit(piece):
+                if piece.is_bit:
                     # As roscpp and rospy read a bool: whatever is not zero is true.
-                    pairs.append((_target(piece), f"'0' when {bits} = x\"00\" else '1'"))
+                    pairs.append((piece.target, f"'0' when {bits} = x\"00\" else '1'"))
                 else:
                     part = replace(piece, low=low, width=8 * stored.count)
-                    pairs.append((_target(part), bits))
+                    pairs.append((part.target, bits))
                 low += 8 * stored.count
     column = max([0, *(len(target) for target, _ in pairs)])
     return [{"target": target.ljust(column), "value": value} for target, value in pairs]
-
-
-def _target(piece: Slice) -> str:
-    """The port, or the part of it that the piece is."""
-    port = piece.port
-    if port.width is None or (piece.width == port.width and not _is_bit(piece)):
-        return port.name
-    return f"{port.name}({piece.low})" if _is_bit(piece) else f"{port.name}({piece.high} downto {piece.low})"
-
-
-def _is_bit(piece: Slice) -> bool:
-    return piece.port.field.type.bits == 1
 
 
 def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Configuration]:
@@ -274,7 +262,7 @@ def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Configuration
         (ID_BYTES, LENGTH_BYTES, _literal(frame.payload_bytes.to_bytes(LENGTH_BYTES, "little"))),
         *((header + offset, len(data), _literal(data)) for offset, data in _constant_bytes(frame)),
         *(
-            (header + piece.offset, piece.bytes, f'"0000000" & {_target(piece)}' if _is_bit(piece) else _target(piece))
+            (header + piece.offset, piece.bytes, f'"0000000" & {piece.target}' if piece.is_bit else piece.target)
             for port in field_ports(frame)
             for piece in slices_of(port)
         ),
@@ -302,7 +290,7 @@ def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:
     """
     payload = default_payload(frame)
     cursor = 0
-    for first, end in [*windows_of(frame), (frame.payload_bytes, frame.payload_bytes)]:
+    for first, end in [*windows_of(frame.fields), (frame.payload_bytes, frame.payload_bytes)]:
         for part in _ROWS.finditer(payload, cursor, first):
             yield part.start(), part[0]
         cursor = end

@@ -419,7 +419,7 @@ def comment(step: Step) -> str:
         case Header():
             return "the payload's length"
         case Block(fields=fields):
-            return ", ".join(dict.fromkeys(dotted(leaf.names) for leaf in fields)) or "no value"
+            return ", ".join(dict.fromkeys(dotted(leaf.names) for leaf in fields))
         case Padding(alignment=alignment):
             return f"padding to a multiple of {alignment}"
         case Count(part=part) | Guard(part=part) | Open(part=part) | Stream(part=part):

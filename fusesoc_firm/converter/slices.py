@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from fusesoc_firm.converter.ports import FieldPort
-from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.model import FrameField
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,18 @@ class Slice:
         """The highest of the port's bits."""
         return self.low + self.width - 1
 
+    @property
+    def is_bit(self) -> bool:
+        """Whether it is of a bool."""
+        return self.port.field.type.bits == 1
+
+    @property
+    def target(self) -> str:
+        """The port in VHDL, or the part of it that the slice is."""
+        if self.port.width is None or (self.width == self.port.width and not self.is_bit):
+            return self.port.name
+        return f"{self.port.name}({self.low})" if self.is_bit else f"{self.port.name}({self.high} downto {self.low})"
+
 
 def slices_of(port: FieldPort) -> Iterator[Slice]:
     """The pieces of a port that lie in one piece in the payload, lowest bits first."""
@@ -40,12 +52,12 @@ def slices_of(port: FieldPort) -> Iterator[Slice]:
             low += elements * type_.bits
 
 
-def windows_of(frame: Frame) -> list[tuple[int, int]]:
-    """The parts of the payload that hold fields in use, as (first, end) offsets in order, touching parts joined."""
+def windows_of(fields: Iterable[FrameField]) -> list[tuple[int, int]]:
+    """Where fields in use lie, as (first, end) offsets in order, touching parts joined."""
     windows: list[tuple[int, int]] = []
     for first, end in sorted(
         (run.offset, run.offset + run.count * field.type.size)
-        for field in frame.fields
+        for field in fields
         if field.is_used
         for run in field.runs
     ):

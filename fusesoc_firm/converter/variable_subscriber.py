@@ -19,7 +19,6 @@ from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.converter.program import (
     Block,
     Close,
-    Count,
     End,
     Guard,
     Header,
@@ -28,25 +27,34 @@ from fusesoc_firm.converter.program import (
     Program,
     Segment,
     Step,
-    Tail,
-    comment,
-    has_bytes,
     subscriber_program,
 )
 from fusesoc_firm.converter.program import (
     Stream as StreamStep,
 )
-from fusesoc_firm.converter.slices import Slice, slices_of
+from fusesoc_firm.converter.slices import slices_of, windows_of
+from fusesoc_firm.converter.steps import (
+    alignment_of,
+    closes_text,
+    element_size,
+    fixed_size,
+    is_counted,
+    is_hollow,
+    is_text,
+    number_rows,
+    step_list,
+    step_sets,
+    terminator_of,
+)
+from fusesoc_firm.converter.storing import joints
 from fusesoc_firm.converter.stream import Store, StoreMap, Stream, ranges, stores_of
-from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, Loop
+from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop
 from fusesoc_firm.frame.values import dotted
 
 Configuration = dict[str, Any]
 
 VARIABLE_SUBSCRIBER_TEMPLATE = "vhdl/variable_subscriber.vhd"
 
-_DIGITS = 64
-_NUMBERS = 16
 _LARGEST_NATURAL = 2**31 - 1
 
 
@@ -103,14 +111,14 @@ class _Subscriber:
             "end_step": end,
             "trailing_bytes": self.frame.trailing_bytes,
             "has_encoding": self.frame.checked_prefix > 0,
-            "has_bad_count": bool(self._count_checks()) or any(map(_closes_text, self.steps)),
+            "has_bad_count": bool(self._count_checks()) or any(map(closes_text, self.steps)),
             "has_padding": self._has(Padding),
             "has_streams": any(step.part.is_used for step in self.steps if isinstance(step, StreamStep)),
             "has_data": self._has(StreamStep),
-            "has_opens": any(map(_is_counted, self.steps)),
-            "has_text": any(map(_is_text, self.steps)),
-            "has_hollow": any(map(_is_hollow, self.steps)),
-            "step_sets": self._step_sets(),
+            "has_opens": any(map(is_counted, self.steps)),
+            "has_text": any(map(is_text, self.steps)),
+            "has_hollow": any(map(is_hollow, self.steps)),
+            "step_sets": step_sets(self.steps),
             **self._tables(),
             **self._lengths(),
             **self._fields(),
@@ -126,44 +134,8 @@ class _Subscriber:
 
     # --- tables -------------------------------------------------------------------------------------------------
 
-    def _step_sets(self) -> list[Configuration]:
-        sizes = {size: self._places(lambda step, size=size: _size(step) == size) for size in (2, 4, 8)}  # type: ignore[misc]
-        aligned = {to: self._places(lambda step, to=to: _alignment(step) == to) for to in (2, 4)}  # type: ignore[misc]
-        wanted = [
-            ("STEP_IS_FIXED", "Takes a known number of bytes.", self._places(_is_fixed)),
-            (
-                "STEP_IS_REST",
-                "Takes what is left of the payload.",
-                self._places(lambda step: isinstance(step, Tail | End)),
-            ),
-        ]
-        optional = [
-            ("STEP_IS_STREAM", "Hands bytes on.", self._places(lambda step: isinstance(step, StreamStep))),
-            (
-                "STEP_IS_COUNT",
-                "Takes a count, or the length.",
-                self._places(lambda step: isinstance(step, Header | Count)),
-            ),
-            ("STEP_IS_PADDING", "Takes padding.", self._places(lambda step: isinstance(step, Padding))),
-            ("STEP_ALIGNS_TO_2", "Padding up to a multiple of 2.", aligned[2]),
-            ("STEP_ALIGNS_TO_4", "Padding up to a multiple of 4.", aligned[4]),
-            ("STEP_IS_OPEN", "Knows a count.", self._places(_is_counted)),
-            ("STEP_IS_TEXT", "Its count includes a closing zero.", self._places(_is_text)),
-            ("STEP_CLOSES_TEXT", "Begins with that zero.", self._places(_closes_text)),
-            ("STEP_IS_HOLLOW", "Its elements take no bytes.", self._places(_is_hollow)),
-            ("STEP_OPENS_DATA", "A stream follows.", self._places(_opens_data)),
-            *((f"STEP_HAS_{size}", f"Its elements have {size} bytes.", places) for size, places in sizes.items()),
-        ]
-        sets = [*wanted, *(found for found in optional if found[2])]
-        return [{"name": name, "about": about, "rows": self._rows(places)} for name, about, places in sets]
-
-    def _rows(self, places: Sequence[int]) -> list[Configuration]:
-        digits = "".join("1" if place in set(places) else "0" for place in range(len(self.steps)))
-        rows = [digits[start : start + _DIGITS] for start in range(0, len(digits), _DIGITS)]
-        return [{"digits": row, "joint": joint} for row, joint in zip(rows, joints(len(rows), " &", ";"), strict=True)]
-
     def _tables(self) -> Configuration:
-        sizes = [_fixed_size(step) for step in self.steps]
+        sizes = [fixed_size(step) for step in self.steps]
         last_beats = [max(0, -(-size // self.lanes) - 1) for size in sizes]
         last_bytes = [size - self.lanes * beat for size, beat in zip(sizes, last_beats, strict=True)]
         return {
@@ -175,7 +147,7 @@ class _Subscriber:
 
     def _lengths(self) -> Configuration:
         """What a count means: bytes of a stream, and how many elements there is room for."""
-        sizes = [size for size in (2, 4, 8) if any(_size(step) == size for step in self.steps)]
+        sizes = [size for size in (2, 4, 8) if any(element_size(step) == size for step in self.steps)]
         shifts = {2: 1, 4: 2, 8: 3}
         bytes_ = [
             f"shift_left(count_value, {shifts[size]}) when STEP_HAS_{size}(step_number) = '1' else" for size in sizes
@@ -200,7 +172,7 @@ class _Subscriber:
         }
 
     def _aligned(self, alignment: int) -> bool:
-        return any(_alignment(step) == alignment for step in self.steps)
+        return any(alignment_of(step) == alignment for step in self.steps)
 
     # --- fields -------------------------------------------------------------------------------------------------
 
@@ -212,7 +184,7 @@ class _Subscriber:
         for place, step in enumerate(self.steps):
             if isinstance(step, Block) and step.fields:
                 named = []
-                for store in stores_of(self.window, _windows(step)):
+                for store in stores_of(self.window, windows_of(step.fields)):
                     named.append((f"store_{number}_r", store))
                     number += 1
                 found.append((place, step, named))
@@ -265,9 +237,9 @@ class _Subscriber:
                     bits = f"{named[stored.store][0]}({stored.high} downto {stored.low})"
                     if leaf.type.bits == 1:
                         # As roscpp and rospy read a bool: whatever is not zero is true.
-                        pairs.append((_target(replace(piece, low=low)), f"'0' when {bits} = x\"00\" else '1'"))
+                        pairs.append((replace(piece, low=low).target, f"'0' when {bits} = x\"00\" else '1'"))
                     else:
-                        pairs.append((_target(replace(piece, low=low, width=8 * stored.count)), bits))
+                        pairs.append((replace(piece, low=low, width=8 * stored.count).target, bits))
                     low += 8 * stored.count
         return pairs
 
@@ -327,16 +299,16 @@ class _Subscriber:
                 bits = "window_bytes" if self.lanes == 1 else f"window_bytes({8 * len(data) - 1} downto 0)"
                 condition = f'step_number = 1 and beat_r = {beat} and {bits} /= x"{data[::-1].hex()}"'
                 found.append({"condition": condition, "code": "BAD_ENCODING"})
-        if any(map(_closes_text, self.steps)):
+        if any(map(closes_text, self.steps)):
             condition = "STEP_CLOSES_TEXT(step_number) = '1' and beat_r = 0 and window_bytes(7 downto 0) /= x\"00\""
             found.append({"condition": condition, "code": "BAD_COUNT"})
         return found
 
     def _count_checks(self) -> list[Configuration]:
-        found = ["STEP_IS_TEXT(step_number) = '1' and left_r = 0"] if any(map(_is_text, self.steps)) else []
+        found = ["STEP_IS_TEXT(step_number) = '1' and left_r = 0"] if any(map(is_text, self.steps)) else []
         for place, step in enumerate(self.steps):
             if isinstance(step, Open) and step.part.bound is not None:
-                most = step.part.bound + _terminator(step.part)
+                most = step.part.bound + terminator_of(step.part)
                 if most < _LARGEST_NATURAL:
                     found.append(f"step_number = {place} and left_r > {most}")
         return [{"word": "elsif" if number else "if", "condition": condition} for number, condition in enumerate(found)]
@@ -358,7 +330,7 @@ class _Subscriber:
             match step:
                 case Guard():
                     jumps.append((f"step_number = {place} and left_r = 0", self.program.behind_guard(place)))
-                case Open() if _is_counted(step) and self.program.behind(place) != place + 1:
+                case Open() if is_counted(step) and self.program.behind(place) != place + 1:
                     jumps.append((f"step_number = {place} and count_is_zero = '1'", self.program.behind(place)))
                 case Close(loop=loop):
                     closing = f"closing_{self._number(loop)} = '1'"
@@ -407,7 +379,7 @@ class _Subscriber:
         ]
         resets = [("segment_valid_r", zeros)]
         for step in self.steps:
-            if isinstance(step, Open) and step.part.is_used and _is_counted(step):
+            if isinstance(step, Open) and step.part.is_used and is_counted(step):
                 registers.append((self._length_register(step.part), "unsigned(31 downto 0)"))
             if isinstance(step, Open) and isinstance(step.part, Loop) and step.part in self._closed_loops:
                 registers.append((self._register("left", step.part), f"unsigned(31 downto 0) := {zeros}"))
@@ -454,7 +426,7 @@ class _Subscriber:
     def _opening(self, step: Open) -> list[str]:
         part = step.part
         statements = []
-        if part.is_used and _is_counted(step):
+        if part.is_used and is_counted(step):
             statements.append(f"{self._length_register(part)} <= count_value;")
         if isinstance(part, Loop) and part in self._closed_loops:
             value = "left_r" if part.count is None else f"to_unsigned({part.count}, 32)"
@@ -482,76 +454,6 @@ class _Subscriber:
         return statements
 
 
-# --- what a step is --------------------------------------------------------------------------------------------------
-
-
-def _is_fixed(step: Step) -> bool:
-    return isinstance(step, Header | Block | Count)
-
-
-def _fixed_size(step: Step) -> int:
-    match step:
-        case Header():
-            return LENGTH_BYTES
-        case Count():
-            return COUNT_BYTES
-        case Block(size=size):
-            return size
-    return 0
-
-
-def _is_counted(step: Step) -> bool:
-    return isinstance(step, Open) and (isinstance(step.part, Data) or step.part.count is None)
-
-
-def _opens_data(step: Step) -> bool:
-    return isinstance(step, Open) and isinstance(step.part, Data)
-
-
-def _is_hollow(step: Step) -> bool:
-    return isinstance(step, Open) and isinstance(step.part, Loop) and not has_bytes(step.part)
-
-
-def _terminator(part: Data | Loop) -> int:
-    return part.terminator if isinstance(part, Data) else 0
-
-
-def _is_text(step: Step) -> bool:
-    return isinstance(step, Open) and _terminator(step.part) > 0
-
-
-def _closes_text(step: Step) -> bool:
-    return isinstance(step, Block) and step.checks == ((0, b"\x00"),)
-
-
-def _size(step: Step) -> int:
-    return step.part.element.size if isinstance(step, Open) and isinstance(step.part, Data) else 0
-
-
-def _alignment(step: Step) -> int:
-    return step.alignment if isinstance(step, Padding) else 0
-
-
-# --- text ------------------------------------------------------------------------------------------------------------
-
-
-def step_list(steps: Sequence[Step]) -> list[Configuration]:
-    """The steps for the list in the head of an architecture."""
-    column = len(str(len(steps) - 1))
-    return [
-        {
-            "number": f"{number:>{column}}",
-            "kind": type(step).__name__.lower().ljust(7),
-            "about": f"{size} bytes: {comment(step)}" if (size := _block_size(step)) else comment(step),
-        }
-        for number, step in enumerate(steps)
-    ]
-
-
-def _block_size(step: Step) -> int:
-    return step.size if isinstance(step, Block) else 0
-
-
 def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[Configuration]:
     """The message side as port declarations in columns, most of them in `direction`."""
     opposite = {"in": "out", "out": "in"}[direction]
@@ -569,34 +471,8 @@ def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[Conf
     ]
 
 
-def number_rows(numbers: Sequence[int]) -> list[Configuration]:
-    """The rows of a table of numbers by step."""
-    rows = [numbers[start : start + _NUMBERS] for start in range(0, len(numbers), _NUMBERS)]
-    texts = [", ".join(map(str, row)) for row in rows]
-    return [{"numbers": text, "joint": joint} for text, joint in zip(texts, joints(len(texts), ",", ""), strict=True)]
-
-
-def joints(count: int, between: str, behind: str) -> list[str]:
-    """What stands behind each of `count` items of a list."""
-    return [between] * (count - 1) + [behind] if count else []
-
-
 def _values(texts: Iterable[str]) -> list[Configuration]:
     return [{"value": text, "joint": ""} for text in texts]
-
-
-def _windows(block: Block) -> list[tuple[int, int]]:
-    """The parts of a block that hold used fields, as (first, end) offsets in order, touching parts joined."""
-    windows: list[tuple[int, int]] = []
-    runs = (
-        (run.offset, run.offset + run.count * leaf.type.size) for leaf in block.fields for run in leaf.runs if run.count
-    )
-    for first, end in sorted(runs):
-        if windows and windows[-1][1] == first:
-            windows[-1] = (windows[-1][0], end)
-        else:
-            windows.append((first, end))
-    return windows
 
 
 def _window_condition(store: Store, beats: int) -> str:
@@ -615,12 +491,3 @@ def _store_data(register: str, store: Store) -> list[Configuration]:
     if len(store.beats) > 1:
         data.append(f"{register}({store.bits - 1} downto {store.beat_bits})")
     return [{"piece": piece, "joint": joint} for piece, joint in zip(data, joints(len(data), " &", ";"), strict=True)]
-
-
-def _target(piece: Slice) -> str:
-    """The port, or the part of it that the piece is."""
-    port = piece.port
-    is_bit = port.field.type.bits == 1
-    if port.width is None or (piece.width == port.width and not is_bit):
-        return port.name
-    return f"{port.name}({piece.low})" if is_bit else f"{port.name}({piece.high} downto {piece.low})"

@@ -103,7 +103,7 @@ def test_entities() -> None:
 
 def test_windows_leave_the_gaps_out() -> None:
     frame = layout(ROS2, "uint8 a\nuint32[2] b\nuint8 c\nfloat64 d\n")
-    windows = windows_of(frame)
+    windows = windows_of(frame.fields)
     assert windows == [(4, 5), (8, 17), (20, 28)]
     (store,) = stores_of(Stream(8), windows)
     assert store.bits == 8 * (1 + 9 + 8)
@@ -154,7 +154,7 @@ def test_lanes_that_are_used_in_the_same_beats_share_a_store() -> None:
 def test_every_bit_of_a_field_comes_from_a_bit_of_its_own(ros: RosVersion, width: int) -> None:
     frame = layout(ros, "int8 a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
     configuration = subscriber_configuration(frame, width)
-    kept = sum(store.bits for store in stores_of(Stream(width), windows_of(frame)))
+    kept = sum(store.bits for store in stores_of(Stream(width), windows_of(frame.fields)))
     assert kept == sum(port.width or 1 for port in field_ports(frame))
     read = [assignment["value"] for assignment in configuration["assignments"]]
     assert len(set(read)) == len(read)

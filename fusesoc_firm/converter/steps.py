@@ -1,0 +1,149 @@
+"""What the steps of a program are, as tables by their numbers, for the subscriber's template."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fusesoc_firm.converter.program import (
+    Block,
+    Count,
+    End,
+    Header,
+    Open,
+    Padding,
+    Step,
+    Stream,
+    Tail,
+    comment,
+    has_bytes,
+)
+from fusesoc_firm.converter.storing import joints
+from fusesoc_firm.frame.model import COUNT_BYTES, LENGTH_BYTES, Data, Loop
+
+Configuration = dict[str, Any]
+
+_DIGITS_IN_A_ROW = 64
+_NUMBERS_IN_A_ROW = 16
+
+
+def is_fixed(step: Step) -> bool:
+    """Whether a step takes a known number of bytes."""
+    return isinstance(step, Header | Block | Count)
+
+
+def fixed_size(step: Step) -> int:
+    """How many; 0 of any other step."""
+    match step:
+        case Header():
+            return LENGTH_BYTES
+        case Count():
+            return COUNT_BYTES
+        case Block(size=size):
+            return size
+    return 0
+
+
+def is_counted(step: Step) -> bool:
+    """Whether a part is opened of which the wire has the number of elements."""
+    return isinstance(step, Open) and (isinstance(step.part, Data) or step.part.count is None)
+
+
+def opens_data(step: Step) -> bool:
+    """Whether a stream follows."""
+    return isinstance(step, Open) and isinstance(step.part, Data)
+
+
+def is_hollow(step: Step) -> bool:
+    """Whether an array is opened whose elements take no bytes."""
+    return isinstance(step, Open) and isinstance(step.part, Loop) and not has_bytes(step.part)
+
+
+def terminator_of(part: Data | Loop) -> int:
+    """The zeros that a part's count includes."""
+    return part.terminator if isinstance(part, Data) else 0
+
+
+def is_text(step: Step) -> bool:
+    """Whether a text with a closing zero is opened."""
+    return isinstance(step, Open) and terminator_of(step.part) > 0
+
+
+def closes_text(step: Step) -> bool:
+    """Whether the first byte is a text's closing zero."""
+    return isinstance(step, Block) and step.checks == ((0, b"\x00"),)
+
+
+def element_size(step: Step) -> int:
+    """Bytes of an element of the stream that is opened; 0 of any other step."""
+    return step.part.element.size if isinstance(step, Open) and isinstance(step.part, Data) else 0
+
+
+def alignment_of(step: Step) -> int:
+    """What padding leads to a multiple of; 0 of any other step."""
+    return step.alignment if isinstance(step, Padding) else 0
+
+
+def _size_is(size: int) -> Callable[[Step], bool]:
+    return lambda step: element_size(step) == size
+
+
+def _alignment_is(alignment: int) -> Callable[[Step], bool]:
+    return lambda step: alignment_of(step) == alignment
+
+
+# The sets of steps that a template asks for; those behind the first two are left out where they are empty.
+_SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
+    ("IS_FIXED", "Takes a known number of bytes.", is_fixed),
+    ("IS_REST", "Takes what is left of the payload.", lambda step: isinstance(step, Tail | End)),
+    ("IS_STREAM", "Hands bytes on.", lambda step: isinstance(step, Stream)),
+    ("IS_COUNT", "Takes a count, or the length.", lambda step: isinstance(step, Header | Count)),
+    ("IS_PADDING", "Takes padding.", lambda step: isinstance(step, Padding)),
+    ("ALIGNS_TO_2", "Padding up to a multiple of 2.", _alignment_is(2)),
+    ("ALIGNS_TO_4", "Padding up to a multiple of 4.", _alignment_is(4)),
+    ("IS_OPEN", "Knows a count.", is_counted),
+    ("IS_TEXT", "Its count includes a closing zero.", is_text),
+    ("CLOSES_TEXT", "Begins with that zero.", closes_text),
+    ("IS_HOLLOW", "Its elements take no bytes.", is_hollow),
+    ("OPENS_DATA", "A stream follows.", opens_data),
+    ("HAS_2", "Its elements have 2 bytes.", _size_is(2)),
+    ("HAS_4", "Its elements have 4 bytes.", _size_is(4)),
+    ("HAS_8", "Its elements have 8 bytes.", _size_is(8)),
+)
+_ALWAYS_THERE = 2
+
+
+def step_sets(steps: Sequence[Step]) -> list[Configuration]:
+    """The sets as rows of digits, a digit a step."""
+    found = []
+    for number, (name, about, is_in) in enumerate(_SETS):
+        digits = "".join(str(int(is_in(step))) for step in steps)
+        if "1" in digits or number < _ALWAYS_THERE:
+            found.append({"name": f"STEP_{name}", "about": about, "rows": _digit_rows(digits)})
+    return found
+
+
+def _digit_rows(digits: str) -> list[Configuration]:
+    rows = [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
+    return [{"digits": row, "joint": joint} for row, joint in zip(rows, joints(len(rows), " &", ";"), strict=True)]
+
+
+def number_rows(numbers: Sequence[int]) -> list[Configuration]:
+    """The rows of a table of numbers by step."""
+    rows = [numbers[start : start + _NUMBERS_IN_A_ROW] for start in range(0, len(numbers), _NUMBERS_IN_A_ROW)]
+    texts = [", ".join(map(str, row)) for row in rows]
+    return [{"numbers": text, "joint": joint} for text, joint in zip(texts, joints(len(texts), ",", ""), strict=True)]
+
+
+def step_list(steps: Sequence[Step]) -> list[Configuration]:
+    """The steps for the list in the head of an architecture."""
+    column = len(str(len(steps) - 1))
+    return [{"step": f"{number:>{column}}  {_description(step)}"} for number, step in enumerate(steps)]
+
+
+def _description(step: Step) -> str:
+    kind = type(step).__name__.lower()
+    if isinstance(step, Block):
+        size = f"{step.size} byte{'' if step.size == 1 else 's'}"
+        return f"{kind:8} {size}: {comment(step)}" if comment(step) else f"{kind:8} {size}"
+    return f"{kind:8} {comment(step)}".rstrip()
