@@ -21,6 +21,9 @@ package firm_axis_pkg is
   -- '1' if `index`, read as an unsigned number, is less than `bound`.
   function is_below(index : std_logic_vector; bound : natural) return std_logic;
 
+  -- The number of ones in a contiguous `keep`, which is one of a stream: it has 1 to 64 bits.
+  function lanes_kept(keep : std_logic_vector) return std_logic_vector;
+
   -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one AND.
   function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector;
 
@@ -76,6 +79,27 @@ package body firm_axis_pkg is
     end loop;
     return less;
   end function is_below;
+
+  -- Found bit by bit from the highest.
+  function lanes_kept(keep : std_logic_vector) return std_logic_vector is
+    constant LANES      : positive := keep'length;
+    constant COUNT_BITS : positive := clog2(LANES+1);
+    variable part       : std_logic_vector(LANES-1 downto 0);
+    variable count      : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
+  begin
+    part := keep;
+    if part(LANES-1) = '1' then
+      count(COUNT_BITS-1) := '1';
+      return count;
+    end if;
+    for place in COUNT_BITS-2 downto 0 loop
+      if part(2**place-1) = '1' then
+        count(place)              := '1';
+        part(2**place-1 downto 0) := part(2**(place+1)-1 downto 2**place);
+      end if;
+    end loop;
+    return count;
+  end function lanes_kept;
 
   -- '1' if the bits of `index` spell `value`.
   function is_equal(index : std_logic_vector; value : natural) return std_logic is

@@ -116,25 +116,6 @@ begin
       return moved(WIDTH-1 downto 0);
     end function bytes_from;
 
-    -- The number of ones in a contiguous `keep`, found bit by bit from the highest.
-    function bytes_kept(keep : std_logic_vector(LANES-1 downto 0)) return count_t is
-      variable part  : std_logic_vector(LANES-1 downto 0);
-      variable count : count_t;
-    begin
-      part  := keep;
-      count := (others => '0');
-      if keep(LANES-1) = '1' then
-        return to_unsigned(LANES, COUNT_BITS);
-      end if;
-      for place in OFFSET_BITS-1 downto 0 loop
-        if part(2**place-1) = '1' then
-          count(place)              := '1';
-          part(2**place-1 downto 0) := part(2**(place+1)-1 downto 2**place);
-        end if;
-      end loop;
-      return count;
-    end function bytes_kept;
-
     -- A legal number, that the assert above can speak first.
     constant VOID : natural := max(0, VOID_LANES);
 
@@ -173,7 +154,7 @@ begin
     count_entering : process (s_axis_tkeep, starting_r)
       variable kept : count_t;
     begin
-      kept     := bytes_kept(s_axis_tkeep);
+      kept     := unsigned(lanes_kept(s_axis_tkeep));
       entering <= kept;
       if starting_r = '1' and VOID > 0 then
         entering <= kept - VOID;
