@@ -7,10 +7,9 @@ does not fit is reported where it was written; as much as can be checked is chec
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
@@ -25,15 +24,18 @@ from fusesoc_firm.system.derived import (
     Converter,
     DerivedSystem,
     MessageSide,
+    PayloadLength,
 )
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
+from fusesoc_firm.system.length import output_length, publisher_buffers, subscriber_length
 from fusesoc_firm.system.specification import (
     MIDDLEWARES,
     SOURCE_SUFFIXES,
     Accelerator,
     Block,
     InterfaceType,
+    OutputType,
     Specification,
 )
 from fusesoc_firm.yaml_text import Text
@@ -53,6 +55,8 @@ def derive(specification: Specification, folder: Path, libraries: Libraries, fau
     analysis.resolve_blocks()
     connections = analysis.wiring().connect()
     faults.raise_if_any()
+    buffers = publisher_buffers(connections, analysis.publishers(), faults)
+    faults.raise_if_any()
     project = specification.project
     system = DerivedSystem(
         name=identifier(project.name).lower(),
@@ -60,7 +64,7 @@ def derive(specification: Specification, folder: Path, libraries: Libraries, fau
         width=project.width,
         scheduler=str(project.scheduler),
         subscribers=analysis.converters("subscriber"),
-        publishers=analysis.converters("publisher"),
+        publishers=tuple(replace(item, buffer=buffers.get(item.block, 0)) for item in analysis.converters("publisher")),
         accelerators=tuple(
             AcceleratorBlock(str(block.name), analysis.types[block.type])
             for block in specification.blocks
@@ -143,8 +147,15 @@ class _Analysis:
         """The message sides of an interface, numbered if there are several; None if a message is wrong."""
         frames = [self._frame(item.middleware, item.message) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
-        sides = [MessageSide(prefix, frame) for prefix, frame in zip(prefixes, frames, strict=True) if frame]
+        sides = [
+            MessageSide(prefix, frame, self._length(item, frame))
+            for prefix, frame, item in zip(prefixes, frames, interface, strict=True)
+            if frame
+        ]
         return tuple(sides) if len(sides) == len(frames) else None
+
+    def _length(self, item: InterfaceType, frame: Frame) -> PayloadLength | None:
+        return output_length(item, frame, self.faults) if isinstance(item, OutputType) else None
 
     def _frame(self, middleware: Text, message: Text) -> Frame | None:
         """The frame of a message, or None where it has a fault, which is noted at the specification's word."""
@@ -158,13 +169,6 @@ class _Analysis:
         except InputError as error:
             for fault in error.diagnostics:
                 self.faults.error(fault.message, fault.source or message.source, fault.hint)
-            return None
-        try:
-            check_fixed_size(frame)
-        except InputError as error:
-            reasons = "; ".join(fault.message for fault in error.diagnostics)
-            hint = error.diagnostics[0].hint
-            self.faults.error(f"{name} cannot be converted: {reasons}", message.source, hint)
             return None
         return frame
 
@@ -192,6 +196,7 @@ class _Analysis:
             value = getattr(block, key)
             if value is not None:
                 self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", value.source)
+        self._check_no_buffer(block)
         if found := self.types.get(block.type):
             self.inputs[block.name] = found.inputs
             self.outputs[block.name] = found.outputs
@@ -209,8 +214,16 @@ class _Analysis:
         frame = self._frame(block.middleware, block.message)
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
+            if is_subscriber:
+                self._check_no_buffer(block)
             self.inputs[block.name] = () if is_subscriber else (MessageSide("", frame),)
-            self.outputs[block.name] = (MessageSide("", frame),) if is_subscriber else ()
+            given = MessageSide("", frame, subscriber_length(frame))
+            self.outputs[block.name] = (given,) if is_subscriber else ()
+
+    def _check_no_buffer(self, block: Block) -> None:
+        if block.buffer is not None:
+            message = f"'buffer' belongs to a publisher, but '{block.name}' is none"
+            self.faults.error(message, block.name.source)
 
     def _check_count(self, mode: str) -> None:
         blocks = self.specification.blocks
@@ -241,6 +254,10 @@ class _Analysis:
             strays={side.frame for block in unsound for side in self.outputs.get(block.name, ())},
             ambiguous={block.name for block in lost},
         )
+
+    def publishers(self) -> dict[str, Block]:
+        """The blocks that are publishers, by name."""
+        return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == "publisher"}
 
     def converters(self, mode: str) -> tuple[Converter, ...]:
         blocks = [block for block in self.specification.blocks if block.type is None and block.mode == mode]

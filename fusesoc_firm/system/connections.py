@@ -36,7 +36,7 @@ class Wiring:
     strays: set[Frame] = field(default_factory=set)
     ambiguous: set[str] = field(default_factory=set)
     sinks: dict[End, list[End]] = field(default_factory=dict)
-    frames: dict[End, Frame] = field(default_factory=dict)
+    sides: dict[End, MessageSide] = field(default_factory=dict)
     driven: dict[End, Outgoing] = field(default_factory=dict)
     # The two ends of connections that could not be made.
     broken_sources: set[str] = field(default_factory=set)
@@ -53,7 +53,10 @@ class Wiring:
             self._check_sinks()
         self._check_sources()
         self._check_cycles()
-        return tuple(Connection(self.frames[source], source, tuple(ends)) for source, ends in self.sinks.items())
+        return tuple(
+            Connection(self.sides[source].frame, source, tuple(ends), self.sides[source].length)
+            for source, ends in self.sinks.items()
+        )
 
     def _connect(self, block: Block, outgoing: Outgoing) -> bool:
         """Make one connection; False where there is none, with the fault noted unless it is already."""
@@ -109,7 +112,7 @@ class Wiring:
         last = free[-1][0]
         given, taken = unused[0] if unused else next(pair for pair in free if pair[0] == last)
         source = End(str(block.name), given.prefix)
-        self.frames[source] = given.frame
+        self.sides[source] = given
         return source, End(str(outgoing.name), taken.prefix)
 
     @staticmethod

@@ -6,6 +6,7 @@ It is what `analysis` makes of a specification and what all templates, and `firm
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.system.specification import Accelerator
@@ -13,19 +14,43 @@ from fusesoc_firm.system.specification import Accelerator
 
 @dataclass(frozen=True)
 class Converter:
-    """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks."""
+    """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks.
+
+    `buffer` are the bytes of the longest payload of a publisher that stores its frames whole, 0 of any other.
+    """
 
     block: str
     frame: Frame
     id: int
+    buffer: int = 0
+
+
+class LengthSource(Enum):
+    """Where the length of a payload of variable size comes from."""
+
+    COMPUTED = "computed"
+    GIVEN = "given"
+    BUFFERED = "buffered"
+
+
+@dataclass(frozen=True)
+class PayloadLength:
+    """How a publisher learns the length of its payloads, and why so."""
+
+    source: LengthSource
+    reason: str
 
 
 @dataclass(frozen=True)
 class MessageSide:
-    """A message at an accelerator: its ports begin with `prefix` (`in_`, `out1_`)."""
+    """A message at a block: its ports begin with `prefix` (`in_`, `out1_`, nothing at a converter).
+
+    What gives messages of variable size has a `length`.
+    """
 
     prefix: str
     frame: Frame
+    length: PayloadLength | None = None
 
 
 @dataclass(frozen=True)
@@ -55,11 +80,15 @@ class End:
 
 @dataclass(frozen=True)
 class Connection:
-    """A message's way from where it arises to all who take it, in the order of the specification."""
+    """A message's way from where it arises to all who take it, in the order of the specification.
+
+    `length` is None if the message is of fixed size.
+    """
 
     frame: Frame
     source: End
     sinks: tuple[End, ...]
+    length: PayloadLength | None = None
 
 
 @dataclass(frozen=True)
@@ -79,6 +108,22 @@ class DerivedSystem:
     def entity(self) -> str:
         """The top level's name."""
         return f"{self.name}_system"
+
+    @property
+    def error_blocks(self) -> tuple[str, ...]:
+        """The converters that report errors, in the order of `frame_error`: publishers of variable size come last."""
+        publishers = (item.block for item in self.publishers if not item.frame.is_fixed_size)
+        return (*(item.block for item in self.subscribers), *publishers)
+
+    @property
+    def computed_frames(self) -> tuple[Frame, ...]:
+        """Every frame whose payload's length is computed, once."""
+        found = (item.frame for item in self.connections if item.length and item.length.source is LengthSource.COMPUTED)
+        return tuple(dict.fromkeys(found))
+
+    def length_to(self, publisher: Converter) -> PayloadLength | None:
+        """How a publisher learns the length of its payloads; None if it is always the same."""
+        return next(item.length for item in self.connections if End(publisher.block) in item.sinks)
 
     @property
     def frames(self) -> tuple[Frame, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.payload_length import length_entity
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.naming import identifier
@@ -24,6 +25,8 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
             hint = f"one system has a message in one ROS version: here ROS {int(frames[entity].ros)}"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(entity, f"converter '{block}'")
+    for frame in system.computed_frames:
+        owners.setdefault(length_entity(frame), f"what computes the length of {frame.message}")
     for accelerator in system.accelerator_types:
         name = accelerator.accelerator.name
         if accelerator.accelerator.type == "VHDL" and identifier(name) != name:

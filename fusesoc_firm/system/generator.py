@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.converter.generator import VHDL, library_sources, publisher_files, subscriber_files
+from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
@@ -73,9 +74,13 @@ def generate(request: Request) -> GeneratedCore:
         **subscriber_files(_frames(system.subscribers), system.width),
         **publisher_files(_frames(system.publishers), system.width),
     }
+    files |= {
+        f"{length_entity(frame)}.vhd": GeneratedFile(render(LENGTH_TEMPLATE, payload_length_configuration(frame)), VHDL)
+        for frame in system.computed_frames
+    }
     sources: set[Path] = set()
     for accelerator in system.accelerator_types:
-        files |= _accelerator_files(accelerator, loaded.folder, sources)
+        files |= _accelerator_files(accelerator, system.width, loaded.folder, sources)
     files[f"{system.entity}.vhd"] = GeneratedFile(render(SYSTEM_TEMPLATE, system_configuration(system)), VHDL)
     return GeneratedCore(f"System {system.name}", files)
 
@@ -84,14 +89,14 @@ def _frames(converters: Iterable[Converter]) -> list[Frame]:
     return list(dict.fromkeys(converter.frame for converter in converters))
 
 
-def _accelerator_files(type_: AcceleratorType, folder: Path, taken: set[Path]) -> dict[str, GeneratedFile]:
+def _accelerator_files(type_: AcceleratorType, width: int, folder: Path, taken: set[Path]) -> dict[str, GeneratedFile]:
     """The user's VHDL, or the wrapper around the user's C++.
 
     `taken` are the sources that the core has already: a package of two accelerators must not be analysed twice.
     """
     accelerator = type_.accelerator
     if accelerator.type == "HLS":
-        return wrapper_file(type_)
+        return wrapper_file(type_, width)
     files: dict[str, GeneratedFile] = {}
     for source in accelerator.sources:
         path = (folder / source).resolve()

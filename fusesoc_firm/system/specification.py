@@ -21,6 +21,7 @@ SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 MODES = ("subscriber", "publisher")
 SCHEDULERS = ("fixed_priority",)
+LENGTHS = ("computed", "given", "buffered")
 
 _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
@@ -38,10 +39,17 @@ class Project(Section):
 
 @dataclass(frozen=True)
 class InterfaceType(Section):
-    """A message that an accelerator takes or gives."""
+    """A message that an accelerator takes."""
 
     middleware: Text = key("whose message it is", **_MIDDLEWARE)
     message: Text = key("the message's type, such as geometry_msgs/Quaternion", is_required=True)
+
+
+@dataclass(frozen=True)
+class OutputType(InterfaceType):
+    """A message that an accelerator gives."""
+
+    length: Text | None = key("where the length of a payload of variable size comes from", choices=LENGTHS)
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,7 @@ class Interface(Section):
     """All messages of an accelerator."""
 
     input: tuple[InterfaceType, ...] = key("messages it takes", form="sections", section=InterfaceType)
-    output: tuple[InterfaceType, ...] = key("messages it gives", form="sections", section=InterfaceType)
+    output: tuple[OutputType, ...] = key("messages it gives", form="sections", section=OutputType)
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,7 @@ class Block(Section):
     middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES))
     mode: Text | None = key("which way a converter works", choices=MODES)
     message: Text | None = key("a converter's message")
+    buffer: int | None = key("bytes of the longest payload of a publisher that stores frames whole", form="integer")
     outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
 
 
