@@ -388,7 +388,8 @@ class _Publisher:
             "opens_text": _any_place(area.first for area in texts),
             "has_texts": bool(texts),
             "targets": _ladder(
-                [(place, f"to_unsigned({target}, {self.end.bit_length()})") for place, target in sorted(jumps)], "(others => '0')"
+                [(place, f"to_unsigned({target}, {self.end.bit_length()})") for place, target in sorted(jumps)],
+                "(others => '0')",
             ),
             "shifts": [
                 {"places": _any_place(place for place, shift in shifts if shift == wanted), "shift": wanted}
@@ -446,9 +447,7 @@ class _Publisher:
             "is_closing": _any_place(place for place, _ in closings),
             "element_lasts": _ladder([(place, port.last) for place, port in ports], "'0'"),
             "element_readies": [{"name": port.ready, "place": place} for place, port in ports],
-            "element_ends": _ladder(
-                [(place, self._elements_carry(len(scope))) for place, scope in closings], "'0'"
-            ),
+            "element_ends": _ladder([(place, self._elements_carry(len(scope))) for place, scope in closings], "'0'"),
             "depths": [self._depth(depth) for depth in depths],
         }
 

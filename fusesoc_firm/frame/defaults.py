@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from typing import Any
 
 from fusesoc_firm.frame.decoder import decode
 from fusesoc_firm.frame.encoder import encode
-from fusesoc_firm.frame.model import Fixed, Frame, FrameField
-from fusesoc_firm.frame.values import MessageValue, leaf_of
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node
+from fusesoc_firm.frame.values import MessageValue, leaf_of, part_of, put, put_leaf
+from fusesoc_firm.message.model import Scalar
 
 
 def default_bytes(node: Fixed) -> bytes:
@@ -41,8 +43,10 @@ def default_payload(frame: Frame) -> bytes:
 def encode_used(frame: Frame, message: MessageValue) -> bytes:
     """The payload that a publisher of the used fields sends: the other ones, which may be missing, as defaults.
 
-    The message has a fixed size. Raises `CodecError` as `encode` does.
+    Raises `CodecError` as `encode` does.
     """
+    if not frame.is_fixed_size:
+        return encode(frame, _as_sent(frame.nodes, message, 0))
     for leaf in frame.fields:
         if leaf.is_used:
             leaf_of(message, leaf, 0)
@@ -53,6 +57,45 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
             for offset in leaf.offsets:
                 payload[offset : offset + leaf.type.size] = defaults[offset : offset + leaf.type.size]
     return bytes(payload)
+
+
+def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
+    """A message, or an element `depth` names below it, with what is not used as its default, or empty."""
+    sent: dict[str, Any] = deepcopy(dict(value)) if isinstance(value, Mapping) else {}
+    for node in nodes:
+        match node:
+            case Fixed(fields=fields):
+                for leaf in fields:
+                    if not leaf.is_used and leaf.count:
+                        put_leaf(sent, leaf.path[depth:], _defaults(leaf))
+            case Data() | Loop() if not node.is_used:
+                put(sent, node.path[depth:], _part_as_sent(node))
+            case Loop():
+                elements = part_of(value, node, depth)
+                if isinstance(elements, list | tuple) and not _holds_texts(node):
+                    put(sent, node.path[depth:], [_as_sent(node.body, item, len(node.path)) for item in elements])
+    return sent
+
+
+def _part_as_sent(node: Data | Loop) -> Any:
+    """What is sent of a part that is not used."""
+    if node.default is not None:
+        return node.default
+    if isinstance(node, Data):
+        return [] if node.kind is DataKind.ARRAY else ""
+    element = "" if _holds_texts(node) else _as_sent(node.body, {}, len(node.path))
+    return [element] * (node.count or 0)
+
+
+def _holds_texts(loop: Loop) -> bool:
+    return any(isinstance(node, Data) and node.path == loop.path for node in loop.body)
+
+
+def _defaults(leaf: FrameField) -> Iterator[Scalar]:
+    """Every element of a leaf that is not used."""
+    given = leaf.default if isinstance(leaf.default, tuple) else (0 if leaf.default is None else leaf.default,)
+    values = (given[number % len(given)] for number in range(leaf.count))
+    return (bool(value) if leaf.type.code == "?" else value for value in values)
 
 
 def _filled(default: Any, value: Any) -> Any:

@@ -6,7 +6,7 @@ So the padding of CDR, which depends on all that came before, needs no formula o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,7 +87,14 @@ def length_of(frame: Frame) -> Length:
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes)]))
 
 
-def _terms(nodes: Sequence[Node]) -> tuple[Term, ...]:
+def sent_length_of(frame: Frame) -> Length:
+    """The expression of what a publisher sends: of a part that is not used its default, or nothing."""
+    prefix = len(frame.prefix)
+    return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes, is_sent=True)]))
+
+
+def _terms(nodes: Sequence[Node], *, is_sent: bool = False) -> tuple[Term, ...]:
+    """The terms of nodes; with `is_sent`, parts that are not used are constants."""
     terms: list[Term] = []
     for node in nodes:
         match node:
@@ -95,14 +102,40 @@ def _terms(nodes: Sequence[Node]) -> tuple[Term, ...]:
                 terms.append(Bytes(size))
             case Pad(alignment):
                 terms.append(Align(alignment))
+            case Data() | Loop() if is_sent and not node.is_used:
+                terms += _constant_terms(node, node.default)
             case Data():
-                gap = Align(node.alignment) if node.padding is None else Bytes(node.padding)
-                body = _joined([gap, Bytes(node.element.size)])
+                body = _joined([_gap(node), Bytes(node.element.size)])
                 terms += [Bytes(COUNT_BYTES), Repeat(node, body, node.element.size), Bytes(node.terminator)]
             case Loop():
-                body = _terms(node.body)
+                body = _terms(node.body, is_sent=is_sent)
                 terms += [Bytes(COUNT_BYTES if node.count is None else 0), Repeat(node, body, _stride(body))]
     return _joined(terms)
+
+
+def _gap(node: Data) -> Term:
+    """What lies between the count and the elements, if there are any."""
+    return Align(node.alignment) if node.padding is None else Bytes(node.padding)
+
+
+def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
+    """The terms of a part that always has the same value; None is that of an element without one."""
+    if isinstance(node, Data):
+        size = node.element.size
+        count = len(value or ()) if node.kind is DataKind.ARRAY else len(units_of(node, value or "")) // size
+        yield Bytes(COUNT_BYTES)
+        if count:
+            yield from (_gap(node), Bytes(count * size))
+        yield Bytes(node.terminator)
+        return
+    if node.count is None:
+        yield Bytes(COUNT_BYTES)
+    for element in value or [None] * (node.count or 0):
+        for inner in node.body:
+            if isinstance(inner, Data | Loop):
+                yield from _constant_terms(inner, inner.default if element is None else element)
+            else:
+                yield from _terms([inner])
 
 
 def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:

@@ -16,7 +16,8 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, nearest
-from fusesoc_firm.frame.model import Frame, WireType
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, Loop, Path, WireType, all_nodes
+from fusesoc_firm.frame.values import CodecError, check_bound, units_of
 from fusesoc_firm.yaml_text import YamlText, is_null, items, kind
 
 _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
@@ -24,16 +25,28 @@ _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
 
 @dataclass
 class _Branch:
-    """A field: `count` elements if it is an array, each a value of `type` or a message of `fields`."""
+    """A field: each of its elements is a value of `type`, a `text`, or a message of `fields`.
+
+    An array of fixed size has `count` elements, one of variable size is an `array`.
+    """
 
     count: int | None = None
+    array: Data | Loop | None = None
     type: WireType | None = None
+    text: Data | None = None
     fields: dict[str, _Branch] = field(default_factory=dict)
+
+    def at(self, path: Path) -> _Branch:
+        """The field that a path leads to."""
+        branch = self
+        for step in path:
+            branch = branch.fields.setdefault(step.name, _Branch(step.count))
+        return branch
 
 
 def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnostics) -> dict[str, Any]:
     """The message of `frame` that a node holds; what does not fit is noted and left out."""
-    if is_null(node) and not frame.fields:
+    if is_null(node) and not frame.names:
         return {}
     reader = _Reader(text, faults, str(frame.message))
     return reader.message(node, _tree(frame), "")
@@ -41,11 +54,19 @@ def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnost
 
 def _tree(frame: Frame) -> _Branch:
     root = _Branch()
-    for leaf in frame.fields:
-        branch = root
-        for step in leaf.path:
-            branch = branch.fields.setdefault(step.name, _Branch(step.count))
-        branch.type = leaf.type
+    for node in all_nodes(frame.nodes):
+        match node:
+            case Fixed(fields=fields):
+                for leaf in fields:
+                    root.at(leaf.path).type = leaf.type
+            case Data(kind=DataKind.ARRAY):
+                branch = root.at(node.path)
+                branch.array, branch.type = node, node.element
+            case Data():
+                root.at(node.path).text = node
+            case Loop():
+                branch = root.at(node.path)
+                branch.count, branch.array = node.count, node
     return root
 
 
@@ -78,16 +99,21 @@ class _Reader:
         return found
 
     def _field(self, node: yaml.Node, branch: _Branch, path: str) -> Any:
-        if branch.count is None:
+        if branch.count is None and branch.array is None:
             return self._element(node, branch, path)
+        size = "" if branch.count is None else f" of {branch.count}"
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{path}' is a list of {branch.count}, not {kind(node)}", node)
+            self._error(f"'{path}' is a list{size}, not {kind(node)}", node)
             return None
-        if len(node.value) != branch.count:
-            self._error(f"'{path}' is a list of {branch.count}, not of {len(node.value)}", node)
+        if branch.count is not None and len(node.value) != branch.count:
+            self._error(f"'{path}' is a list{size}, not of {len(node.value)}", node)
+        elif branch.array is not None:
+            self._check_bound(branch.array, len(node.value), node)
         return [self._element(item, branch, f"{path}[{number}]") for number, item in enumerate(node.value)]
 
     def _element(self, node: yaml.Node, branch: _Branch, path: str) -> Any:
+        if branch.text is not None:
+            return self._text(node, branch.text, path)
         if branch.type is None:
             return self.message(node, branch, path)
         if not isinstance(node, yaml.ScalarNode) or is_null(node) or node.style is not None:
@@ -98,6 +124,19 @@ class _Reader:
         except ValueError as error:
             self._error(f"'{path}' is a {branch.type.name}, not '{node.value}'", node, str(error))
             return None
+
+    def _text(self, node: yaml.Node, text: Data, path: str) -> str | None:
+        if not isinstance(node, yaml.ScalarNode) or is_null(node):
+            self._error(f"'{path}' is a {text.kind.value}, not {kind(node)}", node, "an empty one is ''")
+            return None
+        self._check_bound(text, len(units_of(text, node.value)) // text.element.size, node)
+        return str(node.value)
+
+    def _check_bound(self, part: Data | Loop, count: int, node: yaml.Node) -> None:
+        try:
+            check_bound(part, count)
+        except CodecError as error:
+            self._error(str(error), node)
 
     def _error(self, message: str, node: yaml.Node, hint: str = "") -> None:
         self.faults.error(message, self.text.source(node), hint)

@@ -7,10 +7,9 @@ does not fit is reported where it was written; as much as can be checked is chec
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
@@ -27,14 +26,17 @@ from fusesoc_firm.system.derived import (
     Converter,
     DerivedSystem,
     MessageSide,
+    PayloadLength,
 )
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
+from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.specification import (
     SOURCE_SUFFIXES,
     Accelerator,
     Block,
     InterfaceType,
+    OutputType,
     Specification,
 )
 from fusesoc_firm.yaml_text import Text
@@ -52,7 +54,9 @@ def derive(specification: Specification, folder: Path, libraries: Libraries, fau
     analysis.check_names()
     analysis.resolve_accelerators()
     analysis.resolve_blocks()
-    connections = analysis.wiring().connect()
+    connections = with_lengths(analysis.wiring().connect(), analysis.outputs, analysis.blocks, faults)
+    faults.raise_if_any()
+    buffers = publisher_buffers(connections, analysis.publishers(), faults)
     faults.raise_if_any()
     project = specification.project
     system = DerivedSystem(
@@ -61,7 +65,9 @@ def derive(specification: Specification, folder: Path, libraries: Libraries, fau
         width=project.width,
         scheduler=str(project.scheduler),
         subscribers=analysis.converters("subscriber", connections),
-        publishers=analysis.converters("publisher", connections),
+        publishers=tuple(
+            replace(item, buffer=buffers.get(item.block, 0)) for item in analysis.converters("publisher", connections)
+        ),
         accelerators=tuple(
             AcceleratorBlock(str(block.name), analysis.types[block.type])
             for block in specification.blocks
@@ -144,8 +150,15 @@ class _Analysis:
         """The message sides of an interface, numbered if there are several; None if a message is wrong."""
         frames = [self._frame(item.middleware, item.message, item.include, item.exclude) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
-        sides = [MessageSide(prefix, frame) for prefix, frame in zip(prefixes, frames, strict=True) if frame]
+        sides = [
+            MessageSide(prefix, frame, self._length(item, frame))
+            for prefix, frame, item in zip(prefixes, frames, interface, strict=True)
+            if frame
+        ]
         return tuple(sides) if len(sides) == len(frames) else None
+
+    def _length(self, item: InterfaceType, frame: Frame) -> PayloadLength | None:
+        return output_length(item, frame, self.faults) if isinstance(item, OutputType) else None
 
     def _frame(self, middleware: Text, message: Text, include: Sequence[Text], exclude: Sequence[Text]) -> Frame | None:
         """The frame of a message's fields, or None where it has a fault, which is noted at the specification's word."""
@@ -158,13 +171,6 @@ class _Analysis:
             frame = select(frame_of(name, library.closure(name)), places(include), places(exclude))
         except InputError as error:
             self.faults.take(error, message.source)
-            return None
-        try:
-            check_fixed_size(frame)
-        except InputError as error:
-            reasons = "; ".join(fault.message for fault in error.diagnostics)
-            hint = error.diagnostics[0].hint
-            self.faults.error(f"{name} cannot be converted: {reasons}", message.source, hint)
             return None
         return frame
 
@@ -192,6 +198,7 @@ class _Analysis:
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
                 self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", source)
+        self._check_no_buffer(block)
         if found := self.types.get(block.type):
             self.inputs[block.name] = found.inputs
             self.outputs[block.name] = found.outputs
@@ -209,8 +216,15 @@ class _Analysis:
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
+            if is_subscriber:
+                self._check_no_buffer(block)
             self.inputs[block.name] = () if is_subscriber else (MessageSide("", frame),)
             self.outputs[block.name] = (MessageSide("", frame),) if is_subscriber else ()
+
+    def _check_no_buffer(self, block: Block) -> None:
+        if block.buffer is not None:
+            message = f"'buffer' belongs to a publisher, but '{block.name}' is none"
+            self.faults.error(message, block.name.source)
 
     def _check_count(self, mode: str) -> None:
         blocks = self.specification.blocks
@@ -241,6 +255,10 @@ class _Analysis:
             strays={side.kind for block in unsound for side in self.outputs.get(block.name, ())},
             ambiguous={block.name for block in lost},
         )
+
+    def publishers(self) -> dict[str, Block]:
+        """The blocks that are publishers, by name."""
+        return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == "publisher"}
 
     def converters(self, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
         """The converters with the fields that connections carry: what nobody takes or drives needs no port."""

@@ -6,6 +6,7 @@ It is what `analysis` makes of a specification and what all templates, and `firm
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -16,21 +17,47 @@ from fusesoc_firm.system.specification import Accelerator
 class Converter:
     """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks.
 
-    The fields that are used in `frame` are its ports. One without all of them has an entity with a `suffix`.
+    The fields that are used in `frame` are its ports. One without all of them has an entity with a `suffix`. `buffer`
+    are the bytes of the longest payload of a publisher that stores its frames whole, 0 of any other.
     """
 
     block: str
     frame: Frame
     id: int
     suffix: str = ""
+    buffer: int = 0
+
+
+class LengthSource(Enum):
+    """Where the length of a payload of variable size comes from."""
+
+    COMPUTED = "computed"
+    GIVEN = "given"
+    BUFFERED = "buffered"
+
+
+@dataclass(frozen=True)
+class PayloadLength:
+    """How a publisher learns the length of its payloads, and why so.
+
+    `suffix` is that of the entity that computes it.
+    """
+
+    source: LengthSource
+    reason: str
+    suffix: str = ""
 
 
 @dataclass(frozen=True)
 class MessageSide:
-    """A message at an accelerator: its ports begin with `prefix` (`in_`, `out1_`)."""
+    """A message at a block: its ports begin with `prefix` (`in_`, `out1_`, nothing at a converter).
+
+    An accelerator's output of variable size has a `length`.
+    """
 
     prefix: str
     frame: Frame
+    length: PayloadLength | None = None
 
     @property
     def kind(self) -> tuple[MessageName, RosVersion]:
@@ -67,12 +94,19 @@ class End:
 class Connection:
     """A message's way from where it arises to all who take it, in the order of the specification.
 
-    `frames` is the message for each sink: the fields that are used in it go there from here.
+    `frames` is the message for each sink: the fields that are used in it go there from here. A message of variable size
+    is the same for all sinks, and has a `length`.
     """
 
     source: End
     sinks: tuple[End, ...]
     frames: tuple[Frame, ...]
+    length: PayloadLength | None = None
+
+    @property
+    def frame(self) -> Frame:
+        """The message, as the first sink has it."""
+        return self.frames[0]
 
 
 @dataclass(frozen=True)
@@ -92,6 +126,25 @@ class DerivedSystem:
     def entity(self) -> str:
         """The top level's name."""
         return f"{self.name}_system"
+
+    @property
+    def error_blocks(self) -> tuple[str, ...]:
+        """The converters that report errors, in the order of `frame_error`: publishers of variable size come last."""
+        publishers = (item.block for item in self.publishers if not item.frame.is_fixed_size)
+        return (*(item.block for item in self.subscribers), *publishers)
+
+    @property
+    def computed_lengths(self) -> dict[Frame, str]:
+        """Every frame whose payload's length is computed, with the suffix of the entity that does so."""
+        return {
+            item.frame: item.length.suffix
+            for item in self.connections
+            if item.length and item.length.source is LengthSource.COMPUTED
+        }
+
+    def length_to(self, publisher: Converter) -> PayloadLength | None:
+        """How a publisher learns the length of its payloads; None if it is always the same."""
+        return next(item.length for item in self.connections if End(publisher.block) in item.sinks)
 
     @property
     def frames(self) -> tuple[Frame, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import constants_package
+from fusesoc_firm.converter.payload_length import length_entity
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName
@@ -32,6 +33,8 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
             message = f"'{block}' and {owners[package]} need the package '{package}' for different messages"
             faults.error(message, blocks[block].name.source)
         owners.setdefault(package, f"converter '{block}'")
+    for frame, suffix in system.computed_lengths.items():
+        owners.setdefault(length_entity(frame, suffix), f"what computes the length of {frame.message}")
     for accelerator in system.accelerator_types:
         name = accelerator.accelerator.name
         if accelerator.accelerator.type == "VHDL" and identifier(name) != name:

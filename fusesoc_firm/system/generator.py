@@ -12,6 +12,7 @@ from fusesoc_firm.converter.generator import (
     publisher_files,
     subscriber_files,
 )
+from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
@@ -83,21 +84,24 @@ def generate(request: Request) -> GeneratedCore:
         files |= subscriber_files([converter.frame], system.width, converter.suffix)
     for converter in system.publishers:
         files |= publisher_files([converter.frame], system.width, converter.suffix)
+    for frame, suffix in system.computed_lengths.items():
+        text = render(LENGTH_TEMPLATE, payload_length_configuration(frame, suffix))
+        files[f"{length_entity(frame, suffix)}.vhd"] = GeneratedFile(text, VHDL)
     sources: set[Path] = set()
     for accelerator in system.accelerator_types:
-        files |= _accelerator_files(accelerator, loaded.folder, sources)
+        files |= _accelerator_files(accelerator, system.width, loaded.folder, sources)
     files[f"{system.entity}.vhd"] = GeneratedFile(render(SYSTEM_TEMPLATE, system_configuration(system)), VHDL)
     return GeneratedCore(f"System {system.name}", files)
 
 
-def _accelerator_files(type_: AcceleratorType, folder: Path, taken: set[Path]) -> dict[str, GeneratedFile]:
+def _accelerator_files(type_: AcceleratorType, width: int, folder: Path, taken: set[Path]) -> dict[str, GeneratedFile]:
     """The user's VHDL, or the wrapper around the user's C++.
 
     `taken` are the sources that the core has already: a package of two accelerators must not be analysed twice.
     """
     accelerator = type_.accelerator
     if accelerator.type == "HLS":
-        return wrapper_file(type_)
+        return wrapper_file(type_, width)
     files: dict[str, GeneratedFile] = {}
     for source in accelerator.sources:
         path = (folder / source).resolve()

@@ -16,13 +16,16 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from fusesoc_firm.converter.generator import VHDL
+from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
-from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.naming import distinct_identifiers, identifier
 from fusesoc_firm.render import render
-from fusesoc_firm.system.configuration import accelerator_entity, accelerator_ports, port_map
+from fusesoc_firm.system.configuration import accelerator_entity, port_map
 from fusesoc_firm.system.derived import AcceleratorType, MessageSide
+from fusesoc_firm.system.sides import accelerator_ports
 
 Configuration = dict[str, Any]
 
@@ -73,10 +76,10 @@ def library_name(accelerator: AcceleratorType) -> str:
     return f"lib{function_name(accelerator)}.so"
 
 
-def wrapper_file(accelerator: AcceleratorType) -> dict[str, GeneratedFile]:
+def wrapper_file(accelerator: AcceleratorType, width: int) -> dict[str, GeneratedFile]:
     """The wrapper's VHDL, for simulation and synthesis alike."""
     entity = accelerator_entity(accelerator)
-    return {f"{entity}.vhd": GeneratedFile(render(WRAPPER_TEMPLATE, wrapper_configuration(accelerator)), VHDL)}
+    return {f"{entity}.vhd": GeneratedFile(render(WRAPPER_TEMPLATE, wrapper_configuration(accelerator, width)), VHDL)}
 
 
 def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:
@@ -110,16 +113,24 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
     for side, item in zip(
         (*accelerator.inputs, *accelerator.outputs), (*interface.input, *interface.output), strict=True
     ):
-        for port in field_ports(side.frame):
-            if port.field.is_array:
-                message = f"'{name}' is of type HLS, which takes single values, not the array {port.comment}"
-                faults.error(message, item.message.source, "write this accelerator in VHDL")
+        for problem in _problems(side.frame):
+            message = f"'{name}' is of type HLS, which takes {problem}"
+            faults.error(message, item.message.source, "write this accelerator in VHDL")
 
 
-def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
+def _problems(frame: Frame) -> list[str]:
+    """What of a message no parameter carries, behind what one does."""
+    try:
+        check_fixed_size(frame)
+    except InputError as error:
+        return [f"messages of fixed size, but {fault.message}" for fault in error.diagnostics]
+    return [f"single values, not the array {port.comment}" for port in field_ports(frame) if port.field.is_array]
+
+
+def wrapper_configuration(accelerator: AcceleratorType, width: int) -> Configuration:
     """The configuration of the wrapper that gives the kernel the message sides of an accelerator."""
     inputs, outputs = arguments(accelerator)
-    ports = accelerator_ports(accelerator)
+    ports = accelerator_ports(accelerator, width)
     names = [f"{prefix}{port.name}" for prefix, port in ports]
     column = max(len(name) for name in [*names, "rst_n"])
     return {

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.ports import field_ports
+from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.system.configuration import accelerator_entity
-from fusesoc_firm.system.derived import Connection, Converter, DerivedSystem
+from fusesoc_firm.system.derived import Connection, Converter, DerivedSystem, PayloadLength
+from fusesoc_firm.system.sides import side_ports
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
@@ -25,7 +27,10 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "AXIS_to_msg": [
                 _converter(item, subscriber_entity(item.frame, item.suffix)) for item in system.subscribers
             ],
-            "msg_to_AXIS": [_converter(item, publisher_entity(item.frame, item.suffix)) for item in system.publishers],
+            "msg_to_AXIS": [
+                _converter(item, publisher_entity(item.frame, item.suffix)) | _length(item, system.length_to(item))
+                for item in system.publishers
+            ],
         },
         "Accelerators": [
             {
@@ -36,7 +41,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             }
             for block in system.accelerators
         ],
-        "Connections": list(_connections(system.connections)),
+        "Connections": list(_connections(system.connections, system.width)),
     }
 
 
@@ -47,18 +52,29 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
         "ROS": int(converter.frame.ros),
         "block": converter.block,
         "id": converter.id,
-        "payloadBytes": converter.frame.payload_bytes,
+        "payloadBytes": _payload_bytes(converter.frame),
     }
 
 
-def _connections(connections: Iterable[Connection]) -> Iterator[dict[str, str]]:
+def _payload_bytes(frame: Frame) -> int | str:
+    length = length_of(frame)
+    if length.maximum is None:
+        return f"{length.minimum} and more"
+    return length.minimum if frame.is_fixed_size else f"{length.minimum} to {length.maximum}"
+
+
+def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any]:
+    """How a publisher learns the length of its payloads and why so, and what it stores of them."""
+    if length is None:
+        return {}
+    buffer = {"buffer": publisher.buffer} if publisher.buffer else {}
+    return {"length": length.source.value, "because": length.reason, **buffer}
+
+
+def _connections(connections: Iterable[Connection], width: int) -> Iterator[dict[str, str]]:
     for connection in connections:
         source = connection.source
         for sink, frame in zip(connection.sinks, connection.frames, strict=True):
-            ports = [port.name for port in field_ports(frame)]
-            for port in [*ports, "segment_valid"]:
-                yield {"from": f"{source.block}/{source.prefix}{port}", "to": f"{sink.block}/{sink.prefix}{port}"}
-            yield {
-                "from": f"{sink.block}/{sink.prefix}msg_ready",
-                "to": f"{source.block}/{source.prefix}msg_ready",
-            }
+            for port in side_ports(frame, width, gives=True, has_valid=False):
+                at_source, at_sink = (f"{end.block}/{end.prefix}{port.name}" for end in (source, sink))
+                yield {"from": at_source, "to": at_sink} if port.is_output else {"from": at_sink, "to": at_source}

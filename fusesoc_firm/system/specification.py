@@ -20,6 +20,7 @@ SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 MODES = ("subscriber", "publisher")
 SCHEDULERS = ("fixed_priority",)
+LENGTHS = ("computed", "given", "buffered")
 
 _INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
 _EXCLUDE = {"form": "texts", "meaning": "none of these fields"}
@@ -39,7 +40,7 @@ class Project(Section):
 
 @dataclass(frozen=True)
 class InterfaceType(Section):
-    """A message that an accelerator takes or gives."""
+    """A message that an accelerator takes."""
 
     middleware: Text = key("whose message it is", **_MIDDLEWARE)
     message: Text = key("the message's type, such as geometry_msgs/Quaternion", is_required=True)
@@ -48,11 +49,18 @@ class InterfaceType(Section):
 
 
 @dataclass(frozen=True)
+class OutputType(InterfaceType):
+    """A message that an accelerator gives."""
+
+    length: Text | None = key("where the length of a payload of variable size comes from", choices=LENGTHS)
+
+
+@dataclass(frozen=True)
 class Interface(Section):
     """All messages of an accelerator."""
 
     input: tuple[InterfaceType, ...] = key("messages it takes", form="sections", section=InterfaceType)
-    output: tuple[InterfaceType, ...] = key("messages it gives", form="sections", section=InterfaceType)
+    output: tuple[OutputType, ...] = key("messages it gives", form="sections", section=OutputType)
 
 
 @dataclass(frozen=True)
@@ -85,6 +93,7 @@ class Block(Section):
     message: Text | None = key("a converter's message")
     include: tuple[Text, ...] = key(**_INCLUDE)
     exclude: tuple[Text, ...] = key(**_EXCLUDE)
+    buffer: int | None = key("bytes of the longest payload of a publisher that stores frames whole", form="integer")
     outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
 
 

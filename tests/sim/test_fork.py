@@ -34,6 +34,17 @@ def test_random_readiness(library: Library, sinks: int, seed: int, stall_percent
 
 
 @pytest.mark.parametrize("sinks", COUNTS)
+@pytest.mark.parametrize(("seed", "stall_percent"), [(5, 30), (6, 80)])
+def test_a_withdrawn_message_leaves_nothing_behind(library: Library, sinks: int, seed: int, stall_percent: int) -> None:
+    print(f"seed {seed}, stalls {stall_percent} %")
+    generics = {"SINKS": sinks, "SEED": seed, "STALL_PERCENT": stall_percent, "WITHDRAW_PERCENT": 20}
+    if stall_percent > 50:
+        generics["MESSAGES"] = 50
+    result = library.run(BENCH, generics)
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("sinks", COUNTS)
 def test_a_message_a_cycle(library: Library, sinks: int) -> None:
     result = library.run(BENCH, {"SINKS": sinks})
     assert result.exit_code == 0, result.output
@@ -50,9 +61,9 @@ def test_a_blocked_sink_stops_the_source_but_no_other_sink(library: Library, sin
 @pytest.mark.parametrize("sinks", [2, 5])
 def test_the_netlist_does_the_same(tmp_path: Path, sinks: int) -> None:
     library = _library(tmp_path)
-    library.replace_by_netlist("firm_message_fork", {"SINKS": sinks})
+    library.replace_by_netlist("firm_message_fork", {"SINKS": sinks, "SEGMENTS": 3})
     library.analyse([path for path in core_files("axis/axis", fileset="tb") if path.stem == BENCH])
-    result = library.run(BENCH, {"SINKS": sinks, "SEED": 4, "STALL_PERCENT": 40})
+    result = library.run(BENCH, {"SINKS": sinks, "SEED": 4, "STALL_PERCENT": 40, "WITHDRAW_PERCENT": 5})
     assert result.exit_code == 0, result.output
 
 
@@ -66,3 +77,9 @@ def test_an_illegal_generic_is_named(library: Library, sinks: int) -> None:
     result = library.run("firm_message_fork", {"SINKS": sinks})
     assert result.exit_code != 0
     assert f"firm_message_fork: SINKS is {sinks}; legal: 1 and more" in result.output
+
+
+def test_an_illegal_number_of_segments_is_named(library: Library) -> None:
+    result = library.run("firm_message_fork", {"SEGMENTS": 0})
+    assert result.exit_code != 0
+    assert "firm_message_fork: SEGMENTS is 0; legal: 1 and more" in result.output

@@ -54,6 +54,8 @@ architecture rtl of firm_axis_trim is
   signal wanted  : unsigned(COUNT_BITS-1 downto 0);
   signal sum     : unsigned(32 downto 0);
   signal exceeds : std_logic;  -- less is left than is wanted
+  signal open_r  : std_logic;  -- no length is announced: the frame is as long as it gets
+  signal ends    : std_logic;  -- the frame ends in this cycle, if it is taken
   signal lacking : unsigned(32 downto 0);
 
 begin
@@ -65,34 +67,42 @@ begin
   wanted  <= to_unsigned(LANES, COUNT_BITS) when last = '1' else unsigned(count);
   sum     <= ('0' & left_r) + wanted;
   exceeds <= sum(32);
+  ends    <= last and (exceeds or open_r);
 
-  pass : process (header, exceeds, wanted, left_r)
+  pass : process (header, exceeds, wanted, left_r, last, open_r)
   begin
     m_count <= std_logic_vector(wanted);
     if header = '0' and exceeds = '1' then
       m_count <= std_logic_vector(not left_r(COUNT_BITS-1 downto 0));
+    end if;
+    if last = '1' and open_r = '1' then
+      m_count <= (others => '0');
     end if;
   end process pass;
 
   announced <= std_logic_vector(not left_r);
 
   m_data  <= data;
-  m_last  <= last and exceeds;
+  m_last  <= ends;
   m_valid <= valid;
-  ready   <= m_ready and (exceeds or not last);
+  ready   <= m_ready and (ends or not last);
 
   lacking   <= ('0' & left_r) + (SLACK + 1);
   is_cut    <= valid and exceeds and not last and not header;
-  is_filled <= valid and last and not lacking(32);
+  is_filled <= valid and last and not lacking(32) and not open_r;
 
   count_down : process (clk)
   begin
     if rising_edge(clk) and valid = '1' and m_ready = '1' then
       if start = '1' then
         left_r <= not unsigned(length);
+        open_r <= '0';
+        if unsigned(not length) = 0 then
+          open_r <= '1';
+        end if;
       elsif header = '0' then
         left_r <= sum(31 downto 0);
-        if exceeds = '1' then
+        if exceeds = '1' or ends = '1' then
           left_r <= (others => '1');
         end if;
       end if;

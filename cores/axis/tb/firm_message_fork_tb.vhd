@@ -13,11 +13,15 @@ entity firm_message_fork_tb is
     SEED     : integer := 1;
     -- The chance, each cycle, that the source has no message or a sink takes none.
     STALL_PERCENT : integer := 0;
+    -- The chance, each cycle, that a message is withdrawn. Then no sink has it any more.
+    WITHDRAW_PERCENT : integer := 0;
     -- The last sink takes nothing for so many cycles at the start; the others must have the first message at once.
     BLOCKED : integer := 0);
 end entity firm_message_fork_tb;
 
 architecture simulation of firm_message_fork_tb is
+
+  constant SEGMENTS : positive := 3;
 
   type count_t is array (natural range <>) of natural;
 
@@ -30,6 +34,9 @@ architecture simulation of firm_message_fork_tb is
   signal sink_valid   : std_logic_vector(SINKS-1 downto 0);
   signal sink_ready   : std_logic_vector(SINKS-1 downto 0) := (others => '0');
 
+  signal source_segment_valid : std_logic_vector(SEGMENTS-1 downto 0) := (others => '0');
+  signal sink_segment_valid   : std_logic_vector(SINKS*SEGMENTS-1 downto 0);
+
 begin
 
   clk   <= not clk after 5 ns when not finished else '0';
@@ -37,14 +44,17 @@ begin
 
   u_fork : entity firm.firm_message_fork
     generic map (
-      SINKS => SINKS)
+      SINKS    => SINKS,
+      SEGMENTS => SEGMENTS)
     port map (
-      clk          => clk,
-      rst_n        => rst_n,
-      source_valid => source_valid,
-      source_ready => source_ready,
-      sink_valid   => sink_valid,
-      sink_ready   => sink_ready);
+      clk                  => clk,
+      rst_n                => rst_n,
+      source_valid         => source_valid,
+      source_ready         => source_ready,
+      source_segment_valid => source_segment_valid,
+      sink_valid           => sink_valid,
+      sink_ready           => sink_ready,
+      sink_segment_valid   => sink_segment_valid);
 
   -- Inputs change shortly after the edge, outputs are read at the next.
   run : process
@@ -56,26 +66,37 @@ begin
     variable was_valid  : std_logic_vector(SINKS-1 downto 0) := (others => '0');
     variable was_ready  : std_logic_vector(SINKS-1 downto 0) := (others => '0');
 
-    procedure draw (stalls : out boolean) is
+    procedure draw (percent : integer; happens : out boolean) is
       variable chance : real;
     begin
       uniform(seed_1, seed_2, chance);
-      stalls := chance * 100.0 < real(STALL_PERCENT);
+      happens := chance * 100.0 < real(percent);
     end procedure draw;
 
-    variable stalls : boolean;
+    variable stalls   : boolean;
+    variable is_shown : boolean;
+    variable is_over  : boolean := false;  -- a message was withdrawn in this cycle
+    variable shown    : std_logic_vector(SEGMENTS-1 downto 0);
   begin
     wait until rst_n = '1';
     wait until rising_edge(clk);
     while released < MESSAGES loop
       -- An offer stays until it is taken.
       wait for 1 ns;
-      draw(stalls);
-      if source_valid = '0' and not stalls then
+      draw(STALL_PERCENT, stalls);
+      if source_valid = '0' and not stalls and not is_over then
         source_valid <= '1';
       end if;
+      for segment in source_segment_valid'range loop
+        draw(50, is_shown);
+        source_segment_valid(segment) <= '0';
+        if is_shown and not is_over then
+          source_segment_valid(segment) <= '1';
+        end if;
+      end loop;
+      is_over := false;
       for sink in sink_ready'range loop
-        draw(stalls);
+        draw(STALL_PERCENT, stalls);
         sink_ready(sink) <= '1';
         if stalls or (sink = SINKS-1 and cycles < BLOCKED) then
           sink_ready(sink) <= '0';
@@ -91,6 +112,12 @@ begin
           report "a sink is offered a message that is not there" severity failure;
         assert was_valid(sink) = '0' or was_ready(sink) = '1' or sink_valid(sink) = '1'
           report "an offer was withdrawn" severity failure;
+        shown := source_segment_valid;
+        if taken(sink) > released then
+          shown := (others => '0');
+        end if;
+        assert sink_segment_valid(SEGMENTS*(sink+1)-1 downto SEGMENTS*sink) = shown
+          report "sink " & integer'image(sink) & " sees other segments" severity failure;
         if sink_valid(sink) = '1' and sink_ready(sink) = '1' then
           assert taken(sink) = released
             report "sink " & integer'image(sink) & " is given message " & integer'image(released) & " as its "
@@ -113,13 +140,19 @@ begin
             report "released before sink " & integer'image(sink) & " had it" severity failure;
         end loop;
         source_valid <= '0';
-        draw(stalls);
+        draw(STALL_PERCENT, stalls);
         if not stalls then
           source_valid <= '1' after 1 ns;
         end if;
       elsif source_valid = '1' then
         assert taken /= (taken'range => released + 1)
           report "every sink has the message, but it is not released" severity failure;
+        draw(WITHDRAW_PERCENT, is_over);
+        if is_over then
+          source_valid <= '0' after 1 ns;
+          taken        := (others => released);
+          was_valid    := (others => '0');
+        end if;
       end if;
     end loop;
 

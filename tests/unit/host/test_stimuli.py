@@ -217,3 +217,63 @@ def test_no_list_of_messages(tmp_path: Path, text: str, message: str) -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"error: there are no stimuli at .*nowhere\.yaml"):
         read_stimuli(tmp_path / "nowhere.yaml", SUBSCRIBERS)
+
+
+# --- messages of variable size ---------------------------------------------------------------------------------------
+
+VARIABLE = (
+    Converter("text", frame("std_msgs/String"), 0),
+    Converter("scan", frame("sensor_msgs/LaserScan", RosVersion.ROS2), 1),
+    Converter("status", frame("diagnostic_msgs/DiagnosticStatus", RosVersion.ROS2), 2),
+    Converter("names", frame("sensor_msgs/JointState"), 3),
+    Converter("solid", frame("shape_msgs/SolidPrimitive", RosVersion.ROS2), 4),
+)
+
+
+def read_variable(folder: Path, text: str) -> list[Stimulus]:
+    path = folder / "stimuli.yaml"
+    path.write_text(text, encoding="utf-8")
+    return read_stimuli(path, VARIABLE)
+
+
+@pytest.mark.parametrize(
+    ("word", "expected"), [("hello", "hello"), ("''", ""), ("1e3", "1e3"), ("'null'", "null"), ("é🤖", "é🤖")]
+)
+def test_texts(tmp_path: Path, word: str, expected: str) -> None:
+    (stimulus,) = read_variable(tmp_path, f"- text: {{data: {word}}}\n")
+    assert stimulus.message == {"data": expected}
+    assert stimulus.payload == len(expected.encode()).to_bytes(4, "little") + expected.encode()
+
+
+def test_arrays_of_numbers_messages_and_texts(tmp_path: Path) -> None:
+    header = "{seq: 1, stamp: {sec: 2, nsec: 3}, frame_id: map}"
+    found = read_variable(
+        tmp_path,
+        "- status: {level: 1, name: a, message: '', hardware_id: b, values: [{key: k, value: v}, {key: '', value: w}]}"
+        "\n"
+        f"- names: {{header: {header}, name: [left, right], position: [1, 2.5], velocity: [], effort: []}}\n",
+    )
+    assert found[0].message["values"] == [{"key": "k", "value": "v"}, {"key": "", "value": "w"}]
+    assert found[1].message["name"] == ["left", "right"]
+    assert (found[1].message["position"], found[1].message["effort"]) == ([1.0, 2.5], [])
+
+
+def test_what_does_not_fit_a_message_of_variable_size(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as raised:
+        read_variable(
+            tmp_path,
+            "- text: {data: }\n"
+            "- text: {data: [a]}\n"
+            "- status: {level: 1, name: a, message: a, hardware_id: b, values: {key: k}}\n"
+            "- status: {level: 1, name: a, message: a, hardware_id: b, values: [{key: k, valeu: v}]}\n"
+            "- solid: {type: 1, dimensions: [1, 2, 3, 4], polygon: {points: []}}\n"
+            "- text: {}\n",
+        )
+    assert [(fault.source.line if fault.source else 0, fault.message) for fault in raised.value.diagnostics] == [
+        (1, "'data' is a string, not nothing"),
+        (2, "'data' is a string, not a list"),
+        (3, "'values' is a list, not a mapping"),
+        (4, "'values[0]' has no field 'valeu'"),
+        (5, "'dimensions' holds at most 3, not 4"),
+        (6, "a std_msgs/String needs a value for data"),
+    ]

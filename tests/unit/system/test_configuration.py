@@ -43,8 +43,9 @@ def configuration(folder: Path, blocks: str) -> dict[str, Any]:
 
 def signals(found: dict[str, Any]) -> list[str]:
     declared = [item["name"].strip() for group in found["signals"] for item in group["declarations"]]
-    forks = [item["fork"][key] for item in found["connections"] if item["fork"] for key in ("valid", "ready")]
-    return declared + forks
+    between = [*(fork for item in found["connections"] for fork in item["forks"])]
+    between += [item["buffer"] for item in found["publishers"] if item["buffer"]]
+    return declared + [signal["name"].strip() for item in between for signal in item["signals"]]
 
 
 def mapped(block: dict[str, Any]) -> dict[str, str]:
@@ -55,7 +56,9 @@ def mapped(block: dict[str, Any]) -> dict[str, str]:
 def test_names_are_distinct(tmp_path: Path, blocks: str) -> None:
     found = configuration(tmp_path, blocks)
     labels = [block["label"] for key in ("subscribers", "publishers", "accelerators") for block in found[key]]
-    labels += [item["fork"]["label"] for item in found["connections"] if item["fork"]]
+    labels += [fork["label"] for item in found["connections"] for fork in item["forks"]]
+    labels += [item["length"]["label"] for item in found["connections"] if item["length"]]
+    labels += [item["buffer"]["label"] for item in found["publishers"] if item["buffer"]]
     own = ["u_manager", "u_scheduler", "clk", "rst_n", "s_axis_tdata", "sub_axis_tdata", found["entity"]]
     names = Counter(name.lower() for name in [*labels, *signals(found), *own])
     assert [name for name, count in names.items() if count > 1] == []
@@ -66,17 +69,12 @@ def test_every_signal_is_driven_once_and_ends_somewhere(tmp_path: Path, blocks: 
     found = configuration(tmp_path, blocks)
     targets = Counter(item["target"].strip() for group in found["connections"] for item in group["assignments"])
     assert set(targets.values()) == {1}
-    actuals = [
-        actual
-        for key in ("subscribers", "publishers", "accelerators")
-        for b in found[key]
-        for actual in mapped(b).values()
-    ]
-    forks = [item["fork"] for item in found["connections"] if item["fork"]]
+    instances = [block for key in ("subscribers", "publishers", "accelerators") for block in found[key]]
+    instances += [fork for item in found["connections"] for fork in item["forks"]]
+    instances += [item["length"] for item in found["connections"] if item["length"]]
+    instances += [item["buffer"] for item in found["publishers"] if item["buffer"]]
+    actuals = [actual for instance in instances for actual in mapped(instance).values()]
     used = {name.partition("(")[0] for name in [*targets, *actuals]}
-    used |= {
-        fork[key].partition("(")[0] for fork in forks for key in ("valid", "ready", "source_valid", "source_ready")
-    }
     assert set(signals(found)) <= used
 
 
@@ -100,19 +98,21 @@ def test_a_fork_stands_between_one_source_and_its_sinks(tmp_path: Path) -> None:
     found = configuration(tmp_path, BLOCKS)
     first, *others = found["connections"]
     assert (first["source"], first["sinks"]) == ("s", "p, acc")
-    assert first["fork"] == {
-        "label": "u_s_fork",
-        "count": 2,
-        "high": 1,
-        "valid": "s_fork_valid",
-        "ready": "s_fork_ready",
+    (fork,) = first["forks"]
+    assert fork["label"] == "u_s_fork"
+    assert [item["name"] for item in fork["signals"]] == ["s_fork_valid", "s_fork_ready"]
+    assert mapped(fork) == {
+        "clk": "clk",
+        "rst_n": "rst_n",
         "source_valid": "s_segment_valid(0)",
         "source_ready": "s_msg_ready",
+        "sink_valid": "s_fork_valid",
+        "sink_ready": "s_fork_ready",
     }
     pairs = {item["target"].strip(): item["source"] for item in first["assignments"]}
     assert pairs["acc_in0_msg_valid"] == "s_fork_valid(1)"
     assert pairs["s_fork_ready(0)"] == "p_msg_ready"
-    assert all(item["fork"] is None for item in others)
+    assert all(item["forks"] == [] for item in others)
 
 
 def test_the_text_is_the_same_every_time(tmp_path: Path) -> None:

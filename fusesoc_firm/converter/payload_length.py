@@ -1,0 +1,215 @@
+"""Frame -> configuration of `<pkg>_<type>_length`, which computes a payload's length from the lengths of its parts.
+
+The dissertation's listing 6.5 as hardware, with ROS's own sizes: nothing is sent in front of a nested message, and CDR
+pads. What every element adds does not depend on where it lies, so it is a sum; padding only depends on positions modulo
+the largest alignment, so it is a chain of two or three bits beside that sum.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from fusesoc_firm.converter.message_ports import LENGTH_BITS, message_side
+from fusesoc_firm.converter.ports import ros_path, vhdl_type
+from fusesoc_firm.frame.length import Align, Bytes, Repeat, Term, sent_length_of
+from fusesoc_firm.frame.model import Data, Frame, Loop, Path
+from fusesoc_firm.naming import entity_name
+
+Configuration = dict[str, Any]
+
+LENGTH_TEMPLATE = "vhdl/payload_length.vhd"
+
+_SIGNAL = re.compile(r"[a-z]+_\d+")
+
+
+@dataclass(frozen=True)
+class Statement:
+    """An assignment of `value` to an unsigned signal of `bits` bits, called by a word and a number."""
+
+    word: str
+    number: int
+    bits: int
+    value: str
+    comment: str
+
+    @property
+    def signal(self) -> str:
+        """The signal's name."""
+        return f"{self.word}_{self.number}"
+
+
+def length_entity(frame: Frame, suffix: str = "") -> str:
+    """`<pkg>_<type>_length`, and what tells apart those of different parts."""
+    return f"{entity_name(frame.message.package, frame.message.name)}_length{suffix}"
+
+
+def length_ports(frame: Frame) -> tuple[str, ...]:
+    """The message side's ports that determine the payload's length, of a frame whose length is computed."""
+    side = message_side(frame)
+    return tuple(side.length(part) for part in _counted_parts(sent_length_of(frame).terms))
+
+
+def payload_length_configuration(frame: Frame, suffix: str = "") -> Configuration:
+    """The configuration of `<pkg>_<type>_length`, of a frame whose length is computed."""
+    length = sent_length_of(frame)
+    assert length.is_computed, f"the lengths at the ports of {frame.message} do not determine its payload's"
+    parts = _counted_parts(length.terms)
+    names = dict(zip((part.path for part in parts), length_ports(frame), strict=True))
+    # Positions count from behind the prefix.
+    total = _Sum(_modulus(length.terms), {path: f"unsigned({name})" for path, name in names.items()}, [])
+    total.add(length.terms)
+    total.add_bytes(length.prefix)
+    column = max(len(name) for name in ["payload_length", *names.values()])
+    return {
+        "entity": length_entity(frame, suffix),
+        "message": str(frame.message),
+        "ros": int(frame.ros),
+        "summand_count": len(total.elements),
+        "has_paddings": total.modulus > 1,
+        "chain_length": _chain_length(total.statements),
+        "place_bits": total.modulus.bit_length() - 1,
+        "ports": [
+            {
+                "name": names[part.path].ljust(column),
+                "type": vhdl_type(LENGTH_BITS),
+                "comment": f"{ros_path(part.path)}: {part.ros_type}",
+            }
+            for part in parts
+        ],
+        "payload_length": "payload_length".ljust(column),
+        "type": vhdl_type(LENGTH_BITS),
+        "has_signals": bool(total.statements),
+        "signals": _declarations(total.statements),
+        "statements": [
+            {"target": item.signal, "value": item.value, "has_comment": bool(item.comment), "comment": item.comment}
+            for item in total.statements
+        ],
+        "elements": [{"name": name} for name in total.elements],
+        "rest": " + ".join([f"to_unsigned({total.constant}, {total.rest_bits})", *total.paddings]),
+        "rest_high": total.rest_bits - 1,
+    }
+
+
+def _declarations(statements: Sequence[Statement]) -> list[Configuration]:
+    column = max((len(item.signal) for item in statements), default=0)
+    return [{"name": item.signal.ljust(column), "high": item.bits - 1} for item in statements]
+
+
+def _chain_length(statements: Sequence[Statement]) -> int:
+    """How many paddings follow from each other at most."""
+    lengths: dict[str, int] = {}
+    for item in statements:
+        before = [lengths[name] for name in _SIGNAL.findall(item.value) if name in lengths]
+        lengths[item.signal] = max(before, default=0) + (item.word == "padding")
+    return max(lengths.values(), default=0)
+
+
+def _modulus(terms: Sequence[Term]) -> int:
+    """The largest alignment; 1 if there is none."""
+    inner = [_modulus(term.body) for term in terms if isinstance(term, Repeat)]
+    return max([1, *inner, *(term.alignment for term in terms if isinstance(term, Align))])
+
+
+def _counted_parts(terms: Sequence[Term]) -> list[Data | Loop]:
+    """The parts of any number of elements that take bytes."""
+    return [
+        term.part
+        for term in terms
+        if isinstance(term, Repeat) and term.body and not (isinstance(term.part, Loop) and term.part.count is not None)
+    ]
+
+
+@dataclass
+class _Sum:
+    """Terms added up, and the statements that this takes.
+
+    The sum is that of the signals `elements` and `paddings` and of `constant`. The position behind it, modulo
+    `modulus`, is that of `origin`, signals of so many bits, and `offset`. `counts` has the number of elements by path.
+    """
+
+    modulus: int
+    counts: Mapping[Path, str]
+    statements: list[Statement]
+    origin: list[str] = field(default_factory=list)
+    offset: int = 0
+    elements: list[str] = field(default_factory=list)
+    paddings: list[str] = field(default_factory=list)
+    constant: int = 0
+
+    @property
+    def rest_bits(self) -> int:
+        """Bits of all but the elements."""
+        return max(1, (self.constant + len(self.paddings) * self.modulus).bit_length())
+
+    def add(self, terms: Sequence[Term]) -> None:
+        """Add terms that are always there."""
+        for term in terms:
+            match term:
+                case Bytes(count):
+                    self.add_bytes(count)
+                case Align(alignment) if self.origin:
+                    self._add_padding(alignment)
+                case Align(alignment):
+                    self.add_bytes(-self.offset % alignment)
+                case Repeat(part=Loop(count=int() as count), stride=int() as stride):
+                    if count:
+                        self.add(term.body)
+                        self.add_bytes((count - 1) * stride)
+                case Repeat() if term.body:
+                    self._add_elements(term)
+
+    def add_bytes(self, count: int) -> None:
+        """Add bytes whose number is known."""
+        self.constant += count
+        self.offset += count
+
+    def _add_padding(self, alignment: int) -> None:
+        offset = self.offset % self.modulus
+        position = " + ".join([*self.origin, *([str(offset)] if offset else [])])
+        place = self._state("place", self.modulus, position, f"up to a multiple of {alignment}")
+        bits = place if alignment == self.modulus else _low(place, alignment)
+        padding = self._state("padding", alignment, f"0 - {bits}")
+        self.paddings.append(padding)
+        self.origin = [] if alignment == self.modulus else [place, padding]
+        self.offset = 0
+
+    def _add_elements(self, term: Repeat) -> None:
+        """Add any number of elements, of which the first may take more or less than each further one."""
+        assert term.stride is not None
+        count = self.counts[term.part.path]
+        first = replace(self, origin=[*self.origin], paddings=[], constant=-term.stride)
+        first.add(term.body)
+        value = " + ".join([_times(count, term.stride), *first.paddings])
+        is_uniform = not first.paddings and not first.constant
+        if not is_uniform:
+            value += f" {'-' if first.constant < 0 else '+'} {abs(first.constant)}" if first.constant else ""
+            value += f" when {count} /= 0 else (others => '0')"
+        words = f"{ros_path(term.part.path)}: {term.part.ros_type}"
+        elements = self._state("bytes", 2**LENGTH_BITS, value, words)
+        self.elements.append(elements)
+        if term.stride % self.modulus or not is_uniform:
+            self.origin.append(_low(elements, self.modulus))
+
+    def _state(self, word: str, modulus: int, value: str, comment: str = "") -> str:
+        """A signal for values below `modulus`, and the statement that assigns it."""
+        number = sum(statement.word == word for statement in self.statements)
+        statement = Statement(word, number, modulus.bit_length() - 1, value, comment)
+        self.statements.append(statement)
+        return statement.signal
+
+
+def _low(signal: str, modulus: int) -> str:
+    """A signal modulo a power of two."""
+    return f"{signal}({modulus.bit_length() - 2} downto 0)"
+
+
+def _times(count: str, stride: int) -> str:
+    """`count` elements of `stride` bytes."""
+    if stride == 1:
+        return count
+    if stride.bit_count() == 1:
+        return f"shift_left({count}, {stride.bit_length() - 1})"
+    return f"resize({count} * {stride}, {LENGTH_BITS})"
