@@ -41,8 +41,9 @@ class LoadedSystem:
         return source_files(self.specification, self.folder) + self._message_files()
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
-        """Every message of a converter, with the definitions of it and all within it."""
-        return [(frame.message, self.libraries[frame.ros].closure(frame.message)) for frame in self.system.frames]
+        """Every message of a converter once, whichever of its fields are used, with all definitions within it."""
+        messages = dict.fromkeys((frame.ros, frame.message) for frame in self.system.frames)
+        return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
 
     def _message_files(self) -> list[Path]:
         found: list[Path] = []

@@ -120,6 +120,7 @@ def test_parts_cost_what_is_used(parts_system: GeneratedSystem) -> None:
     }
     position, orientation = [f"position_{axis}" for axis in "xyz"], [f"orientation_{axis}" for axis in "xyzw"]
     assert ports == {
+        "geometry_msgs_pose_pkg": [],
         "axis_to_geometry_msgs_pose": position + orientation,
         "axis_to_geometry_msgs_pose_part_sub": ["position_x", *orientation],
         "axis_to_geometry_msgs_pose_other_sub": position,
