@@ -129,7 +129,7 @@ class _Publisher:
     def _check_size(self) -> None:
         if (self.end + 1) * self.width > _LARGEST_NATURAL:
             fail(
-                f"the fields of {self.frame.message} take {(self.end + 1) * self.lanes} bytes, too many for a converter",
+                f"{self.frame.message} has {(self.end + 1) * self.lanes} bytes of fields, too many for a converter",
                 hint=f"at most {_LARGEST_NATURAL // 8}: VHDL counts the bits of the fields up to 2**31-1",
             )
 

@@ -40,7 +40,8 @@ def with_lengths(
         source = connection.source
         (side,) = (side for side in outputs[source.block] if side.prefix == source.prefix)
         _check_whole(connection, side, connections, blocks, faults)
-        length = side.length or _subscriber_length(connection.frame)
+        is_sent = any(blocks[sink.block].type is None for sink in connection.sinks)
+        length = side.length or _subscriber_length(connection.frame, is_sent=is_sent)
         if connection.frame != select(connection.frame):
             # Outputs of the same parts share the entity of the first.
             suffix = suffixes.setdefault(connection.frame, f"_{identifier(source.block).lower()}")
@@ -71,10 +72,13 @@ def _check_whole(
             faults.error(text, place, "a message of variable size comes from one block")
 
 
-def _subscriber_length(frame: Frame) -> PayloadLength:
-    """How the length of what a subscriber gives is known: it has that of the whole message."""
+def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
+    """How the length of what a subscriber gives is known: it has that of the whole message.
+
+    Without all its parts a message that is sent on (`is_sent`) has another one; to an accelerator it is what came.
+    """
     unused = [node for node in all_nodes(frame.nodes) if isinstance(node, Data | Loop) and not node.is_used]
-    if not unused:
+    if not unused or not is_sent:
         return PayloadLength(LengthSource.GIVEN, "the subscriber has it")
     length = sent_length_of(frame)
     if length.minimum == length.maximum:
