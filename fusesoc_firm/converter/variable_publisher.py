@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby, pairwise
+from textwrap import shorten
 from typing import Any
 
 from fusesoc_firm.converter.message_ports import MessagePort, MessageSide, message_ports, message_side
@@ -559,7 +560,7 @@ def _about(area: _Area) -> str:
         Padding: "",
         End: "",
     }[type(area.step)]
-    return f"{kind} {comment(area.step)}".strip()
+    return shorten(f"{kind} {comment(area.step)}", _LINE, placeholder=" ...")
 
 
 def _bits(piece: Slice) -> str:

@@ -36,6 +36,7 @@ from tests.unit.frame.oracle import Oracle
 from tests.unit.frame.stimuli import EMPTY, EXTREME, TYPICAL, Stimuli
 from tests.unit.frame.variable_samples import PACKAGE, VARIABLE
 
+HERE = Path(__file__).parent
 ID = 0xA5
 # rosbags knows no wstring: the second one is the same on the wire.
 WIDE, UNITS = f"{PACKAGE}/Wides", f"{PACKAGE}/Units"
@@ -55,6 +56,7 @@ class PublisherBench:
 
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(core_files("axis/axis", "sim/host"))
+        Library("bench", self.directory).analyse([HERE / "message_source.vhd"])
 
     def publisher(self, ros: RosVersion, name: str, width: int = 8) -> Publisher:
         """The publisher of a message with its bench, generated and analysed once."""
@@ -164,10 +166,9 @@ class Publisher:
 
     def analyse_bench(self) -> None:
         """Analyse the bench alone, as is needed after the publisher was replaced."""
-        here = Path(__file__).parent
         file = self.library.directory / self.library.name / f"{self.entity}_tb.vhd"
-        file.write_text(render("variable_publisher_tb.vhd", self._configuration(), here), encoding="ascii")
-        self.library.analyse([here / "message_source.vhd", file])
+        file.write_text(render("variable_publisher_tb.vhd", self._configuration(), HERE), encoding="ascii")
+        self.library.analyse([file])
 
     @cached_property
     def groups(self) -> list[Group]:
