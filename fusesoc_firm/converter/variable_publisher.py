@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby, pairwise
+from textwrap import shorten
 from typing import Any
 
 from fusesoc_firm.converter.message_ports import MessagePort, MessageSide, message_ports, message_side
@@ -250,16 +251,19 @@ class _Publisher:
                 length = self.side.length(part)
                 more = part.terminator if isinstance(part, Data) else 0
                 yield 0, COUNT_BYTES, f"std_logic_vector(unsigned({length}) + {more})" if more else length
-            case Block(fields=fields, constants=constants):
-                for leaf in fields:
-                    for piece in self._slices(leaf):
-                        bits = _bits(piece)
-                        yield piece.offset, piece.bytes, f'"0000000" & {bits}' if _is_bit(piece) else bits
-                for offset, data in constants:
-                    for start in range(0, len(data), _LITERAL_BYTES):
-                        part_of = data[start : start + _LITERAL_BYTES]
-                        if any(part_of):
-                            yield offset + start, len(part_of), f'x"{part_of[::-1].hex()}"'
+            case Block():
+                yield from self._block_values(step)
+
+    def _block_values(self, block: Block) -> Iterator[tuple[int, int, str]]:
+        for leaf in block.fields:
+            for piece in self._slices(leaf):
+                bits = _bits(piece)
+                yield piece.offset, piece.bytes, f'"0000000" & {bits}' if _is_bit(piece) else bits
+        for offset, data in block.constants:
+            for start in range(0, len(data), _LITERAL_BYTES):
+                part_of = data[start : start + _LITERAL_BYTES]
+                if any(part_of):
+                    yield offset + start, len(part_of), f'x"{part_of[::-1].hex()}"'
 
     def _slices(self, leaf: FrameField) -> Iterator[Slice]:
         port = self.side.field(leaf)
@@ -403,6 +407,7 @@ class _Publisher:
             case Data():
                 value = "left_ends"
             case Loop(count=None):
+                assert isinstance(area.step, Open)
                 value = self._elements_carry(len(area.step.scope) + 1)
             case _:
                 value = "'0'"
@@ -558,7 +563,7 @@ def _about(area: _Area) -> str:
         Padding: "",
         End: "",
     }[type(area.step)]
-    return f"{kind} {comment(area.step)}".strip()
+    return shorten(f"{kind} {comment(area.step)}", _LINE, placeholder=" ...")
 
 
 def _bits(piece: Slice) -> str:

@@ -203,7 +203,9 @@ entity frame_sink is
   generic (
     WIDTH         : positive;
     SEED          : positive;
-    STALL_PERCENT : natural
+    STALL_PERCENT : natural;
+    -- Ready only once `tvalid` was seen, which must not wait for it.
+    LATE_READY    : boolean
   );
   port (
     clk    : in  std_logic;
@@ -241,7 +243,7 @@ begin
     loop
       uniform(random_1, random_2, draw);
       ready_r <= '0';
-      if 100.0 * draw >= real(STALL_PERCENT) then
+      if 100.0 * draw >= real(STALL_PERCENT) and (is_stuck or not LATE_READY) then
         ready_r <= '1';
       end if;
       wait until rising_edge(clk);

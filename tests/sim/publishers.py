@@ -36,6 +36,7 @@ from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.unit.frame.oracle import Oracle
 from tests.unit.frame.variable_samples import PACKAGE, VARIABLE
 
+HERE = Path(__file__).parent
 ID = 0xA5
 # rosbags knows no wstring: the second one is the same on the wire.
 WIDE, UNITS = f"{PACKAGE}/Wides", f"{PACKAGE}/Units"
@@ -55,6 +56,7 @@ class PublisherBench:
 
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(core_files("axis/axis", "sim/host"))
+        Library("bench", self.directory).analyse([HERE / "message_source.vhd"])
 
     def publisher(self, ros: RosVersion, name: str, width: int = 8) -> Publisher:
         """The publisher of a message with its bench, generated and analysed once."""
@@ -164,10 +166,9 @@ class Publisher:
 
     def analyse_bench(self) -> None:
         """Analyse the bench alone, as is needed after the publisher was replaced."""
-        here = Path(__file__).parent
         file = self.library.directory / self.library.name / f"{self.entity}_tb.vhd"
-        file.write_text(render("variable_publisher_tb.vhd", self._configuration(), here), encoding="ascii")
-        self.library.analyse([here / "message_source.vhd", file])
+        file.write_text(render("variable_publisher_tb.vhd", self._configuration(), HERE), encoding="ascii")
+        self.library.analyse([file])
 
     @cached_property
     def groups(self) -> list[Group]:
@@ -311,10 +312,10 @@ class Publisher:
         size = source.randrange(len(data))
         zeroed = copy.deepcopy(value)
         self._zero(self.frame.nodes, zeroed, 0, self.streams[part].part, [place], size)
-        streams = {**message.streams, part: list(message.streams[part])}
+        streams = list(message.streams[part])
         # What holds no byte is still closed.
-        streams[part][place] = self.beats(data[:size]) or [Beat(b"", True)]
-        return replace(message, streams=streams, payload=self._payload(zeroed), error=SHORT)
+        streams[place] = self.beats(data[:size]) or [Beat(b"", True)]
+        return replace(message, streams={**message.streams, part: streams}, payload=self._payload(zeroed), error=SHORT)
 
     def _zero(self, nodes: Sequence[Node], value: Any, depth: int, part: Data, left: list[int], size: int) -> None:
         """Zeros in place of all behind the first `size` bytes of stream number `left[0]` of `part`."""
@@ -337,9 +338,9 @@ class Publisher:
     def _with_long_stream(self, message: Message, part: int, place: int, source: random.Random) -> Message:
         """A stream goes on behind its length: that is dropped."""
         data = b"".join(beat.data for beat in message.streams[part][place])
-        streams = {**message.streams, part: list(message.streams[part])}
-        streams[part][place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
-        return replace(message, streams=streams, error=LONG)
+        streams = list(message.streams[part])
+        streams[place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
+        return replace(message, streams={**message.streams, part: streams}, error=LONG)
 
     def _without_last(self, message: Message, part: int, source: random.Random) -> Message:
         """The last element of an array does not say so."""

@@ -33,6 +33,7 @@ _SHARED = {
         f"uint8 {word}\n" for word in "data index word valid last ready count length place header size step".split()
     )
     + "uint8[] words\nstring text\nPlain[] elements\nstring left\nuint8 max\nuint8 lanes\n",
+    "Giant": "uint8[5000] before\nuint16 some\nstring name\nfloat64[3000] behind\nuint32 last\nuint8[1] odd\n",
     "Wide": "uint8[200] block\nstring text\nfloat32[50] numbers\n",
 }
 _ROS1 = {"Times": "time stamp\ntime[2] stamps\nstring text\nduration[3] spans\nuint8[] data\n"}
