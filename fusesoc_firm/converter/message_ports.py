@@ -19,16 +19,16 @@ from dataclasses import dataclass, field
 from fusesoc_firm.converter.ports import FieldPort, field_ports, port_width, ros_path, vhdl_type
 from fusesoc_firm.converter.program import Program, Scope, has_bytes, subscriber_program
 from fusesoc_firm.converter.reserved import reserved_names
+from fusesoc_firm.converter.steps import SET_NAMES
 from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
 from fusesoc_firm.naming import identifier
 
 LENGTH_BITS = 32
 
 _TEMPLATES = ("vhdl/variable_subscriber.vhd", "vhdl/variable_publisher.vhd")
-# What is numbered in the templates' configurations, and the tables there.
-_NUMBERED = re.compile(
-    r".*_r|payload_length|(closing|elements)_\d+(_\w+)?|step_(is|has|closes|opens|aligns)_\w+", re.IGNORECASE
-)
+# What is numbered in the templates' configurations. With a number behind it no such name is another one.
+_NUMBERED = re.compile(r".*_r|closing_\d+|elements_\d+(_[a-z]+)?", re.IGNORECASE)
+_TAKEN = reserved_names(*_TEMPLATES) | SET_NAMES | {"payload_length"}
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class _Naming:
 
     program: Program
     parts: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(default_factory=dict)
-    taken: set[str] = field(default_factory=lambda: set(reserved_names(*_TEMPLATES)))
+    taken: set[str] = field(default_factory=lambda: set(_TAKEN))
 
     def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
         """Name all parts, also those that are not used: what else is used does not change a name."""

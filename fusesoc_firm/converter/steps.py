@@ -111,6 +111,8 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("HAS_8", "Its elements have 8 bytes.", _size_is(8)),
 )
 _ALWAYS_THERE = 2
+# What the sets are called in VHDL, in lower case.
+SET_NAMES = frozenset(f"step_{name}".lower() for name, _, _ in _SETS)
 
 
 def step_sets(steps: Sequence[Step]) -> list[Configuration]:

@@ -164,3 +164,9 @@ def test_names_of_ports_are_distinct_and_stay_with_other_fields(ros: RosVersion)
 def test_a_name_gives_way_to_a_port() -> None:
     side = message_side(made(ROS1, "uint8[] data\nuint32 data_length\nuint8 payload_length\nuint8 clk\n"))
     assert [part.name for part in side.parts] == ["data", "data_length_2", "payload_length_2", "clk_2"]
+
+
+@pytest.mark.parametrize("word", ["closing_1", "elements_1", "elements_1_sum", "step_is_open", "step_r", "left_0_r"])
+def test_names_that_the_templates_number_are_taken(word: str) -> None:
+    side = message_side(made(ROS1, f"uint8[] data\nuint8 {word}\n"))
+    assert [part.name for part in side.parts] == ["data", f"{word}_2"]
