@@ -28,12 +28,13 @@ _TAKEN = frozenset(
     """
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
-    END_PLACE BAD_LENGTH SHORT_PART LONG_PART all_words word_index this_word word_size sent_size is_supplied
-    is_withdrawn is_ending is_start is_header announced is_offered is_accepted is_done is_jumping jump_target is_short is_long
-    left_step left_sum left_ends in_stream stream_last stream_keep stream_size stream_more stream_done
-    is_closing element_last elements_end phase_left padding_size in_padding repeat_last is_repeated trim_ready is_cut
-    is_filled pack_data pack_count pack_last pack_valid pack_ready u_select walk_places count_bytes
-    watch_stream check_stream check_element stream_short stream_long elements_short elements_long count_elements give_up count_phase count_repeats report_fault u_trim u_pack lanes_kept
+    end_place bad_length short_part long_part all_words word_index this_word word_size sent_size is_supplied
+    is_withdrawn is_ending is_start is_header announced is_offered is_accepted is_done is_jumping jump_target
+    is_short is_long left_step left_sum left_ends in_stream stream_last stream_keep stream_size stream_more
+    stream_done is_closing element_last elements_end phase_left padding_size in_padding repeat_last is_repeated
+    trim_ready is_cut is_filled pack_data pack_count pack_last pack_valid pack_ready u_select walk_places
+    count_bytes watch_stream check_stream check_element stream_short stream_long elements_short elements_long
+    count_elements give_up count_phase count_repeats report_fault u_trim u_pack lanes_kept
     segment_valid msg_valid msg_ready frame_error frame_error_code payload_length id
     rtl firm ieee work std numeric_std std_logic_1164 std_logic std_logic_vector unsigned natural positive integer
     boolean to_unsigned to_integer resize shift_left shift_right rising_edge failure true false

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity
-from fusesoc_firm.converter.message_ports import ElementPorts, StreamPorts, message_ports, message_side
+from fusesoc_firm.converter.message_ports import StreamPorts, message_ports, message_side
 from fusesoc_firm.converter.program import Block, Count, Header, Scope, publisher_program
 from fusesoc_firm.converter.variable_publisher import (
     VARIABLE_PUBLISHER_TEMPLATE,
@@ -256,7 +256,9 @@ class Publisher:
 
     # --- messages -----------------------------------------------------------------------------------------------
 
-    def values(self, count: int, source: random.Random, kinds: Sequence[str] = KINDS, longest: int = 4) -> list[dict[str, Any]]:
+    def values(
+        self, count: int, source: random.Random, kinds: Sequence[str] = KINDS, longest: int = 4
+    ) -> list[dict[str, Any]]:
         """Values of these kinds by turns."""
         name = parse_name(self.name)
         stimuli = Stimuli(self.oracle.closure(self.name), self.oracle.ros, source, longest)
@@ -310,10 +312,10 @@ class Publisher:
         size = source.randrange(len(data))
         zeroed = copy.deepcopy(value)
         self._zero(self.frame.nodes, zeroed, 0, self.streams[part].part, [place], size)
-        streams = {**message.streams, part: list(message.streams[part])}
+        found = list(message.streams[part])
         # What holds no byte is still closed.
-        streams[part][place] = self.beats(data[:size]) or [Beat(b"", True)]
-        return replace(message, streams=streams, payload=self._payload(zeroed), error=SHORT)
+        found[place] = self.beats(data[:size]) or [Beat(b"", True)]
+        return replace(message, streams={**message.streams, part: found}, payload=self._payload(zeroed), error=SHORT)
 
     def _zero(self, nodes: Sequence[Node], value: Any, depth: int, part: Data, left: list[int], size: int) -> None:
         """Zeros in place of all behind the first `size` bytes of stream number `left[0]` of `part`."""
@@ -336,9 +338,9 @@ class Publisher:
     def _with_long_stream(self, message: Message, part: int, place: int, source: random.Random) -> Message:
         """A stream goes on behind its length: that is dropped."""
         data = b"".join(beat.data for beat in message.streams[part][place])
-        streams = {**message.streams, part: list(message.streams[part])}
-        streams[part][place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
-        return replace(message, streams=streams, error=LONG)
+        found = list(message.streams[part])
+        found[place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
+        return replace(message, streams={**message.streams, part: found}, error=LONG)
 
     def _without_last(self, message: Message, part: int, source: random.Random) -> Message:
         """The last element of an array does not say so."""
@@ -347,9 +349,7 @@ class Publisher:
         elements[place] = False, elements[place][1]
         return replace(message, elements={**message.elements, part: elements}, error=LONG)
 
-    def _with_early_last(
-        self, value: Mapping[str, Any], message: Message, part: int, source: random.Random
-    ) -> Message:
+    def _with_early_last(self, value: Mapping[str, Any], message: Message, part: int, source: random.Random) -> Message:
         """An array ends before its length is reached: what follows the element is zeros."""
         loop = self.groups[part].scope[-1]
         total = len(message.elements[part])

@@ -1,10 +1,11 @@
-"""Publishers of messages of variable size in simulation: every byte, faults of the message side, throughput, netlists."""
+"""Publishers of messages of variable size in simulation: bytes, faults of the message side, throughput, netlists."""
 
 from __future__ import annotations
 
 import random
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,11 @@ from fusesoc_firm.converter.variable_publisher import (
     VARIABLE_PUBLISHER_TEMPLATE,
     variable_publisher_configuration,
 )
-from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.render import render
 from tests.sim.ghdl import Library, core_files
 from tests.sim.publishers import ID, SHORT, Publisher, PublisherBench
-from tests.unit.frame.oracle import parsed
 from tests.unit.frame.stimuli import EMPTY, EXTREME, TYPICAL
 from tests.unit.frame.variable_samples import PACKAGE, VARIABLE
 
@@ -56,7 +54,8 @@ _KIND_CASES += [(ROS1, f"{PACKAGE}/Times"), (ROS2, f"{PACKAGE}/Wides"), (ROS2, f
 SAMPLE = [case(ros, name, 8) for ros in RosVersion for name in [*_FROM_DISTRIBUTIONS[ros], *_AWKWARD[ros]]]
 SAMPLE += [case(ros, name, 64) for ros in RosVersion for name in _FROM_DISTRIBUTIONS[ros]]
 SAMPLE += [case(ros, name, width) for width in WIDTHS if width > 8 for ros, name in _KIND_CASES]
-TROUBLED = [case(ros, name, width) for width in (8, 16, 64, 512) for ros, name in _KIND_CASES]
+TROUBLED = [case(ros, name, width) for width in (8, 64) for ros, name in _KIND_CASES]
+TROUBLED += [case(ros, f"{PACKAGE}/Tree", width) for width in (16, 32, 512) for ros in RosVersion]
 TROUBLED += [case(ros, f"sensor_msgs/{name}", 8) for ros in RosVersion for name in ("Image", "PointCloud2")]
 NETLISTS = [
     case(ROS1, "sensor_msgs/Image", 8),
@@ -93,8 +92,7 @@ def test_faults_hurt_no_other_frame(
     print(f"seed {SEED}")
     source = random.Random(f"{SEED} {name} {width}")
     messages = [publisher.faulty(value, source) for value in publisher.values(40, source, [TYPICAL], 7)]
-    codes = {message.error for message in messages}
-    assert codes >= {0, 1, 2}
+    assert len({message.error for message in messages}) >= 3
     publisher.run(tmp_path, messages, SEED=SEED)
     publisher.run(tmp_path, messages, SEED=SEED, STALL_PERCENT=30, SINK_STALL_PERCENT=40)
 
@@ -124,7 +122,7 @@ def test_a_stream_moves_a_beat_a_cycle(bench: PublisherBench, tmp_path: Path, ro
     messages = [publisher.good({"data": random.Random(SEED).randbytes(count * width // 8)}) for count in beats]
     result = publisher.run(tmp_path, messages, SEED=SEED)
     taken = [int(cycle) for cycle in re.findall(r"^taken \d+ cycle (\d+)$", result.output, re.MULTILINE)]
-    cycles = [end - start for start, end in zip(taken, taken[1:], strict=False)]
+    cycles = [end - start for start, end in pairwise(taken)]
     assert (cycles[0] - cycles[1], cycles[2] - cycles[1]) == (40 - 3, 1040 - 3)
 
 
@@ -143,7 +141,7 @@ def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Ros
     result = publisher.run(tmp_path, [publisher.good(value)] * 3, SEED=SEED)
     taken = [int(cycle) for cycle in re.findall(r"^taken \d+ cycle (\d+)$", result.output, re.MULTILINE)]
     expected = {(ROS1, 8): 115, (ROS1, 64): 30, (ROS2, 8): 131, (ROS2, 64): 38}[ros, width]
-    assert [end - start for start, end in zip(taken, taken[1:], strict=False)] == [expected] * 2
+    assert [end - start for start, end in pairwise(taken)] == [expected] * 2
 
 
 @pytest.mark.parametrize("width", [8, 64])
