@@ -1,7 +1,7 @@
-"""Frame -> configuration of the publisher of a message of variable size: its program as a row of places.
+"""Frame -> configuration of the publisher of a message of variable size.
 
-A place is a word of up to a beat of bytes, or a moment of the program that has none: the opening of a part, a stream,
-padding, the end of an element. The publisher goes from place to place; one multiplexer chooses the place's word.
+The publisher goes through the places of its program (`places`); a multiplexer chooses the word of the place. Whatever
+depends on the place is a ladder of conditions, a line a step.
 """
 
 from __future__ import annotations
@@ -9,23 +9,21 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby, pairwise
+from itertools import groupby
 from textwrap import shorten
 from typing import Any
 
-from fusesoc_firm.converter.message_ports import MessagePort, MessageSide, message_ports, message_side
+from fusesoc_firm.converter.message_ports import MessagePort, MessageSide, StreamPorts, message_ports, message_side
+from fusesoc_firm.converter.places import Area, Places, size_of
 from fusesoc_firm.converter.ports import FieldPort
 from fusesoc_firm.converter.program import (
     Block,
     Close,
     Count,
-    End,
     Guard,
     Header,
     Open,
     Padding,
-    Program,
-    Scope,
     Segment,
     Step,
     Stream,
@@ -40,61 +38,43 @@ Configuration = dict[str, Any]
 
 VARIABLE_PUBLISHER_TEMPLATE = "vhdl/variable_publisher.vhd"
 
-# So many words of zeros in a row, and more, are one place that is sent as often.
-_ROW = 4
-# A literal of zeros and ones is no longer than this: GHDL's Verilog loses the low half of some that are longer.
+# A literal is no longer: GHDL's Verilog loses the low half of some that are.
 _LITERAL_BYTES = 4
 _COUNTER_BITS = 32
-# About so long are lines of conditions.
+# About so long are lines of conditions and of the list of places.
 _LINE = 80
 _LARGEST_NATURAL = 2**31 - 1
+_ZEROS = "(others => '0')"
 
 
 def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> Configuration:
     """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
-    return {"entity": entity, **_Publisher(publisher_program(frame), message_side(frame), width).configuration()}
-
-
-@dataclass(frozen=True)
-class _Row:
-    """Bytes `offset` to `offset + size - 1` of a step, in words from `place` on.
-
-    Where `times` is more than 1, that is how often the one word of zeros is sent, which then is `size`.
-    """
-
-    offset: int
-    size: int
-    place: int
-    times: int = 1
-
-
-@dataclass(frozen=True)
-class _Area:
-    """The places of a step: `rows` has those with bytes that are known before."""
-
-    number: int
-    step: Step
-    first: int
-    last: int
-    rows: tuple[_Row, ...] = ()
+    places = Places(publisher_program(frame), width // 8)
+    if (places.end + 1) * width > _LARGEST_NATURAL:
+        fail(
+            f"the fields of {frame.message} take {places.end * places.lanes} bytes, too many for a converter",
+            hint=f"at most {_LARGEST_NATURAL // 8}: VHDL counts the bits of all fields up to 2**31-1",
+        )
+    return {"entity": entity, **_Publisher(places, message_side(frame), width).configuration()}
 
 
 @dataclass(frozen=True)
 class _Publisher:
-    program: Program
+    places: Places
     side: MessageSide
     width: int
 
     @property
     def frame(self) -> Frame:
-        return self.program.frame
+        return self.places.program.frame
 
     @property
     def lanes(self) -> int:
-        return self.width // 8
+        return self.places.lanes
 
     def configuration(self) -> Configuration:
-        self._check_size()
+        end = self.places.end
+        checked = [name for name, found in [("stream", self._streams), ("elements", self._closings)] if found]
         return {
             "message": str(self.frame.message),
             "ros": int(self.frame.ros),
@@ -108,183 +88,93 @@ class _Publisher:
             "ports": _port_declarations(message_ports(self.frame, self.width)),
             "segment_high": self.side.segments - 1,
             "slack": self.frame.trailing_bytes,
-            "areas": self._listed(),
-            "end": self.end,
-            "end_bits": self.end.bit_length(),
-            "place_high": self.end.bit_length() - 1,
-            "word_count": self.end + 1,
-            "words_high": (self.end + 1) * self.width - 1,
-            "header_last": self._areas[0].last,
-            "pieces": _columns(self._pieces()),
+            "areas": _listed(self.places),
+            "end": end,
+            "end_bits": end.bit_length(),
+            "place_high": end.bit_length() - 1,
+            "word_count": end + 1,
+            "words_high": (end + 1) * self.width - 1,
+            "header_last": self.places.areas[0].last,
+            "pieces": _columns(list(self._pieces())),
             "supplies": _ladder(self._supplies(), "'0'"),
-            "sizes": _ladder(self._sizes(), self._size(self.lanes)),
-            "short_parts": "".join(f" or {part}_short" for part in self._checked),
-            "long_parts": " or ".join(f"{part}_long" for part in self._checked) or "'0'",
-            **self._repeats(),
-            **self._streams(),
-            **self._loops(),
-            **self._opens(),
-            **self._paddings(),
+            "sizes": _ladder(self._sizes(), self._size(0)),
+            "short_parts": "".join(f" or {part}_short" for part in checked),
+            "long_parts": " or ".join(f"{part}_long" for part in checked) or "'0'",
+            **self._repeat_keys(),
+            **self._stream_keys(),
+            **self._opening_keys(),
+            **self._loop_keys(),
+            **self._padding_keys(),
         }
-
-    def _check_size(self) -> None:
-        if (self.end + 1) * self.width > _LARGEST_NATURAL:
-            fail(
-                f"{self.frame.message} has {(self.end + 1) * self.lanes} bytes of fields, too many for a converter",
-                hint=f"at most {_LARGEST_NATURAL // 8}: VHDL counts the bits of the fields up to 2**31-1",
-            )
-
-    # --- places -------------------------------------------------------------------------------------------------
-
-    @cached_property
-    def _areas(self) -> tuple[_Area, ...]:
-        """The places of every step that has any."""
-        areas: list[_Area] = []
-        place = 0
-        for number, step in enumerate(self.program.steps):
-            rows = self._rows(step, place)
-            count = _words(rows, self.lanes) if rows else self._moments(number)
-            if count:
-                areas.append(_Area(number, step, place, place + count - 1, rows))
-            place += count
-        return tuple(areas)
-
-    def _rows(self, step: Step, place: int) -> tuple[_Row, ...]:
-        """The bytes of a step in words, rows of zeros in one word each."""
-        size = _size(step)
-        rows: list[_Row] = []
-        done = 0
-        for first, end in _gaps(step):
-            begin, words = -(-first // self.lanes), end // self.lanes - -(-first // self.lanes)
-            if words < _ROW:
-                continue
-            if begin * self.lanes > done:
-                rows.append(_Row(done, begin * self.lanes - done, place))
-                place += begin - done // self.lanes
-            rows.append(_Row(begin * self.lanes, self.lanes, place, words))
-            place += 1
-            done = (begin + words) * self.lanes
-        if size > done:
-            rows.append(_Row(done, size - done, place))
-        return tuple(rows)
-
-    def _moments(self, number: int) -> int:
-        """How many places a step without bytes of its own has: none if another one does its work."""
-        match self.program.steps[number]:
-            case Guard() | Stream() | Padding():
-                return 1
-            case Open(part=part):
-                # A guard opens the part in front of its padding; without a body there is nothing behind it.
-                return int(not self._is_guarded(part) and (isinstance(part, Data) or bool(part.body)))
-            case Close():
-                return int(not self._closes_with_block(number))
-        return 0
-
-    def _is_guarded(self, part: Data | Loop) -> bool:
-        return any(isinstance(step, Guard) and step.part is part for step in self.program.steps)
-
-    def _closes_with_block(self, number: int) -> bool:
-        """Whether the last word in front of a `Close` is the end of the element."""
-        return isinstance(self.program.steps[number - 1], Block)
-
-    @cached_property
-    def end(self) -> int:
-        """The place behind all others."""
-        return self._areas[-1].last + 1
-
-    def _place(self, number: int) -> int:
-        """Where the work of step `number` begins, or that of the next one with any."""
-        return next((area.first for area in self._areas if area.number >= number), self.end)
-
-    def _closing_place(self, number: int) -> int:
-        """Where the element of the loop that step `number` closes ends."""
-        return max(area.last for area in self._areas if area.number <= number)
-
-    def _areas_of(self, *kinds: type[Step]) -> list[_Area]:
-        return [area for area in self._areas if isinstance(area.step, kinds)]
-
-    def _listed(self) -> list[Configuration]:
-        """The places for the list in front of the architecture."""
-        names = [f"{a.first} to {a.last}" if a.last > a.first else f"{a.first}" for a in self._areas] + [f"{self.end}"]
-        texts = [*map(_about, self._areas), "the end"]
-        column = max(map(len, names))
-        return [{"places": name.rjust(column), "text": text} for name, text in zip(names, texts, strict=True)]
 
     # --- words --------------------------------------------------------------------------------------------------
 
-    def _pieces(self) -> list[tuple[str, str]]:
+    def _pieces(self) -> Iterator[tuple[str, str]]:
         """(part of all_words, value): all bits, in order."""
-        known: list[tuple[int, int, str]] = []
-        for area in self._areas:
-            known += [
-                (8 * (self.lanes * row.place + offset - row.offset), 8 * size, value)
-                for row in area.rows
-                for offset, size, value in self._values(area.step)
-                if row.offset <= offset < row.offset + row.size and row.times == 1
-            ]
-            if isinstance(area.step, Stream):
-                known.append((area.first * self.width, self.width, self.side.stream(area.step.part).axis("tdata")))
-        known.sort()
-        total = (self.end + 1) * self.width
-        pieces = []
         cursor = 0
-        for low, bits, value in [*known, (total, 0, "")]:
+        total = (self.places.end + 1) * self.width
+        for low, bits, value in [*self._known(), (total, 0, "")]:
             if low > cursor:
-                pieces.append((cursor, low - cursor, "(others => '0')"))
+                yield f"all_words({low - 1} downto {cursor})", _ZEROS
             if bits:
-                pieces.append((low, bits, value))
+                yield f"all_words({low + bits - 1} downto {low})", value
             cursor = low + bits
-        return [(f"all_words({low + bits - 1} downto {low})", value) for low, bits, value in pieces]
+
+    def _known(self) -> list[tuple[int, int, str]]:
+        """(lowest bit, bits, value) of what is not zeros, in order."""
+        found = [
+            (8 * (self.lanes * row.place + offset - row.offset), 8 * size, value)
+            for area in self.places.areas
+            for row in area.rows
+            for offset, size, value in self._values(area.step)
+            if row.offset <= offset < row.offset + row.size
+        ]
+        found += [(self.width * area.first, self.width, port.axis("tdata")) for area, port in self._streams]
+        return sorted(found)
 
     def _values(self, step: Step) -> Iterator[tuple[int, int, str]]:
-        """(offset, bytes, value) of whatever in a step is not zero."""
+        """(offset, bytes, value) of what a step has that is not zeros."""
         match step:
             case Header():
                 yield 0, ID_BYTES, f"std_logic_vector(to_unsigned(ID, {8 * ID_BYTES}))"
-                # The port may change once the message is withdrawn.
-                here = min(LENGTH_BYTES, self.lanes - ID_BYTES)
-                if here:
-                    yield ID_BYTES, here, f"payload_length({8 * here - 1} downto 0)"
-                if here < LENGTH_BYTES:
-                    yield ID_BYTES + here, LENGTH_BYTES - here, f"announced(31 downto {8 * here})"
+                # Behind the first word the port may be wrong already: the message may be withdrawn.
+                first = min(LENGTH_BYTES, self.lanes - ID_BYTES)
+                if first:
+                    yield ID_BYTES, first, f"payload_length({8 * first - 1} downto 0)"
+                if first < LENGTH_BYTES:
+                    yield ID_BYTES + first, LENGTH_BYTES - first, f"announced(31 downto {8 * first})"
             case Count(part=part):
-                length = self.side.length(part)
-                more = part.terminator if isinstance(part, Data) else 0
-                yield 0, COUNT_BYTES, f"std_logic_vector(unsigned({length}) + {more})" if more else length
+                length, terminator = self.side.length(part), _terminator(part)
+                yield 0, COUNT_BYTES, f"std_logic_vector(unsigned({length}) + {terminator})" if terminator else length
             case Block():
-                yield from self._block_values(step)
+                yield from self._fields(step)
+                yield from _constants(step)
 
-    def _block_values(self, block: Block) -> Iterator[tuple[int, int, str]]:
+    def _fields(self, block: Block) -> Iterator[tuple[int, int, str]]:
         for leaf in block.fields:
             for piece in self._slices(leaf):
                 bits = _bits(piece)
                 yield piece.offset, piece.bytes, f'"0000000" & {bits}' if _is_bit(piece) else bits
-        for offset, data in block.constants:
-            for start in range(0, len(data), _LITERAL_BYTES):
-                part_of = data[start : start + _LITERAL_BYTES]
-                if any(part_of):
-                    yield offset + start, len(part_of), f'x"{part_of[::-1].hex()}"'
 
     def _slices(self, leaf: FrameField) -> Iterator[Slice]:
+        """The pieces of the leaf's port; another `Fixed` may hold the elements before the first one here."""
         port = self.side.field(leaf)
         for piece in slices_of(FieldPort(port.name, port.width, leaf)):
             yield Slice(port, piece.low + leaf.first * leaf.type.bits, piece.width, piece.offset, piece.bytes)
 
-    # --- what happens at a place --------------------------------------------------------------------------------
+    # --- what a place waits for, and how many bytes it has ------------------------------------------------------
 
-    def _supplies(self) -> list[tuple[int, str]]:
+    def _supplies(self) -> Iterator[tuple[int, str]]:
         """(last place, what the places up to it wait for)."""
-        found = [(0, "segment_valid(0)")]
-        for area in self._areas:
+        yield 0, "segment_valid(0)"
+        for area in self.places.areas:
             signal = self._supply(area.step)
-            closing = self.program.steps[area.number + 1]
-            if isinstance(closing, Close) and self._closes_with_block(area.number + 1):
-                whole = self.side.element(closing.loop).valid
+            if closing := self.places.closed_by(area):
                 if area.last > area.first:
-                    found.append((area.last - 1, signal))
+                    yield area.last - 1, signal
+                whole = self.side.element(closing.loop).valid
                 signal = whole if signal in ("'1'", whole) else f"{signal} and {whole}"
-            found.append((area.last, signal))
-        return found
+            yield area.last, signal
 
     def _supply(self, step: Step) -> str:
         match step:
@@ -297,7 +187,7 @@ class _Publisher:
         return "'1'"
 
     def _segment(self, segment: Segment | None) -> str:
-        """The first segment is there at all places but the first, or the message is withdrawn."""
+        # Behind the first place, the message's first segment is valid, or the message is withdrawn.
         if segment is None or segment == Segment((), 0):
             return "'1'"
         if not segment.scope:
@@ -305,65 +195,63 @@ class _Publisher:
         ports = self.side.element(segment.scope[-1])
         return ports.valid if ports.segments is None else f"{ports.segment_valid}({segment.number})"
 
-    def _sizes(self) -> list[tuple[int, str]]:
-        """(last place, bytes of the places up to it); streams and padding know their own."""
-        found = []
-        for area in self._areas:
-            size = _size(area.step)
+    def _sizes(self) -> Iterator[tuple[int, str]]:
+        """(last place, bytes of each of the places up to it); a stream and padding know their own."""
+        for area in self.places.areas:
             if isinstance(area.step, Stream | Padding):
                 continue
-            if not size:
-                found.append((area.last, self._size(0)))
-                continue
+            size = size_of(area.step)
             rest = size % self.lanes
-            if area.last > area.first or not rest:
-                found.append((area.last - bool(rest), self._size(self.lanes)))
-            if rest:
-                found.append((area.last, self._size(rest)))
-        return found
+            if size > rest:
+                yield area.last - bool(rest), self._size(self.lanes)
+            if rest or not size:
+                yield area.last, self._size(rest)
 
     def _size(self, count: int) -> str:
         return f'"{count:0{self.lanes.bit_length()}b}"'
 
-    def _repeats(self) -> Configuration:
-        repeats = [(row.place, row.times) for area in self._areas for row in area.rows if row.times > 1]
-        bits = max((times - 1 for _, times in repeats), default=0).bit_length()
+    def _repeat_keys(self) -> Configuration:
+        repeats = [(row.place, row.times - 1) for area in self.places.areas for row in area.rows if row.times > 1]
+        bits = max((last for _, last in repeats), default=0).bit_length()
         return {
             "has_repeats": bool(repeats),
             "repeat_high": bits - 1,
-            "repeats": [{"place": place, "last": times - 1, "bits": bits} for place, times in repeats],
+            "repeats": [{"place": place, "last": last, "bits": bits} for place, last in repeats],
         }
-
-    @property
-    def _checked(self) -> list[str]:
-        """What can have more or less than its length."""
-        return [name for name, found in [("stream", self.program.streams), ("elements", self._closings)] if found]
 
     # --- streams ------------------------------------------------------------------------------------------------
 
-    def _streams(self) -> Configuration:
-        areas = self._areas_of(Stream)
-        ports = [(area.last, self.side.stream(area.step.part)) for area in areas if isinstance(area.step, Stream)]
-        sizes = {part.part.element.size for _, part in ports}
+    @cached_property
+    def _streams(self) -> list[tuple[Area, StreamPorts]]:
+        """Every stream's place and ports."""
+        areas = self.places.areas_of(Stream)
+        return [(area, self.side.stream(area.step.part)) for area in areas if isinstance(area.step, Stream)]
+
+    def _stream_keys(self) -> Configuration:
+        # What is counted are bytes, of up to 2**32 - 1 elements.
+        extra_bits = max((_shift(port.part) for _, port in self._streams), default=0)
+        counts = [area for area in self._counts if isinstance(_part(area), Data)]
+        readies = _aligned([port.axis("tready") for _, port in self._streams])
         return {
-            "has_streams": bool(areas),
-            "in_stream": _any_place(area.first for area in areas),
-            "stream_keeps": _ladder([(place, port.axis("tkeep")) for place, port in ports], "(others => '0')"),
-            "stream_lasts": _ladder([(place, port.axis("tlast")) for place, port in ports], "'0'"),
-            "stream_readies": [{"name": port.axis("tready"), "place": place} for place, port in ports],
-            # Bytes of a stream are counted, of up to 2**32 - 1 elements.
-            "left_high": _COUNTER_BITS - 1 + max(sizes, default=1).bit_length() - 1,
-            "left_bits": _COUNTER_BITS + max(sizes, default=1).bit_length() - 1,
-            "has_extra_bits": max(sizes, default=1) > 1,
+            "has_streams": bool(self._streams),
+            "in_stream": _any_place(area.first for area, _ in self._streams),
+            "stream_keeps": _ladder([(area.last, port.axis("tkeep")) for area, port in self._streams], _ZEROS),
+            "stream_lasts": _ladder([(area.last, port.axis("tlast")) for area, port in self._streams], "'0'"),
+            "stream_readies": [
+                {"name": name, "place": area.first} for (area, _), name in zip(self._streams, readies, strict=True)
+            ],
+            "left_high": _COUNTER_BITS + extra_bits - 1,
+            "left_bits": _COUNTER_BITS + extra_bits,
+            "has_extra_bits": extra_bits > 0,
             "step_high": max(2, self.lanes).bit_length() - 1,
             "step_bits": max(2, self.lanes).bit_length(),
-            "counts_data": _any_range(
-                (area.first, area.last)
-                for area in self._areas_of(Count)
-                if isinstance(area.step, Count) and isinstance(area.step.part, Data)
-            ),
+            "counts_data": _any_range(counts),
             **self._loading(),
         }
+
+    @property
+    def _counts(self) -> list[Area]:
+        return self.places.areas_of(Count)
 
     def _loading(self) -> Configuration:
         """How a counter gets a count: from one word or, of a narrow stream, from several."""
@@ -373,197 +261,149 @@ class _Publisher:
             "shift_low": self.width,
         }
 
-    # --- openings -----------------------------------------------------------------------------------------------
+    # --- openings and jumps -------------------------------------------------------------------------------------
 
-    def _opens(self) -> Configuration:
-        opens = self._areas_of(Open, Guard)
-        jumps = [(area.last, self._behind(area)) for area in opens]
-        jumps += [(self._closing_place(number), self._body(number)) for number in self._closings]
-        data = [area for area in opens if isinstance(self._part(area), Data)]
-        texts = [area for area in data if self._terminator(area)]
-        shifts = [(area.first, self._part(area).element.size.bit_length() - 1) for area in data]  # type: ignore[union-attr]
+    @property
+    def _opens(self) -> list[Area]:
+        return self.places.areas_of(Open, Guard)
+
+    def _opening_keys(self) -> Configuration:
+        data = [(area.first, part) for area in self._opens if isinstance(part := _part(area), Data)]
+        texts = [place for place, part in data if part.terminator]
+        bits = self.places.end.bit_length()
         return {
-            "has_jumps": bool(jumps),
-            "jumps": sorted(
-                [*map(self._opening_jump, opens), *map(self._closing_jump, self._closings)],
-                key=lambda jump: jump["place"],
-            ),
-            "opens_data": _any_place(area.first for area in data),
-            "opens_text": _any_place(area.first for area in texts),
+            "opens_data": _any_place(place for place, _ in data),
+            "opens_text": _any_place(texts),
             "has_texts": bool(texts),
-            "targets": _ladder(
-                [(place, f"to_unsigned({target}, {self.end.bit_length()})") for place, target in sorted(jumps)],
-                "(others => '0')",
-            ),
             "shifts": [
-                {"places": _any_place(place for place, shift in shifts if shift == wanted), "shift": wanted}
-                for wanted in sorted({shift for _, shift in shifts} - {0})
+                {"places": _any_place(place for place, part in data if _shift(part) == shift), "shift": shift}
+                for shift in sorted({_shift(part) for _, part in data} - {0})
             ],
+            "has_jumps": bool(self.places.jumps),
+            "jumps": sorted(
+                [*map(self._opening_jump, self._opens), *map(self._closing_jump, self._closings)],
+                key=lambda jump: int(jump["place"]),
+            ),
+            "targets": _ladder(
+                [(place, f"to_unsigned({target}, {bits})") for place, target in self.places.jumps], _ZEROS
+            ),
         }
 
-    def _opening_jump(self, area: _Area) -> Configuration:
+    def _opening_jump(self, area: Area) -> Configuration:
         """Past a part without elements; an array of fixed size has some."""
-        match self._part(area):
+        match _part(area):
             case Data():
                 value = "left_ends"
-            case Loop(count=None):
-                assert isinstance(area.step, Open)
-                value = self._elements_carry(len(area.step.scope) + 1)
+            case Loop(count=None) as loop:
+                value = self._elements_end(self._depth_of(loop))
             case _:
                 value = "'0'"
         return {"place": area.last, "value": value}
 
-    def _closing_jump(self, number: int) -> Configuration:
-        return {"place": self._closing_place(number), "value": "not (element_last or elements_end)"}
-
-    def _elements_carry(self, depth: int) -> str:
-        return f"elements_{depth}_sum({self._depth_bits(depth)})"
-
-    @staticmethod
-    def _part(area: _Area) -> Data | Loop:
-        assert isinstance(area.step, Open | Guard)
-        return area.step.part
-
-    def _terminator(self, area: _Area) -> int:
-        part = self._part(area)
-        return part.terminator if isinstance(part, Data) else 0
-
-    def _behind(self, area: _Area) -> int:
-        number = area.number
-        if isinstance(area.step, Guard):
-            number = self.program.behind_guard(number)
-        return self._place(self.program.behind(number))
-
-    def _body(self, number: int) -> int:
-        return self._place(self.program.body(number))
+    def _closing_jump(self, closing: tuple[Close, int]) -> Configuration:
+        return {"place": closing[1], "value": "not (element_last or elements_end)"}
 
     # --- loops --------------------------------------------------------------------------------------------------
 
-    @cached_property
-    def _closings(self) -> list[int]:
-        return [number for number, step in enumerate(self.program.steps) if isinstance(step, Close)]
+    @property
+    def _closings(self) -> Sequence[tuple[Close, int]]:
+        return self.places.closings
 
-    def _loops(self) -> Configuration:
-        closings = [(self._closing_place(number), self._loop(number)) for number in self._closings]
-        ports = [(place, self.side.element(scope[-1])) for place, scope in closings]
-        depths = sorted({len(scope) for _, scope in closings})
+    def _loop_keys(self) -> Configuration:
+        ports = [(place, self.side.element(close.loop)) for close, place in self._closings]
+        readies = _aligned([port.ready for _, port in ports])
         return {
-            "has_loops": bool(closings),
-            "is_closing": _any_place(place for place, _ in closings),
+            "has_loops": bool(ports),
+            "is_closing": _any_place(place for place, _ in ports),
             "element_lasts": _ladder([(place, port.last) for place, port in ports], "'0'"),
-            "element_readies": [{"name": port.ready, "place": place} for place, port in ports],
-            "element_ends": _ladder([(place, self._elements_carry(len(scope))) for place, scope in closings], "'0'"),
-            "depths": [self._depth(depth) for depth in depths],
+            "element_readies": [
+                {"name": name, "place": place} for (place, _), name in zip(ports, readies, strict=True)
+            ],
+            "element_ends": _ladder(
+                [(place, self._elements_end(len(close.scope))) for close, place in self._closings], "'0'"
+            ),
+            "depths": [self._depth(depth) for depth in sorted({len(close.scope) for close, _ in self._closings})],
         }
 
-    def _loop(self, number: int) -> Scope:
-        step = self.program.steps[number]
-        assert isinstance(step, Close)
-        return step.scope
+    def _depth_of(self, loop: Loop) -> int:
+        return next(len(close.scope) for close, _ in self._closings if close.loop is loop)
+
+    def _loops(self, depth: int) -> list[Loop]:
+        return [close.loop for close, _ in self._closings if len(close.scope) == depth]
 
     def _depth_bits(self, depth: int) -> int:
-        """Bits of the counter for the elements of the loops with `depth` - 1 others around."""
-        loops = [scope[-1] for scope in map(self._loop, self._closings) if len(scope) == depth]
-        return max(_COUNTER_BITS if loop.count is None else loop.count.bit_length() for loop in loops)
+        """Bits of the counter for the elements of loops with `depth` - 1 others around."""
+        counts = (loop.count for loop in self._loops(depth))
+        return max(_COUNTER_BITS if count is None else count.bit_length() for count in counts)
+
+    def _elements_end(self, depth: int) -> str:
+        return f"elements_{depth}_sum({self._depth_bits(depth)})"
 
     def _depth(self, depth: int) -> Configuration:
-        scopes = [self._loop(number) for number in self._closings if len(self._loop(number)) == depth]
-        loops = [scope[-1] for scope in scopes]
-        opens = [area for area in self._areas_of(Open) if any(self._part(area) is loop for loop in loops)]
-        counts = [
-            (area.first, area.last)
-            for area in self._areas_of(Count)
-            if isinstance(area.step, Count) and any(area.step.part is loop for loop in loops)
-        ]
-        bits = self._depth_bits(depth)
-        fixed = [(area, self._part(area)) for area in opens]
+        loops, bits = self._loops(depth), self._depth_bits(depth)
+        counts = [area for area in self._counts if any(_part(area) is loop for loop in loops)]
+        opens = [(area.first, loop.count) for area in self._opens for loop in loops if _part(area) is loop]
         return {
             "depth": depth,
-            **self._loading(),
             "high": bits - 1,
             "bits": bits,
-            "counts": _any_range(counts),
             "has_counts": bool(counts),
-            "opens_counted": _any_place(area.first for area, part in fixed if _count(part) is None),
+            "counts": _any_range(counts),
+            "opens_counted": _any_place(place for place, count in opens if count is None),
             "fixed": [
-                {"depth": depth, "place": area.first, "value": f'"{2**bits - count:0{bits}b}"', "count": count}
-                for area, part in fixed
-                if (count := _count(part)) is not None
+                {"depth": depth, "place": place, "value": f'"{2**bits - count:0{bits}b}"', "count": count}
+                for place, count in opens
+                if count is not None
             ],
-            "closes": _any_place(
-                self._closing_place(number) for number in self._closings if len(self._loop(number)) == depth
-            ),
+            "closes": _any_place(place for close, place in self._closings if len(close.scope) == depth),
+            **self._loading(),
         }
 
     # --- padding ------------------------------------------------------------------------------------------------
 
-    def _paddings(self) -> Configuration:
-        areas = self._areas_of(Padding)
-        widest = max((area.step.alignment for area in areas if isinstance(area.step, Padding)), default=2)
-        bits = widest.bit_length() - 1
-        gaps = []
-        for area in areas:
-            assert isinstance(area.step, Padding)
-            own = area.step.alignment.bit_length() - 1
-            zeros = f'"{"0" * (bits - own)}" & ' if bits > own else ""
-            gaps.append((area.last, f"{zeros}phase_left({own - 1} downto 0)"))
+    def _padding_keys(self) -> Configuration:
+        steps = ((area.first, area.step) for area in self.places.areas)
+        found = [(place, _log2(step.alignment)) for place, step in steps if isinstance(step, Padding)]
+        bits = max((own for _, own in found), default=1)
         ahead = ID_BYTES + LENGTH_BYTES + len(self.frame.prefix)
         return {
-            "has_padding": bool(areas),
-            "in_padding": _any_place(area.first for area in areas),
+            "has_padding": bool(found),
+            "in_padding": _any_place(place for place, _ in found),
             "phase_high": bits - 1,
             "phase_bits": bits,
             "first_phase": f'"{-ahead % 2**bits:0{bits}b}"',
-            "gaps": _ladder(gaps, "(others => '0')"),
+            "gaps": _ladder([(place, _low_bits("phase_left", own, bits)) for place, own in found], _ZEROS),
             "gap_fits": self.lanes >= 2**bits,
         }
 
 
-def _size(step: Step) -> int:
-    """The bytes of a step that are as many whenever it is reached."""
-    match step:
-        case Header():
-            return ID_BYTES + LENGTH_BYTES
-        case Block(size=size):
-            return size
-        case Count():
-            return COUNT_BYTES
-    return 0
+# --- what a step is --------------------------------------------------------------------------------------------------
 
 
-def _gaps(step: Step) -> Iterator[tuple[int, int]]:
-    """The (first, end) of each run of zeros in a step."""
-    if not isinstance(step, Block):
-        return
-    held = [
-        (run.offset, run.offset + run.count * leaf.type.size) for leaf in step.fields for run in leaf.runs if run.count
-    ]
-    held += [(offset, offset + len(data)) for offset, data in step.constants if any(data)]
-    ends = [(0, 0), *sorted(held), (step.size, step.size)]
-    yield from ((before[1], behind[0]) for before, behind in pairwise(ends))
+def _part(area: Area) -> Data | Loop:
+    assert isinstance(area.step, Count | Open | Guard)
+    return area.step.part
 
 
-def _words(rows: Sequence[_Row], lanes: int) -> int:
-    return sum(1 if row.times > 1 else -(-row.size // lanes) for row in rows)
+def _terminator(part: Data | Loop) -> int:
+    return part.terminator if isinstance(part, Data) else 0
 
 
-def _count(part: Data | Loop) -> int | None:
-    return part.count if isinstance(part, Loop) else None
+def _shift(part: Data) -> int:
+    """By how many bits elements are more bytes."""
+    return _log2(part.element.size)
 
 
-def _about(area: _Area) -> str:
-    kind = {
-        Header: "id and",
-        Block: "1 byte:" if _size(area.step) == 1 else f"{_size(area.step)} bytes:",
-        Count: "count of",
-        Guard: "opens",
-        Open: "opens",
-        Stream: "stream of",
-        Close: "closes an element of",
-        Padding: "",
-        End: "",
-    }[type(area.step)]
-    return shorten(f"{kind} {comment(area.step)}", _LINE, placeholder=" ...")
+def _log2(power: int) -> int:
+    return power.bit_length() - 1
+
+
+def _constants(block: Block) -> Iterator[tuple[int, int, str]]:
+    for offset, data in block.constants:
+        for start in range(0, len(data), _LITERAL_BYTES):
+            part = data[start : start + _LITERAL_BYTES]
+            if any(part):
+                yield offset + start, len(part), f'x"{part[::-1].hex()}"'
 
 
 def _bits(piece: Slice) -> str:
@@ -579,6 +419,34 @@ def _is_bit(piece: Slice) -> bool:
 
 
 # --- VHDL text -------------------------------------------------------------------------------------------------------
+
+
+def _listed(places: Places) -> list[Configuration]:
+    """The places for the list in front of the architecture."""
+    rows = [(f"{a.first} to {a.last}" if a.last > a.first else f"{a.first}", _about(a)) for a in places.areas]
+    rows.append((f"{places.end}", "the end"))
+    column = max(len(name) for name, _ in rows)
+    return [{"places": name.rjust(column), "text": text} for name, text in rows]
+
+
+def _about(area: Area) -> str:
+    size = size_of(area.step)
+    match area.step:
+        case Header():
+            kind = "id and"
+        case Block():
+            kind = "1 byte:" if size == 1 else f"{size} bytes:"
+        case Count():
+            kind = "count of"
+        case Guard() | Open():
+            kind = "opens"
+        case Stream():
+            kind = "stream of"
+        case Close():
+            kind = "closes an element of"
+        case _:
+            kind = ""
+    return shorten(f"{kind} {comment(area.step)}", _LINE, placeholder=" ...")
 
 
 def _port_declarations(ports: Sequence[MessagePort]) -> list[Configuration]:
@@ -597,24 +465,32 @@ def _port_declarations(ports: Sequence[MessagePort]) -> list[Configuration]:
 
 
 def _columns(pairs: Sequence[tuple[str, str]]) -> list[Configuration]:
-    column = max(len(target) for target, _ in pairs)
-    return [{"target": target.ljust(column), "value": value} for target, value in pairs]
+    names = _aligned([target for target, _ in pairs])
+    return [{"target": name, "value": value} for name, (_, value) in zip(names, pairs, strict=True)]
+
+
+def _aligned(names: Sequence[str]) -> list[str]:
+    column = max(map(len, names), default=0)
+    return [name.ljust(column) for name in names]
 
 
 def _ladder(choices: Iterable[tuple[int, str]], otherwise: str) -> list[Configuration]:
     """`value when place_r <= last else` for each choice in order; neighbours with the same value share one.
 
-    The last choice needs no condition if nothing lies behind it; `otherwise` is for none at all.
+    Behind the last choice nothing is asked for, so it stands without a condition; `otherwise` if there is none at all.
     """
     groups = [(list(group)[-1][0], value) for value, group in groupby(choices, key=lambda choice: choice[1])]
     if not groups:
         return [{"value": otherwise, "condition": "", "joint": ";"}]
-    column = max(len(value) for _, value in groups)
-    rows = [
-        {"value": value.ljust(column), "condition": f" when place_r <= {place}", "joint": " else"}
-        for place, value in groups[:-1]
+    *rows, (_, final) = groups
+    column = max((len(value) for _, value in rows), default=0)
+    return [
+        *(
+            {"value": value.ljust(column), "condition": f" when place_r <= {place}", "joint": " else"}
+            for place, value in rows
+        ),
+        {"value": final, "condition": "", "joint": ";"},
     ]
-    return [*rows, {"value": groups[-1][1], "condition": "", "joint": ";"}]
 
 
 def _any_place(places: Iterable[int]) -> str:
@@ -622,11 +498,13 @@ def _any_place(places: Iterable[int]) -> str:
     return _any(f"place_r = {place}" for place in places)
 
 
-def _any_range(ranges: Iterable[tuple[int, int]]) -> str:
-    """A condition that holds at the places from each `first` to its `last` only."""
+def _any_range(areas: Iterable[Area]) -> str:
+    """A condition that holds at the places of these areas only."""
     return _any(
-        f"place_r = {first}" if first == last else f"(place_r >= {first} and place_r <= {last})"
-        for first, last in ranges
+        f"place_r = {area.first}"
+        if area.first == area.last
+        else f"(place_r >= {area.first} and place_r <= {area.last})"
+        for area in areas
     )
 
 
@@ -638,3 +516,10 @@ def _any(conditions: Iterable[str]) -> str:
         else:
             lines.append(condition)
     return " or\n        ".join(lines) or "false"
+
+
+def _low_bits(name: str, count: int, bits: int) -> str:
+    """The `count` lowest bits of a vector, with zeros in front up to `bits`."""
+    if count == bits:
+        return name
+    return f'"{"0" * (bits - count)}" & {name}({count - 1} downto 0)'

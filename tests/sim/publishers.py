@@ -312,10 +312,10 @@ class Publisher:
         size = source.randrange(len(data))
         zeroed = copy.deepcopy(value)
         self._zero(self.frame.nodes, zeroed, 0, self.streams[part].part, [place], size)
-        streams = list(message.streams[part])
+        found = list(message.streams[part])
         # What holds no byte is still closed.
-        streams[place] = self.beats(data[:size]) or [Beat(b"", True)]
-        return replace(message, streams={**message.streams, part: streams}, payload=self._payload(zeroed), error=SHORT)
+        found[place] = self.beats(data[:size]) or [Beat(b"", True)]
+        return replace(message, streams={**message.streams, part: found}, payload=self._payload(zeroed), error=SHORT)
 
     def _zero(self, nodes: Sequence[Node], value: Any, depth: int, part: Data, left: list[int], size: int) -> None:
         """Zeros in place of all behind the first `size` bytes of stream number `left[0]` of `part`."""
@@ -338,9 +338,9 @@ class Publisher:
     def _with_long_stream(self, message: Message, part: int, place: int, source: random.Random) -> Message:
         """A stream goes on behind its length: that is dropped."""
         data = b"".join(beat.data for beat in message.streams[part][place])
-        streams = list(message.streams[part])
-        streams[place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
-        return replace(message, streams={**message.streams, part: streams}, error=LONG)
+        found = list(message.streams[part])
+        found[place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
+        return replace(message, streams={**message.streams, part: found}, error=LONG)
 
     def _without_last(self, message: Message, part: int, source: random.Random) -> Message:
         """The last element of an array does not say so."""

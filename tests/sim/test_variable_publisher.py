@@ -1,11 +1,11 @@
-"""Publishers of messages of variable size simulated: every byte, faults of the message side, throughput, netlists."""
+"""Publishers of messages of variable size in simulation: bytes, faults of the message side, throughput, netlists."""
 
 from __future__ import annotations
 
-import itertools
 import random
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +54,8 @@ _KIND_CASES += [(ROS1, f"{PACKAGE}/Times"), (ROS2, f"{PACKAGE}/Wides"), (ROS2, f
 SAMPLE = [case(ros, name, 8) for ros in RosVersion for name in [*_FROM_DISTRIBUTIONS[ros], *_AWKWARD[ros]]]
 SAMPLE += [case(ros, name, 64) for ros in RosVersion for name in _FROM_DISTRIBUTIONS[ros]]
 SAMPLE += [case(ros, name, width) for width in WIDTHS if width > 8 for ros, name in _KIND_CASES]
-TROUBLED = [case(ros, name, width) for width in (8, 16, 64, 512) for ros, name in _KIND_CASES]
+TROUBLED = [case(ros, name, width) for width in (8, 64) for ros, name in _KIND_CASES]
+TROUBLED += [case(ros, f"{PACKAGE}/Tree", width) for width in (16, 32, 512) for ros in RosVersion]
 TROUBLED += [case(ros, f"sensor_msgs/{name}", 8) for ros in RosVersion for name in ("Image", "PointCloud2")]
 NETLISTS = [
     case(ROS1, "sensor_msgs/Image", 8),
@@ -91,8 +92,7 @@ def test_faults_hurt_no_other_frame(
     print(f"seed {SEED}")
     source = random.Random(f"{SEED} {name} {width}")
     messages = [publisher.faulty(value, source) for value in publisher.values(40, source, [TYPICAL], 7)]
-    codes = {message.error for message in messages}
-    assert codes >= {0, 1, 2}
+    assert len({message.error for message in messages}) >= 3
     publisher.run(tmp_path, messages, SEED=SEED)
     publisher.run(tmp_path, messages, SEED=SEED, STALL_PERCENT=30, SINK_STALL_PERCENT=40)
 
@@ -122,7 +122,7 @@ def test_a_stream_moves_a_beat_a_cycle(bench: PublisherBench, tmp_path: Path, ro
     messages = [publisher.good({"data": random.Random(SEED).randbytes(count * width // 8)}) for count in beats]
     result = publisher.run(tmp_path, messages, SEED=SEED)
     taken = [int(cycle) for cycle in re.findall(r"^taken \d+ cycle (\d+)$", result.output, re.MULTILINE)]
-    cycles = [end - start for start, end in itertools.pairwise(taken)]
+    cycles = [end - start for start, end in pairwise(taken)]
     assert (cycles[0] - cycles[1], cycles[2] - cycles[1]) == (40 - 3, 1040 - 3)
 
 
@@ -141,7 +141,7 @@ def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Ros
     result = publisher.run(tmp_path, [publisher.good(value)] * 3, SEED=SEED)
     taken = [int(cycle) for cycle in re.findall(r"^taken \d+ cycle (\d+)$", result.output, re.MULTILINE)]
     expected = {(ROS1, 8): 115, (ROS1, 64): 30, (ROS2, 8): 131, (ROS2, 64): 38}[ros, width]
-    assert [end - start for start, end in itertools.pairwise(taken)] == [expected] * 2
+    assert [end - start for start, end in pairwise(taken)] == [expected] * 2
 
 
 @pytest.mark.parametrize("width", [8, 64])

@@ -1,0 +1,166 @@
+"""The steps of a publisher as a row of places.
+
+A place is a word of up to a beat of bytes, or a moment of the program that has none of its own: the opening of a part,
+a stream, padding, the end of an element. A publisher goes from place to place and back to the first one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+from fusesoc_firm.converter.program import Block, Close, Count, Guard, Header, Open, Padding, Program, Step, Stream
+from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Loop
+
+# So many words of zeros in a row, and more, are one place that is sent as often.
+_ROW = 4
+
+
+@dataclass(frozen=True)
+class Row:
+    """Bytes `offset` to `offset + size - 1` of a step, in words from `place` on.
+
+    Where `times` is more than 1, the row is one word of zeros that is sent so often; it is of `size` bytes.
+    """
+
+    offset: int
+    size: int
+    place: int
+    times: int = 1
+
+
+@dataclass(frozen=True)
+class Area:
+    """The places `first` to `last` of step number `number`; `rows` has its bytes, if it has some of its own."""
+
+    number: int
+    step: Step
+    first: int
+    last: int
+    rows: tuple[Row, ...] = ()
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the steps of a program are, in words of `lanes` bytes."""
+
+    program: Program
+    lanes: int
+
+    @cached_property
+    def areas(self) -> tuple[Area, ...]:
+        """Those of every step that has a place."""
+        areas: list[Area] = []
+        place = 0
+        for number, step in enumerate(self.program.steps):
+            rows = tuple(self._rows(step, place))
+            count = sum(self._words(row) for row in rows) or self._moments(number)
+            if count:
+                areas.append(Area(number, step, place, place + count - 1, rows))
+            place += count
+        return tuple(areas)
+
+    @property
+    def end(self) -> int:
+        """The place behind all others."""
+        return self.areas[-1].last + 1
+
+    @cached_property
+    def closings(self) -> tuple[tuple[Close, int], ...]:
+        """Every `Close`, with the place at which the element ends: the last word in front of it, or its own."""
+        steps = self.program.steps
+        return tuple(
+            (step, max(area.last for area in self.areas if area.number <= number))
+            for number, step in enumerate(steps)
+            if isinstance(step, Close)
+        )
+
+    @cached_property
+    def jumps(self) -> tuple[tuple[int, int], ...]:
+        """(place, target) for each place that may lead elsewhere than to the next one, in order."""
+        found = [(area.last, self._place(self._behind(area))) for area in self.areas_of(Open, Guard)]
+        for (_, place), number in zip(self.closings, self._closing_numbers, strict=True):
+            found.append((place, self._place(self.program.body(number))))
+        return tuple(sorted(found))
+
+    def areas_of(self, *kinds: type[Step]) -> list[Area]:
+        """The areas of the steps of some kinds."""
+        return [area for area in self.areas if isinstance(area.step, kinds)]
+
+    def closed_by(self, area: Area) -> Close | None:
+        """What ends an element with the area's last word."""
+        following = self.program.steps[area.number + 1]
+        return following if isinstance(area.step, Block) and isinstance(following, Close) else None
+
+    @property
+    def _closing_numbers(self) -> list[int]:
+        return [number for number, step in enumerate(self.program.steps) if isinstance(step, Close)]
+
+    def _place(self, number: int) -> int:
+        """Where step `number` begins, or the next one that has a place."""
+        return next((area.first for area in self.areas if area.number >= number), self.end)
+
+    def _behind(self, area: Area) -> int:
+        number = self.program.behind_guard(area.number) if isinstance(area.step, Guard) else area.number
+        return self.program.behind(number)
+
+    def _moments(self, number: int) -> int:
+        """How many places a step without bytes of its own has: none where another one does its work."""
+        match self.program.steps[number]:
+            case Guard() | Stream() | Padding():
+                return 1
+            case Open(part=part):
+                # A guard opens the part in front of its padding; an array without a body has nothing to go through.
+                return int(not self._is_guarded(part) and (isinstance(part, Data) or bool(part.body)))
+            case Close():
+                return int(not isinstance(self.program.steps[number - 1], Block))
+        return 0
+
+    def _is_guarded(self, part: Data | Loop) -> bool:
+        return any(isinstance(step, Guard) and step.part is part for step in self.program.steps)
+
+    def _rows(self, step: Step, place: int) -> Iterator[Row]:
+        """The bytes of a step in words, many of zeros in one word."""
+        done = 0
+        for first, end in _gaps(step):
+            begin = -(-first // self.lanes)
+            times = end // self.lanes - begin
+            if times < _ROW:
+                continue
+            if begin * self.lanes > done:
+                yield Row(done, begin * self.lanes - done, place)
+                place += begin - done // self.lanes
+            yield Row(begin * self.lanes, self.lanes, place, times)
+            place += 1
+            done = (begin + times) * self.lanes
+        if size_of(step) > done:
+            yield Row(done, size_of(step) - done, place)
+
+    def _words(self, row: Row) -> int:
+        return -(-row.size // self.lanes)
+
+
+def size_of(step: Step) -> int:
+    """The bytes of a step that are as many whenever it is reached."""
+    match step:
+        case Header():
+            return ID_BYTES + LENGTH_BYTES
+        case Block(size=size):
+            return size
+        case Count():
+            return COUNT_BYTES
+    return 0
+
+
+def _gaps(step: Step) -> Sequence[tuple[int, int]]:
+    """The (first, end) of each run of zeros in a step."""
+    if not isinstance(step, Block):
+        return []
+    held = [
+        (run.offset, run.offset + run.count * leaf.type.size) for leaf in step.fields for run in leaf.runs if run.count
+    ]
+    held += [(offset, offset + len(data)) for offset, data in step.constants if any(data)]
+    ends = [(0, 0), *sorted(held), (step.size, step.size)]
+    return [(before[1], behind[0]) for before, behind in pairwise(ends)]
