@@ -283,6 +283,16 @@ class Publisher:
         error = 0 if 0 <= slack <= self.frame.trailing_bytes else BAD_LENGTH
         return replace(message, bits=message.bits[:-32] + f"{length:032b}", payload=payload, error=error)
 
+    def with_length(self, message: Message, name: str, length: int) -> Message:
+        """The same with another number at the message's port `name`."""
+        low = 0
+        for port, width, _, _ in self.groups[0].fields:
+            if port == name:
+                high = len(message.bits) - low
+                return replace(message, bits=f"{message.bits[: high - 32]}{length:032b}{message.bits[high:]}")
+            low += width or 1
+        raise KeyError(name)
+
     def faulty(self, value: Mapping[str, Any], source: random.Random) -> Message:
         """A message with one thing wrong, or with nothing."""
         message = self.good(value)
@@ -293,18 +303,18 @@ class Publisher:
                 length = source.choice((0, 1, 2, 3, 2**16)) if source.random() < 0.3 else len(message.payload)
                 return self.announced(message, max(0, length + source.choice((-9, -2, -1, 1, 2, 3, 4, 5, 300))))
             case 1 if streams:
-                return self._with_short_stream(value, message, *source.choice(streams), source)
+                return self.with_short_stream(value, message, *source.choice(streams), source)
             case 2 if streams:
-                return self._with_long_stream(message, *source.choice(streams), source)
+                return self.with_long_stream(message, *source.choice(streams), source)
             case 3 if loops:
-                return self._without_last(message, source.choice(loops), source)
+                return self.without_last(message, source.choice(loops), source)
             case 4 if loops:
-                return self._with_early_last(value, message, source.choice(loops), source)
+                return self.with_early_last(value, message, source.choice(loops), source)
             case 5:
                 return replace(message, lifetime=source.randint(1, 200), error=SHORT, exact=0)
         return message
 
-    def _with_short_stream(
+    def with_short_stream(
         self, value: Mapping[str, Any], message: Message, part: int, place: int, source: random.Random
     ) -> Message:
         """A stream ends early: its rest are zeros."""
@@ -335,21 +345,21 @@ class Publisher:
                 name = node.path[-1].name
                 value[name] = _zeroed(part, value[name], left, size)
 
-    def _with_long_stream(self, message: Message, part: int, place: int, source: random.Random) -> Message:
+    def with_long_stream(self, message: Message, part: int, place: int, source: random.Random) -> Message:
         """A stream goes on behind its length: that is dropped."""
         data = b"".join(beat.data for beat in message.streams[part][place])
         found = list(message.streams[part])
         found[place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
         return replace(message, streams={**message.streams, part: found}, error=LONG)
 
-    def _without_last(self, message: Message, part: int, source: random.Random) -> Message:
+    def without_last(self, message: Message, part: int, source: random.Random) -> Message:
         """The last element of an array does not say so."""
         elements = list(message.elements[part])
         place = source.choice([place for place, (is_last, _) in enumerate(elements) if is_last])
         elements[place] = False, elements[place][1]
         return replace(message, elements={**message.elements, part: elements}, error=LONG)
 
-    def _with_early_last(self, value: Mapping[str, Any], message: Message, part: int, source: random.Random) -> Message:
+    def with_early_last(self, value: Mapping[str, Any], message: Message, part: int, source: random.Random) -> Message:
         """An array ends before its length is reached: what follows the element is zeros."""
         loop = self.groups[part].scope[-1]
         total = len(message.elements[part])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import struct
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -111,6 +112,44 @@ def test_a_message_goes_in_any_cycle(
     messages = [each for message in withdrawn for each in (message, second)]
     publisher.run(tmp_path, messages, SEED=SEED)
     publisher.run(tmp_path, messages, SEED=SEED, SINK_STALL_PERCENT=50)
+
+
+@pytest.mark.parametrize("width", [8, 16, 64, 512])
+@pytest.mark.parametrize("ros", RosVersion)
+@pytest.mark.parametrize("length", [2**32 - 1, 2**31, 2**29, 300])
+def test_a_length_that_is_far_too_large_ends_with_its_part(
+    bench: PublisherBench, tmp_path: Path, ros: RosVersion, width: int, length: int
+) -> None:
+    """A `tlast` and a `last` end a part, and a frame its length: nothing goes on for 2**32 elements."""
+    publisher = bench.publisher(ros, f"{PACKAGE}/Lying", width)
+    value = {"texts": ["abcde", "d"], "many": [1.5, 2.5, 3.5, 4.5], "data": bytes(range(20)), "last": 7}
+    good = publisher.good(value)
+    # What is sent of each part, to its end.
+    sent = {"texts": b"d", "many": struct.pack("<4d", 1.5, 2.5, 3.5, 4.5), "data": bytes(range(20))}
+    lies = []
+    for name in ("texts", "many", "data"):
+        lie = publisher.with_length(good, f"{name}_length", length)
+        counted = good.payload.index(len(value[name]).to_bytes(4, "little"), len(publisher.frame.prefix))
+        kept = good.payload.index(sent[name]) + len(sent[name])
+        payload = good.payload[:counted] + length.to_bytes(4, "little") + good.payload[counted + 4 :]
+        lies.append(replace(lie, payload=payload, error=SHORT, exact=kept))
+    messages = [each for lie in lies for each in (lie, good)]
+    publisher.run(tmp_path, messages, SEED=SEED)
+    publisher.run(tmp_path, messages, SEED=SEED, STALL_PERCENT=30, SINK_STALL_PERCENT=40)
+
+
+@pytest.mark.parametrize("width", [8, 16, 32])
+def test_padding_ends_in_what_is_given_up(bench: PublisherBench, tmp_path: Path, width: int) -> None:
+    """Bytes that are not sent any more count all the same."""
+    publisher = bench.publisher(ROS2, "sensor_msgs/JointState", width)
+    source = random.Random(SEED)
+    messages = []
+    for size in range(9):
+        (value,) = publisher.values(1, source, [TYPICAL])
+        value = {**value, "name": ["n" * size, "m"], "position": [1.0], "velocity": [2.0], "effort": [3.0]}
+        good = publisher.good(value)
+        messages += [publisher.with_early_last(value, good, 1, source), good]
+    publisher.run(tmp_path, messages, SEED=SEED)
 
 
 @pytest.mark.parametrize("width", WIDTHS)

@@ -34,6 +34,7 @@ _SHARED = {
     )
     + "uint8[] words\nstring text\nPlain[] elements\nstring left\nuint8 max\nuint8 lanes\n",
     "Giant": "uint8[5000] before\nuint16 some\nstring name\nfloat64[3000] behind\nuint32 last\nuint8[1] odd\n",
+    "Lying": "string[] texts\nfloat64[] many\nuint8[] data\nuint8 last\n",
     "Wide": "uint8[200] block\nstring text\nfloat32[50] numbers\n",
 }
 _ROS1 = {"Times": "time stamp\ntime[2] stamps\nstring text\nduration[3] spans\nuint8[] data\n"}
