@@ -28,7 +28,7 @@ _TAKEN = frozenset(
     """
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
-    end_place bad_length short_part long_part all_words word_index this_word word_size sent_size is_supplied
+    end_place bad_length short_part long_part all_words place_word this_word word_size sent_size is_supplied
     is_withdrawn is_ending is_start is_header announced is_offered is_accepted is_done is_jumping jump_target
     is_short is_long left_step left_sum left_ends in_stream stream_last stream_keep stream_size stream_more
     stream_done is_closing element_last elements_end phase_left padding_size in_padding repeat_last is_repeated
