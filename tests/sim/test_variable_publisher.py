@@ -122,7 +122,7 @@ def test_a_length_that_is_far_too_large_ends_with_its_part(
 ) -> None:
     """A `tlast` and a `last` end a part, and a frame its length: nothing goes on for 2**32 elements."""
     publisher = bench.publisher(ros, f"{PACKAGE}/Lying", width)
-    value = {"texts": ["abcde", "d"], "many": [1.5, 2.5, 3.5, 4.5], "data": bytes(range(20)), "last": 7}
+    value: dict[str, Any] = {"texts": ["abcde", "d"], "many": [1.5, 2.5, 3.5, 4.5], "data": bytes(range(20)), "last": 7}
     good = publisher.good(value)
     # What is sent of each part, to its end.
     sent = {"texts": b"d", "many": struct.pack("<4d", 1.5, 2.5, 3.5, 4.5), "data": bytes(range(20))}

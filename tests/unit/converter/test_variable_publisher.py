@@ -75,15 +75,15 @@ def test_each_bit_of_the_words_is_driven_once(ros: RosVersion, width: int) -> No
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_word_of_the_highest_index_is_zeros(width: int) -> None:
-    """An index of all ones reaches no word that is something, whatever the number of places."""
+def test_the_word_of_the_end_is_zeros(width: int) -> None:
+    """It is what a frame is filled up with."""
     for size in range(40):
         configuration = configured(layout(ROS1, f"uint8[{size}] block\nstring text\n"), width)
-        end, bits = configuration["end"], configuration["end_bits"]
-        assert end <= 2**bits - 1
         last = configuration["pieces"][-1]
         assert last["value"] == "(others => '0')"
-        assert last["target"].strip().startswith(f"all_words({(end + 1) * width - 1} ")
+        high, low = last["target"].strip().removeprefix("all_words(").removesuffix(")").split(" downto ")
+        assert int(high) == configuration["words_high"] == (configuration["end"] + 1) * width - 1
+        assert int(low) <= configuration["end"] * width
 
 
 def test_zeros_in_a_row_are_one_place() -> None:
