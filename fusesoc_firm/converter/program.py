@@ -4,7 +4,7 @@ A subscriber takes the bytes of a frame step by step, a publisher puts them ther
 
     Header              the payload's length
     Block               bytes of known arrangement
-    Pad                 padding that depends on the position
+    Padding             padding that depends on the position
     Count, Guard, Open  a part's number of elements; whether its padding is there; its beginning
     Stream              the elements of a string or an array of numbers
     Close               the end of an element of an array of messages or strings

@@ -31,6 +31,7 @@ from fusesoc_firm.converter.program import (
     publisher_program,
 )
 from fusesoc_firm.converter.slices import Slice, slices_of
+from fusesoc_firm.converter.steps import terminator_of
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, FrameField, Loop
 
@@ -144,7 +145,7 @@ class _Publisher:
                 if first < LENGTH_BYTES:
                     yield ID_BYTES + first, LENGTH_BYTES - first, f"announced(31 downto {8 * first})"
             case Count(part=part):
-                length, terminator = self.side.length(part), _terminator(part)
+                length, terminator = self.side.length(part), terminator_of(part)
                 yield 0, COUNT_BYTES, f"std_logic_vector(unsigned({length}) + {terminator})" if terminator else length
             case Block():
                 yield from self._fields(step)
@@ -153,8 +154,7 @@ class _Publisher:
     def _fields(self, block: Block) -> Iterator[tuple[int, int, str]]:
         for leaf in block.fields:
             for piece in self._slices(leaf):
-                bits = _bits(piece)
-                yield piece.offset, piece.bytes, f'"0000000" & {bits}' if _is_bit(piece) else bits
+                yield piece.offset, piece.bytes, f'"0000000" & {piece.target}' if piece.is_bit else piece.target
 
     def _slices(self, leaf: FrameField) -> Iterator[Slice]:
         """The pieces of the leaf's port; another `Fixed` may hold the elements before the first one here."""
@@ -385,10 +385,6 @@ def _part(area: Area) -> Data | Loop:
     return area.step.part
 
 
-def _terminator(part: Data | Loop) -> int:
-    return part.terminator if isinstance(part, Data) else 0
-
-
 def _shift(part: Data) -> int:
     """By how many bits elements are more bytes."""
     return _log2(part.element.size)
@@ -404,18 +400,6 @@ def _constants(block: Block) -> Iterator[tuple[int, int, str]]:
             part = data[start : start + _LITERAL_BYTES]
             if any(part):
                 yield offset + start, len(part), f'x"{part[::-1].hex()}"'
-
-
-def _bits(piece: Slice) -> str:
-    """The port, or the part of it that the piece is."""
-    port = piece.port
-    if port.width is None or (piece.width == port.width and not _is_bit(piece)):
-        return port.name
-    return f"{port.name}({piece.low})" if _is_bit(piece) else f"{port.name}({piece.high} downto {piece.low})"
-
-
-def _is_bit(piece: Slice) -> bool:
-    return piece.port.field.type.bits == 1
 
 
 # --- VHDL text -------------------------------------------------------------------------------------------------------

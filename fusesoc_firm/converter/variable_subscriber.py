@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -128,9 +128,6 @@ class _Subscriber:
 
     def _has(self, kind: type[Step]) -> bool:
         return any(isinstance(step, kind) for step in self.steps)
-
-    def _places(self, is_meant: Callable[[Step], bool]) -> list[int]:
-        return [place for place, step in enumerate(self.steps) if is_meant(step)]
 
     # --- tables -------------------------------------------------------------------------------------------------
 
