@@ -152,6 +152,22 @@ def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
     return tuple(found)
 
 
+def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[dict[str, str]]:
+    """The message side as port declarations in columns, in `direction` but for those that are reverse."""
+    opposite = {"in": "out", "out": "in"}[direction]
+    names = max([len("frame_error_code"), *(len(port.name) for port in ports)])
+    types = max(len(port.vhdl_type) for port in ports)
+    return [
+        {
+            "name": port.name.ljust(names),
+            "direction": (opposite if port.is_reverse else direction).ljust(3),
+            "type": port.vhdl_type,
+            "comment": f"{' ' * (types - len(port.vhdl_type))} -- {port.comment}" if port.comment else "",
+        }
+        for port in ports
+    ]
+
+
 def segment_count(frame: Frame) -> int:
     """The width of `segment_valid`."""
     return 1 if frame.is_fixed_size else subscriber_program(frame).segments()

@@ -13,7 +13,13 @@ from itertools import groupby
 from textwrap import shorten
 from typing import Any
 
-from fusesoc_firm.converter.message_ports import MessagePort, MessageSide, StreamPorts, message_ports, message_side
+from fusesoc_firm.converter.message_ports import (
+    MessageSide,
+    StreamPorts,
+    message_ports,
+    message_side,
+    port_declarations,
+)
 from fusesoc_firm.converter.places import Area, Places, size_of
 from fusesoc_firm.converter.ports import FieldPort
 from fusesoc_firm.converter.program import (
@@ -86,7 +92,7 @@ class _Publisher:
             "count_high": self.lanes.bit_length() - 1,
             "count_bits": self.lanes.bit_length(),
             "is_byte_wide": self.lanes == 1,
-            "ports": _port_declarations(message_ports(self.frame, self.width)),
+            "ports": port_declarations(message_ports(self.frame, self.width), "in"),
             "segment_high": self.side.segments - 1,
             "slack": self.frame.trailing_bytes,
             "areas": _listed(self.places),
@@ -431,21 +437,6 @@ def _about(area: Area) -> str:
         case _:
             kind = ""
     return shorten(f"{kind} {comment(area.step)}", _LINE, placeholder=" ...")
-
-
-def _port_declarations(ports: Sequence[MessagePort]) -> list[Configuration]:
-    """The message side as port declarations in columns."""
-    names = max([len("frame_error_code"), *(len(port.name) for port in ports)])
-    types = max(len(port.vhdl_type) for port in ports)
-    return [
-        {
-            "name": port.name.ljust(names),
-            "direction": "out" if port.is_reverse else "in ",
-            "type": port.vhdl_type,
-            "comment": f"{' ' * (types - len(port.vhdl_type))} -- {port.comment}" if port.comment else "",
-        }
-        for port in ports
-    ]
 
 
 def _columns(pairs: Sequence[tuple[str, str]]) -> list[Configuration]:

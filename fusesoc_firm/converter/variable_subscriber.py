@@ -9,11 +9,11 @@ from typing import Any
 
 from fusesoc_firm.converter.message_ports import (
     ElementPorts,
-    MessagePort,
     MessageSide,
     StreamPorts,
     message_ports,
     message_side,
+    port_declarations,
 )
 from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.converter.program import (
@@ -449,23 +449,6 @@ class _Subscriber:
             statements += [f"{self._register('valid', loop)} <= '1';", f"{last} <= '0';"]
             statements.append(f"if {left} = 1 then {last} <= '1'; end if;")
         return statements
-
-
-def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[Configuration]:
-    """The message side as port declarations in columns, most of them in `direction`."""
-    opposite = {"in": "out", "out": "in"}[direction]
-    width = max([len("frame_error_code"), *(len(port.name) for port in ports)])
-    types = max(len(port.vhdl_type) for port in ports)
-    return [
-        {
-            "name": port.name.ljust(width),
-            "direction": (opposite if port.is_reverse else direction).ljust(3),
-            "type": port.vhdl_type,
-            "padding": " " * (types - len(port.vhdl_type)) if port.comment else "",
-            "comment": f" -- {port.comment}" if port.comment else "",
-        }
-        for port in ports
-    ]
 
 
 def _values(texts: Iterable[str]) -> list[Configuration]:
