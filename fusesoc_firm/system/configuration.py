@@ -137,7 +137,6 @@ def _scheduler(system: DerivedSystem) -> Configuration:
         "scheduler": f"firm_sched_{_FIXED_PRIORITY if policy.startswith(_FIXED_PRIORITY) else policy}",
         "scheduler_generics": _aligned(generics),
         "is_preemptive": scheduling.is_preemptive,
-        "preemptive": _boolean(scheduling.is_preemptive),
         "scheduler_times": {"constants": constants} if constants else None,
     }
 
