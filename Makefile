@@ -39,7 +39,7 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIO
 	  $(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)") 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator
+test: TOOLS = iverilog verilator dot:graphviz
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 

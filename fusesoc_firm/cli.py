@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import fnmatch
+import json
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -13,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from fusesoc_firm import __version__
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.library_path import library_root
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.derived import Interface
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.message.model import MessageDefinition, MessageName
+    from fusesoc_firm.system.generator import LoadedSystem
 
 STAGES = ("tree", "message", "frame", "config", "vhdl")
 
@@ -130,15 +132,45 @@ def _positive(text: str) -> int:
 def _add_system(commands: Any) -> None:
     system = _command(commands, "system", "look at system specifications", "firm system check robot.yaml")
     actions = system.add_subparsers(title="actions", metavar="ACTION", required=True)
+    new = _command(
+        actions,
+        "new",
+        "ask for a specification and write it, or extend one that is there",
+        "firm system new robot.yaml",
+        _new_system,
+    )
     check = _command(
         actions, "check", "report all faults of a specification", "firm system check robot.yaml", _check_system
     )
     show = _command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
     )
-    for parser in (check, show):
+    draw = _command(
+        actions,
+        "diagram",
+        "draw a system: blocks, messages, widths and ids",
+        "firm system diagram robot.yaml -o robot.svg",
+        _draw_system,
+    )
+    draw.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where to write it (default: print it)")
+    draw.add_argument("--format", choices=("svg", "dot"), default="svg", help="of the picture (default: svg)")
+    report = _command(
+        actions,
+        "report",
+        "count the lines that are written and those that are generated of them",
+        "firm system report robot.yaml",
+        _report_system,
+    )
+    for parser in (new, check, show, draw, report):
         parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
         _add_sources(parser)
+    _command(
+        actions,
+        "schema",
+        "print the grammar of specifications as a JSON Schema, for editors",
+        "firm system schema > specification.schema.json",
+        _print_schema,
+    )
 
 
 def _add_definitions(parser: argparse.ArgumentParser) -> None:
@@ -255,7 +287,7 @@ def _converters(stage: str, frame: Any, definitions: dict[MessageName, MessageDe
 
 
 def _check_system(arguments: argparse.Namespace) -> None:
-    system = _load(arguments)
+    system = _load(arguments).system
     counts = [
         (len(system.subscribers), "subscriber"),
         (len(system.accelerators), "accelerator"),
@@ -268,14 +300,58 @@ def _check_system(arguments: argparse.Namespace) -> None:
 def _show_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.show import derived_description
 
-    print(_yaml(derived_description(_load(arguments))), end="")
+    print(_yaml(derived_description(_load(arguments).system)), end="")
 
 
-def _load(arguments: argparse.Namespace) -> Any:
+def _new_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.prompts import asker
+    from fusesoc_firm.system.wizard import extend_specification
+
+    if arguments.spec.exists():
+        _check_system(arguments)
+    extend_specification(arguments.spec, asker(), lambda: _message_names(arguments))
+    _check_system(arguments)
+
+
+def _message_names(arguments: argparse.Namespace) -> list[str]:
+    return sorted({str(name) for ros in (1, 2) for name in _library(arguments, ros).names()})
+
+
+def _draw_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.diagram import diagram
+
+    picture = diagram(_load(arguments).system, arguments.format)
+    if arguments.output:
+        _write(arguments.output, picture)
+    else:
+        print(picture, end="")
+
+
+def _report_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.report import report
+
+    print(report(arguments.spec, _load(arguments)), end="")
+
+
+def _print_schema(_: argparse.Namespace) -> None:
+    from fusesoc_firm.system.specification import Specification
+    from fusesoc_firm.yaml_schema import json_schema
+
+    print(json.dumps(json_schema(Specification, "System specification of fusesoc_firm"), indent=2))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
+
+
+def _load(arguments: argparse.Namespace) -> LoadedSystem:
     from fusesoc_firm.message.library import libraries
     from fusesoc_firm.system.generator import load_system
 
-    return load_system(arguments.spec, libraries(arguments.path, os.environ, arguments.distro)).system
+    return load_system(arguments.spec, libraries(arguments.path, os.environ, arguments.distro))
 
 
 def _yaml(data: dict[str, Any]) -> str:

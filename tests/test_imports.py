@@ -27,7 +27,7 @@ ALLOWED: dict[str, set[str]] = {
     "message": _WORDS,
     "frame": _MESSAGE,
     "converter": _FRAME | _WRITING | _READING,
-    "system": _CONVERTER,
+    "system": _CONVERTER | {"prompts"},
     "scheduling": _SYSTEM,
     "host": _SYSTEM,
     # The cores of its bench lie in the library.
@@ -37,6 +37,8 @@ ALLOWED: dict[str, set[str]] = {
     "library_path": set(),
     "yaml_text": {"diagnostics"},
     "yaml_sections": {"diagnostics", "yaml_text"},
+    "yaml_schema": {"yaml_sections"},
+    "prompts": {"diagnostics"},
     "generation": {"diagnostics"},
     "requesting_core": {"diagnostics", "yaml_text"},
     "parameters": {"diagnostics", "generation", "requesting_core"},

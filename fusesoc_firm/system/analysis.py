@@ -32,6 +32,8 @@ from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.specification import (
+    CONVERTER,
+    PUBLISHER,
     SOURCE_SUFFIXES,
     Accelerator,
     Block,
@@ -40,6 +42,7 @@ from fusesoc_firm.system.specification import (
     Specification,
 )
 from fusesoc_firm.system.timing import scheduling_of
+from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text
 
 Libraries = Mapping[RosVersion, MessageLibrary]
@@ -198,7 +201,7 @@ class _Analysis:
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
             self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, nearest(block.type, names))
-        for key in ("middleware", "mode", "message", "include", "exclude"):
+        for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
                 self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", source)
@@ -226,7 +229,7 @@ class _Analysis:
             self.outputs[block.name] = (MessageSide("", frame),) if is_subscriber else ()
 
     def _check_no_publisher_keys(self, block: Block) -> None:
-        for key in ("buffer", "period", "wcet", "deadline"):
+        for key in keys_only_of(Block, PUBLISHER):
             if getattr(block, key) is not None:
                 message = f"'{key}' belongs to a publisher, but '{block.name}' is none"
                 self.faults.error(message, block.name.source)

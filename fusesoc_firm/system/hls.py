@@ -15,14 +15,11 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
-from fusesoc_firm.converter.generator import VHDL
 from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
 from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.naming import distinct_identifiers, identifier
-from fusesoc_firm.render import render
 from fusesoc_firm.system.configuration import accelerator_entity, port_map
 from fusesoc_firm.system.derived import AcceleratorType, MessageSide
 from fusesoc_firm.system.sides import accelerator_ports
@@ -74,12 +71,6 @@ def function_name(accelerator: AcceleratorType) -> str:
 def library_name(accelerator: AcceleratorType) -> str:
     """The shared library that simulation loads from its work folder."""
     return f"lib{function_name(accelerator)}.so"
-
-
-def wrapper_file(accelerator: AcceleratorType, width: int) -> dict[str, GeneratedFile]:
-    """The wrapper's VHDL, for simulation and synthesis alike."""
-    entity = accelerator_entity(accelerator)
-    return {f"{entity}.vhd": GeneratedFile(render(WRAPPER_TEMPLATE, wrapper_configuration(accelerator, width)), VHDL)}
 
 
 def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:

@@ -18,7 +18,9 @@ from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 # The types of accelerators, each with the endings of its sources' names.
 SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
-MODES = ("subscriber", "publisher")
+SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
+# A block that is no accelerator.
+CONVERTER = "converter"
 # Cores of robot:sched, each with the policy it is called after.
 SCHEDULERS = (
     "fixed_priority",
@@ -104,15 +106,23 @@ class Block(Section):
 
     name: Text = key("the block's name", is_required=True)
     type: Text | None = key("the accelerator it is an instance of; empty for a converter")
-    middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES))
-    mode: Text | None = key("which way a converter works", choices=MODES)
-    message: Text | None = key("a converter's message")
-    include: tuple[Text, ...] = key(**_INCLUDE)
-    exclude: tuple[Text, ...] = key(**_EXCLUDE)
-    buffer: int | None = key("bytes of the longest payload of a publisher that stores frames whole", form="integer")
-    period: Text | None = key("time between two messages of a publisher: cycles, 10 ms, or a rate such as 100 Hz")
-    wcet: Text | None = key("longest time that a publisher's frame takes to be sent; known where the size is")
-    deadline: Text | None = key("time from a publisher's request to the end of its frame; its period unless given")
+    middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES), only_of=CONVERTER)
+    mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
+    message: Text | None = key("a converter's message", only_of=CONVERTER)
+    include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
+    buffer: int | None = key(
+        "bytes of the longest payload of a publisher that stores frames whole", form="integer", only_of=PUBLISHER
+    )
+    period: Text | None = key(
+        "time between two messages of a publisher: cycles, 10 ms, or a rate such as 100 Hz", only_of=PUBLISHER
+    )
+    wcet: Text | None = key(
+        "longest time that a publisher's frame takes to be sent; known where the size is", only_of=PUBLISHER
+    )
+    deadline: Text | None = key(
+        "time from a publisher's request to the end of its frame; its period unless given", only_of=PUBLISHER
+    )
     outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
 
 
