@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-import xml.etree.ElementTree as ElementTree
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import jsonschema
@@ -46,7 +46,7 @@ def test_the_diagram_has_every_block_and_connection(tmp_path: Path) -> None:
 def test_the_picture_is_the_same_each_time(tmp_path: Path) -> None:
     picture = diagram(derived(tmp_path, TEXT), "svg")
     assert picture == diagram(derived(tmp_path, TEXT), "svg")
-    labels = [element.text for element in ElementTree.fromstring(picture).iter() if element.tag.endswith("}text")]
+    labels = [element.text for element in ET.fromstring(picture).iter() if element.tag.endswith("}text")]
     assert {"sub", "acc", "mix (VHDL)", "sensor_msgs/Image"} <= set(labels)
 
 
