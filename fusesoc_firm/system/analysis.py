@@ -31,6 +31,7 @@ from fusesoc_firm.system.derived import (
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
+from fusesoc_firm.system.pins import check_pins
 from fusesoc_firm.system.specification import (
     CONVERTER,
     PUBLISHER,
@@ -142,6 +143,7 @@ class _Analysis:
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
                 check_kernel(found, self.faults)
+            check_pins(found, self.specification.project.width, self.faults)
 
     def _check_sources(self, accelerator: Accelerator) -> None:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())

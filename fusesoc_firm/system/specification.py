@@ -32,6 +32,7 @@ SCHEDULERS = (
     "lst",
 )
 LENGTHS = ("computed", "given", "buffered")
+DIRECTIONS = ("in", "out")
 
 _INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
 _EXCLUDE = {"form": "texts", "meaning": "none of these fields"}
@@ -82,6 +83,15 @@ class Interface(Section):
 
 
 @dataclass(frozen=True)
+class Pin(Section):
+    """A port of an accelerator that is none of a message: it leads out of the system."""
+
+    name: Text = key("the port's name; at the top level it is <block>_<name>", is_required=True)
+    direction: Text = key("which way it leads, as the accelerator sees it", is_required=True, choices=DIRECTIONS)
+    bits: int | None = key("bits of a std_logic_vector; without it the port is a std_logic", form="integer")
+
+
+@dataclass(frozen=True)
 class Accelerator(Section):
     """A type of accelerator; blocks are its instances."""
 
@@ -89,6 +99,7 @@ class Accelerator(Section):
     type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
     sources: tuple[Text, ...] = key("its source files, relative to the specification", form="texts", is_required=True)
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
+    pins: tuple[Pin, ...] = key("its ports that lead out of the system", form="sections", section=Pin)
 
 
 @dataclass(frozen=True)

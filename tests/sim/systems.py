@@ -46,7 +46,14 @@ class GeneratedSystem:
 
 def call(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request:
     """A generator call for the specification `spec`."""
-    known: dict[str, Plain] = {"seed": 1, "stall_percent": 25, "paths": None, "distro": None, **parameters}
+    known: dict[str, Plain] = {
+        "seed": 1,
+        "stall_percent": 25,
+        "environment": None,
+        "paths": None,
+        "distro": None,
+        **parameters,
+    }
     known |= {"spec": spec.name, "stimuli": str(stimuli), "model": str(model), "product": "simulation"}
     return Request("far", "test:sys:system-simulation:0", spec.parent, known)
 
