@@ -1,7 +1,7 @@
 """What all models of schedulers share.
 
-A model does what its entity in cores/sched does, cycle by cycle, for a batch of schedulers at once: B of them, each with
-N requesters. The ports are arrays; `step` is a rising edge of the clock.
+A model does what its entity in cores/sched does, cycle by cycle, for a batch of schedulers at once: B of them, each
+with N requesters. The ports are arrays; `step` is a rising edge of the clock.
 
     scheduler = POLICIES["lru"](Generics(periods))
     while ...:
