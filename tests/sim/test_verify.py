@@ -264,7 +264,7 @@ def test_a_failure_is_kept_and_can_be_repeated(
     from contextlib import contextmanager
 
     from fusesoc_firm.verify import command
-    from fusesoc_firm.verify.workers import Workers
+    from fusesoc_firm.workers import Workers
 
     @contextmanager
     def threads(_: int | None = None) -> Iterator[Workers]:
