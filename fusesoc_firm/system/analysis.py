@@ -39,6 +39,7 @@ from fusesoc_firm.system.specification import (
     OutputType,
     Specification,
 )
+from fusesoc_firm.system.timing import scheduling_of
 from fusesoc_firm.yaml_text import Text
 
 Libraries = Mapping[RosVersion, MessageLibrary]
@@ -59,15 +60,18 @@ def derive(specification: Specification, folder: Path, libraries: Libraries, fau
     buffers = publisher_buffers(connections, analysis.publishers(), faults)
     faults.raise_if_any()
     project = specification.project
+    publishers = tuple(
+        replace(item, buffer=buffers.get(item.block, 0)) for item in analysis.converters("publisher", connections)
+    )
+    scheduling = scheduling_of(project, analysis.blocks, publishers, faults)
+    faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
         fpga_part=str(project.fpga_part or ""),
         width=project.width,
-        scheduler=str(project.scheduler),
+        scheduling=scheduling,
         subscribers=analysis.converters("subscriber", connections),
-        publishers=tuple(
-            replace(item, buffer=buffers.get(item.block, 0)) for item in analysis.converters("publisher", connections)
-        ),
+        publishers=publishers,
         accelerators=tuple(
             AcceleratorBlock(str(block.name), analysis.types[block.type])
             for block in specification.blocks
@@ -198,7 +202,7 @@ class _Analysis:
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
                 self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", source)
-        self._check_no_buffer(block)
+        self._check_no_publisher_keys(block)
         if found := self.types.get(block.type):
             self.inputs[block.name] = found.inputs
             self.outputs[block.name] = found.outputs
@@ -217,14 +221,15 @@ class _Analysis:
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
             if is_subscriber:
-                self._check_no_buffer(block)
+                self._check_no_publisher_keys(block)
             self.inputs[block.name] = () if is_subscriber else (MessageSide("", frame),)
             self.outputs[block.name] = (MessageSide("", frame),) if is_subscriber else ()
 
-    def _check_no_buffer(self, block: Block) -> None:
-        if block.buffer is not None:
-            message = f"'buffer' belongs to a publisher, but '{block.name}' is none"
-            self.faults.error(message, block.name.source)
+    def _check_no_publisher_keys(self, block: Block) -> None:
+        for key in ("buffer", "period", "wcet", "deadline"):
+            if getattr(block, key) is not None:
+                message = f"'{key}' belongs to a publisher, but '{block.name}' is none"
+                self.faults.error(message, block.name.source)
 
     def _check_count(self, mode: str) -> None:
         blocks = self.specification.blocks

@@ -8,7 +8,7 @@ message, and what finds out the length of a payload.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
@@ -34,6 +34,7 @@ from fusesoc_firm.system.sides import (
     handshakes,
     side_ports,
 )
+from fusesoc_firm.system.timing import WITH_DEADLINES, WITH_TRANSFER_TIMES
 
 Configuration = dict[str, Any]
 
@@ -48,9 +49,12 @@ _TAKEN = """
     sub_axis_tdata sub_axis_tkeep sub_axis_tlast sub_axis_tvalid sub_axis_tready
     pub_axis_tdata pub_axis_tkeep pub_axis_tvalid pub_axis_tlast pub_axis_tready
     sched_request sched_beat sched_last sched_grant_valid sched_grant_select
+    periods deadlines transfer_times firm_sched_pkg times_t
     std standard std_logic std_logic_vector
 """.split()
 _ERROR_CODE_BITS = 4
+# One entity serves both policies of fixed priorities.
+_FIXED_PRIORITY = "fixed_priority"
 
 
 def accelerator_entity(accelerator: AcceleratorType) -> str:
@@ -65,7 +69,7 @@ def system_configuration(system: DerivedSystem) -> Configuration:
     return {
         **_dimensions(system),
         "name": system.name,
-        "scheduler": system.scheduler,
+        **_scheduler(system),
         "publisher_errors": [
             {"bit": bit, "block": block}
             for bit, block in enumerate(system.error_blocks)
@@ -81,7 +85,13 @@ def system_configuration(system: DerivedSystem) -> Configuration:
 
 def test_bench_configuration(system: DerivedSystem, seed: int, stall_percent: int) -> Configuration:
     """The configuration of the test bench: the simulated host beside the system."""
-    return {**_dimensions(system), "seed": seed, "stall_percent": stall_percent}
+    return {
+        **_dimensions(system),
+        "seed": seed,
+        "stall_percent": stall_percent,
+        "is_preemptive": system.scheduling.is_preemptive,
+        "from": "burst" if system.scheduling.is_preemptive else "from",
+    }
 
 
 def _dimensions(system: DerivedSystem) -> Configuration:
@@ -102,6 +112,60 @@ def _dimensions(system: DerivedSystem) -> Configuration:
         "error_high": len(system.error_blocks) - 1,
         "error_code_high": _ERROR_CODE_BITS * len(system.error_blocks) - 1,
     }
+
+
+def _scheduler(system: DerivedSystem) -> Configuration:
+    """The scheduler's entity, its generics, and the constants with the publishers' times that these name."""
+    scheduling = system.scheduling
+    policy = scheduling.policy
+    generics = {"REQUESTERS": str(len(system.publishers))}
+    constants = []
+    if policy.startswith(_FIXED_PRIORITY):
+        generics["PREEMPTIVE"] = _boolean(scheduling.is_preemptive)
+    if policy in WITH_DEADLINES:
+        deadlines = [item.deadline for item in scheduling.times]
+        periods = [item.period or item.deadline for item in scheduling.times]
+        constants += [_times("PERIODS", periods, system), _times("DEADLINES", deadlines, system)]
+    if policy in WITH_TRANSFER_TIMES:
+        constants.append(_times("TRANSFER_TIMES", [item.transfer_time for item in scheduling.times], system))
+    generics |= {str(item["name"]): str(item["name"]) for item in constants}
+    if constants:
+        generics["TIME_BITS"] = str(scheduling.time_bits)
+    if scheduling.is_preemptive:
+        generics["SHORTEST_RUN"] = str(scheduling.shortest_run)
+    return {
+        "scheduler": f"firm_sched_{_FIXED_PRIORITY if policy.startswith(_FIXED_PRIORITY) else policy}",
+        "scheduler_generics": _aligned(generics),
+        "is_preemptive": scheduling.is_preemptive,
+        "preemptive": _boolean(scheduling.is_preemptive),
+        "scheduler_times": {"constants": constants} if constants else None,
+    }
+
+
+def _times(name: str, cycles: Sequence[int | None], system: DerivedSystem) -> Configuration:
+    """A constant with one time a publisher."""
+    last = len(cycles) - 1
+    return {
+        "name": name,
+        "high": last,
+        "values": [
+            {"id": number, "cycles": value, "comma": "" if number == last else ",", "block": publisher.block}
+            for number, (value, publisher) in enumerate(zip(cycles, system.publishers, strict=True))
+        ],
+    }
+
+
+def _aligned(generics: Mapping[str, str]) -> list[Configuration]:
+    """A generic map, its arrows below each other."""
+    width, last = max(map(len, generics)), [*generics][-1]
+    return [
+        {"formal": name.ljust(width), "actual": actual, "comma": "" if name == last else ","}
+        for name, actual in generics.items()
+    ]
+
+
+def _boolean(value: bool) -> str:
+    return str(value).lower()
 
 
 def _blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]]:

@@ -110,13 +110,39 @@ class Connection:
 
 
 @dataclass(frozen=True)
+class PublisherTimes:
+    """What is known of a publisher's times, in cycles.
+
+    From message to message, to send a frame, and from the request to send it until it is to be sent.
+    """
+
+    period: int | None
+    transfer_time: int | None
+    deadline: int | None
+
+
+@dataclass(frozen=True)
+class Scheduling:
+    """Who may send to the host next: a policy, with the times of the publishers in the order of their ids.
+
+    A preemptive policy interrupts a frame after `shortest_run` beats at the soonest. Its times have `time_bits`.
+    """
+
+    policy: str
+    times: tuple[PublisherTimes, ...]
+    is_preemptive: bool
+    shortest_run: int
+    time_bits: int
+
+
+@dataclass(frozen=True)
 class DerivedSystem:
     """The whole system; `name` is an identifier, `width` the streams' bits."""
 
     name: str
     fpga_part: str
     width: int
-    scheduler: str
+    scheduling: Scheduling
     subscribers: tuple[Converter, ...]
     publishers: tuple[Converter, ...]
     accelerators: tuple[AcceleratorBlock, ...]

@@ -9,7 +9,14 @@ from fusesoc_firm.converter.configuration import publisher_entity, subscriber_en
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.system.configuration import accelerator_entity
-from fusesoc_firm.system.derived import Connection, Converter, DerivedSystem, PayloadLength
+from fusesoc_firm.system.derived import (
+    Connection,
+    Converter,
+    DerivedSystem,
+    PayloadLength,
+    PublisherTimes,
+    Scheduling,
+)
 from fusesoc_firm.system.sides import side_ports
 
 
@@ -21,15 +28,17 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "top": system.entity,
             "fpgaPart": system.fpga_part,
             "width": system.width,
-            "scheduler": system.scheduler,
+            **_scheduling(system.scheduling),
         },
         "Converters": {
             "AXIS_to_msg": [
                 _converter(item, subscriber_entity(item.frame, item.suffix)) for item in system.subscribers
             ],
             "msg_to_AXIS": [
-                _converter(item, publisher_entity(item.frame, item.suffix)) | _length(item, system.length_to(item))
-                for item in system.publishers
+                _converter(item, publisher_entity(item.frame, item.suffix))
+                | _length(item, system.length_to(item))
+                | _times(times)
+                for item, times in zip(system.publishers, system.scheduling.times, strict=True)
             ],
         },
         "Accelerators": [
@@ -69,6 +78,17 @@ def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any
         return {}
     buffer = {"buffer": publisher.buffer} if publisher.buffer else {}
     return {"length": length.source.value, "because": length.reason, **buffer}
+
+
+def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
+    shown: dict[str, Any] = {"scheduler": scheduling.policy}
+    return shown | ({"shortestRun": scheduling.shortest_run} if scheduling.is_preemptive else {})
+
+
+def _times(times: PublisherTimes) -> dict[str, int]:
+    """A publisher's times in cycles, as far as they are known."""
+    found = {"periodCycles": times.period, "wcetCycles": times.transfer_time, "deadlineCycles": times.deadline}
+    return {name: cycles for name, cycles in found.items() if cycles is not None}
 
 
 def _connections(connections: Iterable[Connection], width: int) -> Iterator[dict[str, str]]:

@@ -19,7 +19,16 @@ from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 MODES = ("subscriber", "publisher")
-SCHEDULERS = ("fixed_priority",)
+# Cores of robot:sched, each with the policy it is called after.
+SCHEDULERS = (
+    "fixed_priority",
+    "fixed_priority_preemptive",
+    "round_robin",
+    "lru",
+    "edf_resources",
+    "edf_latency",
+    "lst",
+)
 LENGTHS = ("computed", "given", "buffered")
 
 _INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
@@ -36,6 +45,13 @@ class Project(Section):
     fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
     width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
     scheduler: Text = key("who may send to the host next", choices=SCHEDULERS, default=Text(SCHEDULERS[0]))
+    shortest_run: int = key(
+        "beats that a publisher sends at least before a preemptive scheduler interrupts it",
+        name="shortestRun",
+        form="integer",
+        default=16,
+    )
+    clock: Text | None = key("frequency of clk, such as 100 MHz, for times that are not in cycles")
 
 
 @dataclass(frozen=True)
@@ -94,6 +110,9 @@ class Block(Section):
     include: tuple[Text, ...] = key(**_INCLUDE)
     exclude: tuple[Text, ...] = key(**_EXCLUDE)
     buffer: int | None = key("bytes of the longest payload of a publisher that stores frames whole", form="integer")
+    period: Text | None = key("time between two messages of a publisher: cycles, 10 ms, or a rate such as 100 Hz")
+    wcet: Text | None = key("longest time that a publisher's frame takes to be sent; known where the size is")
+    deadline: Text | None = key("time from a publisher's request to the end of its frame; its period unless given")
     outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
 
 

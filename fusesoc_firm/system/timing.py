@@ -1,0 +1,144 @@
+"""What the scheduler must know of the publishers' times, in cycles of `clk`.
+
+A time of the specification is a number of cycles, or one with a unit, which the project's `clock` makes cycles of.
+How long a frame takes to be sent (its WCET in the dissertation's section 6.3.2) follows from its size where that
+is known.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor
+
+from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.system.derived import Converter, PublisherTimes, Scheduling
+from fusesoc_firm.system.specification import Block, Project
+from fusesoc_firm.yaml_text import Text
+
+# Policies that may interrupt a frame, that compare deadlines, and that compare what is left of them.
+PREEMPTIVE = ("fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
+WITH_DEADLINES = ("edf_resources", "edf_latency", "lst")
+WITH_TRANSFER_TIMES = ("lst",)
+
+# Bytes of a frame before its payload: id and length.
+_HEADER_BYTES = 5
+# A scheduler's times are a few bits wider than the longest deadline, so that it can tell early from late (cores/sched).
+_SPARE_TIME_BITS = 3
+_FEWEST_TIME_BITS, _MOST_TIME_BITS = 8, 31
+_LONGEST_TIME = 2 ** (_MOST_TIME_BITS - _SPARE_TIME_BITS) - 1
+
+_SECONDS = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
+_HERTZ = {"Hz": 1, "kHz": 1000, "MHz": 10**6, "GHz": 10**9}
+_QUANTITY = re.compile(r"(\d+(?:\.\d+)?)\s*([A-Za-z]*)")
+
+Rounding = Callable[[Fraction], int]
+
+
+def scheduling_of(
+    project: Project, blocks: Mapping[str, Block], publishers: Sequence[Converter], faults: Diagnostics
+) -> Scheduling:
+    """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted."""
+    reader = _Reader(project.clock is not None, _clock(project, faults), faults)
+    times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
+    policy = str(project.scheduler)
+    _check_shortest_run(project, faults)
+    _check_complete(policy, [blocks[item.block] for item in publishers], times, faults)
+    return Scheduling(policy, times, policy in PREEMPTIVE, project.shortest_run, _time_bits(times))
+
+
+def frame_beats(payload_bytes: int, width: int) -> int:
+    """Beats of a frame on a stream of `width` bits."""
+    return -(-(_HEADER_BYTES + payload_bytes) * 8 // width)
+
+
+def _time_bits(times: Iterable[PublisherTimes]) -> int:
+    """Bits of the scheduler's time: all deadlines fit, and everybody's frame may still come in between."""
+    reach = max((item.deadline or 0 for item in times), default=0) + sum(item.transfer_time or 0 for item in times)
+    return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
+
+
+def _clock(project: Project, faults: Diagnostics) -> Fraction | None:
+    """The clock's frequency in Hz."""
+    if project.clock is None:
+        return None
+    found = _QUANTITY.fullmatch(project.clock)
+    if not found or found[2] not in _HERTZ or not Fraction(found[1]):
+        faults.error(
+            f"'clock' cannot be '{project.clock}'", project.clock.source, "a frequency, such as 100 MHz or 12.5 MHz"
+        )
+        return None
+    return Fraction(found[1]) * _HERTZ[found[2]]
+
+
+def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
+    if project.shortest_run < 1:
+        faults.error(f"'shortestRun' cannot be {project.shortest_run}", project.source, "legal: 1 and more beats")
+
+
+def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
+    """Note what a policy must know of a publisher and is not said."""
+    for block, item in zip(blocks, times, strict=True):
+        # What cannot be read is noted already.
+        if policy in WITH_DEADLINES and item.deadline is None and block.period is None and block.deadline is None:
+            faults.error(f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'", block.name.source)
+        if policy in WITH_TRANSFER_TIMES and item.transfer_time is None and block.wcet is None:
+            faults.error(
+                f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound", block.name.source
+            )
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads times. The clock is in Hz; it may have been given and not be known, by a fault that is noted."""
+
+    is_clock_given: bool
+    clock: Fraction | None
+    faults: Diagnostics
+
+    def times(self, block: Block, publisher: Converter, width: int) -> PublisherTimes:
+        """A publisher's times; early ones are rounded down, late ones up, so that no deadline is missed by rounding."""
+        period = self._cycles(block.period, "period", floor)
+        transfer_time = self._cycles(block.wcet, "wcet", ceil)
+        if block.wcet is None:
+            transfer_time = _beats_at_most(publisher, width)
+        deadline = self._cycles(block.deadline, "deadline", floor) if block.deadline else period
+        return PublisherTimes(period, transfer_time, deadline)
+
+    def _cycles(self, time: Text | None, key: str, rounded: Rounding) -> int | None:
+        """A time in cycles, or None if there is none or it is wrong, which is noted."""
+        if time is None:
+            return None
+        found = _QUANTITY.fullmatch(time)
+        units = (*_SECONDS, *_HERTZ) if key == "period" else tuple(_SECONDS)
+        if not found or found[2] not in ("", *units) or (not found[2] and "." in found[1]):
+            hint = f"a number of cycles, or a number with one of {', '.join(units)}"
+            self.faults.error(f"'{key}' cannot be '{time}'", time.source, hint)
+            return None
+        number, unit = Fraction(found[1]), found[2]
+        if unit and self.clock is None:
+            if not self.is_clock_given:
+                message = f"'{key}' is '{time}', but the clock's frequency is not given"
+                self.faults.error(message, time.source, "add 'clock' to the project, such as 'clock: 100 MHz'")
+            return None
+        cycles = number if not unit else self._of_unit(number, unit)
+        if not 1 <= cycles <= _LONGEST_TIME:
+            message = f"'{key}' is {floor(cycles)} cycles; legal: 1 to {_LONGEST_TIME}"
+            self.faults.error(message, time.source)
+            return None
+        return rounded(cycles)
+
+    def _of_unit(self, number: Fraction, unit: str) -> Fraction:
+        assert self.clock is not None
+        if unit in _SECONDS:
+            return number * _SECONDS[unit] * self.clock
+        return self.clock / (number * _HERTZ[unit]) if number else Fraction(0)
+
+
+def _beats_at_most(publisher: Converter, width: int) -> int | None:
+    """Beats of a publisher's longest frame; None if it has no bound."""
+    longest = publisher.buffer or length_of(publisher.frame).maximum
+    return None if longest is None else frame_beats(longest, width)

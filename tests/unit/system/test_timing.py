@@ -1,0 +1,113 @@
+"""Times of the specification in cycles, and what a scheduler gets of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.system.configuration import system_configuration
+from fusesoc_firm.system.derived import DerivedSystem, PublisherTimes, Scheduling
+from fusesoc_firm.system.show import derived_description
+from fusesoc_firm.system.specification import SCHEDULERS
+from fusesoc_firm.system.timing import frame_beats
+from tests.unit.system.systems import converter, derived, specification
+
+PREEMPTIVE = {"fixed_priority_preemptive", "edf_resources", "edf_latency", "lst"}
+
+
+def system(folder: Path, project: str, *publishers: str) -> DerivedSystem:
+    """Publishers p0, p1, ... of Point, each with these keys, or of Pose where these begin with `message`."""
+    blocks = ""
+    for number, keys in enumerate(publishers):
+        message = "message: geometry_msgs/Point, " if "message" not in keys else ""
+        kind = keys.split("message: ")[1].split(",")[0] if "message" in keys else "Point"
+        blocks += converter(f"s{number}", "subscriber", kind, f"p{number}")
+        blocks += f"  - {{name: p{number}, middleware: ROS, mode: publisher, {message}{keys}}}\n"
+    return derived(folder, specification(blocks, project=f"{{name: robot, {project}}}"))
+
+
+def times(folder: Path, keys: str, project: str = "clock: 100 MHz") -> PublisherTimes:
+    return system(folder, project, keys).scheduling.times[0]
+
+
+@pytest.mark.parametrize(
+    ("period", "clock", "cycles"),
+    [
+        ("1234", "100 MHz", 1234),
+        ("10 ms", "100 MHz", 1_000_000),
+        ("10ms", "12.5 MHz", 125_000),
+        ("0.5 us", "100 MHz", 50),
+        ("333 ns", "50 MHz", 16),  # of 16.65: a period that is too long would be too late
+        ("1 s", "1 kHz", 1000),
+        ("100 Hz", "100 MHz", 1_000_000),
+        ("3 kHz", "100 MHz", 33_333),
+        ("30 Hz", "100 MHz", 3_333_333),
+    ],
+)
+def test_a_period_in_cycles(tmp_path: Path, period: str, clock: str, cycles: int) -> None:
+    assert times(tmp_path, f"period: {period}", f"clock: {clock}").period == cycles
+
+
+def test_a_transfer_time_is_rounded_up(tmp_path: Path) -> None:
+    assert times(tmp_path, "wcet: 333 ns", "clock: 50 MHz").transfer_time == 17
+
+
+def test_the_deadline_is_the_period_unless_given(tmp_path: Path) -> None:
+    assert times(tmp_path, "period: 500") == PublisherTimes(500, 29, 500)
+    assert times(tmp_path, "period: 500, deadline: 200") == PublisherTimes(500, 29, 200)
+    assert times(tmp_path, "deadline: 600") == PublisherTimes(None, 29, 600)
+    assert times(tmp_path, "wcet: 40") == PublisherTimes(None, 40, None)
+
+
+@pytest.mark.parametrize(("width", "beats"), [(8, 29), (16, 15), (32, 8), (64, 4), (256, 1), (512, 1)])
+def test_the_size_of_a_message_says_how_long_it_is_sent(tmp_path: Path, width: int, beats: int) -> None:
+    assert times(tmp_path, "period: 500", f"width: {width}").transfer_time == beats == frame_beats(24, width)
+
+
+def test_a_message_without_bound_is_sent_for_nobody_knows_how_long(tmp_path: Path) -> None:
+    assert times(tmp_path, "message: std_msgs/String, period: 500").transfer_time is None
+    assert times(tmp_path, "message: std_msgs/String, period: 500, wcet: 90").transfer_time == 90
+
+
+@pytest.mark.parametrize("policy", SCHEDULERS)
+def test_every_policy_gets_its_generics(tmp_path: Path, policy: str) -> None:
+    keys = ("period: 500", "period: 90, deadline: 80, wcet: 30")
+    found = system(tmp_path, f"scheduler: {policy}, shortestRun: 4", *keys)
+    configuration = system_configuration(found)
+    generics = {item["formal"].strip(): item["actual"] for item in configuration["scheduler_generics"]}
+    expected = {"REQUESTERS": "2"}
+    if policy.startswith("fixed_priority"):
+        expected["PREEMPTIVE"] = str(policy in PREEMPTIVE).lower()
+    if policy.startswith("edf") or policy == "lst":
+        # 500 cycles and both frames, 3 bits more.
+        expected |= {"PERIODS": "PERIODS", "DEADLINES": "DEADLINES", "TIME_BITS": "13"}
+    if policy == "lst":
+        expected["TRANSFER_TIMES"] = "TRANSFER_TIMES"
+    if policy in PREEMPTIVE:
+        expected["SHORTEST_RUN"] = "4"
+    assert generics == expected
+    assert configuration["preemptive"] == str(policy in PREEMPTIVE).lower()
+    constants = (configuration["scheduler_times"] or {"constants": []})["constants"]
+    cycles = {item["name"]: [value["cycles"] for value in item["values"]] for item in constants}
+    known = {"PERIODS": [500, 90], "DEADLINES": [500, 80], "TRANSFER_TIMES": [29, 30]}
+    assert cycles == {name: known[name] for name in expected if name in known}
+
+
+def test_the_time_is_as_wide_as_the_longest_deadline_needs(tmp_path: Path) -> None:
+    assert system(tmp_path, "scheduler: round_robin", "wcet: 1").scheduling.time_bits == 8
+    assert system(tmp_path, "scheduler: edf_latency", "period: 268435455").scheduling.time_bits == 31
+
+
+def test_show_tells_them(tmp_path: Path) -> None:
+    found = derived_description(system(tmp_path, "scheduler: lst", "period: 500", "deadline: 80"))
+    assert (found["System"]["scheduler"], found["System"]["shortestRun"]) == ("lst", 16)
+    first, second = found["Converters"]["msg_to_AXIS"]
+    assert [first[key] for key in ("periodCycles", "wcetCycles", "deadlineCycles")] == [500, 29, 500]
+    assert "periodCycles" not in second and second["deadlineCycles"] == 80
+
+
+def test_a_scheduler_without_times_shows_none(tmp_path: Path) -> None:
+    found = system(tmp_path, "width: 8", "wcet: 7")
+    assert found.scheduling == Scheduling("fixed_priority", (PublisherTimes(None, 7, None),), False, 16, 8)
+    assert "shortestRun" not in derived_description(found)["System"]
