@@ -199,8 +199,12 @@ def _large_figures(evaluation: Evaluation, numbers: tuple[int, ...]) -> Iterator
     yield Figure("4.7", "preemptions per accelerator", "per completed transaction", numbers, (preemptions,))
     response = panel("response time", "response_avg", theirs.response_time, 1)
     yield Figure("4.10", "average response time", "cycles", numbers, (response,))
-    yield Figure("4.11", "average lateness", "cycles", numbers, (panel("lateness", "lateness_avg", theirs.lateness, 1),))
-    yield Figure("4.12", "maximum lateness", "cycles", numbers, (panel("lateness", "lateness_max", theirs.lateness, 2),))
+    yield Figure(
+        "4.11", "average lateness", "cycles", numbers, (panel("lateness", "lateness_avg", theirs.lateness, 1),)
+    )
+    yield Figure(
+        "4.12", "maximum lateness", "cycles", numbers, (panel("lateness", "lateness_max", theirs.lateness, 2),)
+    )
     channel = (
         panel("of all cycles", "utilisation", {}, 0),
         panel("of the cycles with a request", "utilisation_requested", {}, 0),

@@ -74,9 +74,7 @@ def evaluate(job: Job) -> Outcome:
     return Outcome(key, measure(trace), time.perf_counter() - started)
 
 
-def jobs(
-    data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence[int], settings: Settings
-) -> list[Job]:
+def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence[int], settings: Settings) -> list[Job]:
     """All combinations; the longest come first, so that no worker is left with one of them at the end."""
     keys = [Key(data_set, policy, number) for data_set in data_sets for policy in policies for number in requesters]
     keys.sort(key=lambda key: -key.requesters * settings.cycles_of(key.data_set) * settings.sets_of(key.data_set))

@@ -7,6 +7,7 @@ fractions in all three columns, and the models of the fixed priorities and of LR
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -99,7 +100,7 @@ def _distinct(of_set: Times, of_requester: Times, sets: int, requesters: int) ->
     """How many requesters of each set occur."""
     found = np.zeros((sets, requesters), np.bool_)
     found[of_set, of_requester] = True
-    return found.sum(axis=1).astype(float)
+    return np.asarray(found.sum(axis=1), float)
 
 
 def _preemptions(trace: Trace, completed: Times) -> Values:
@@ -119,4 +120,4 @@ def _ratio(numerator: Any, denominator: Any) -> Values:
 
 def _mean(values: Values) -> float:
     known = values[~np.isnan(values)]
-    return float(known.mean()) if known.size else float("nan")
+    return float(known.mean()) if known.size else math.nan

@@ -10,7 +10,7 @@ import pytest
 from fusesoc_firm.scheduling.metrics import METRICS, Metrics, measure
 from fusesoc_firm.scheduling.simulation import Tasks, Trace
 from fusesoc_firm.scheduling.workloads import Workload
-from tests.unit.scheduling.recording import times
+from tests.unit.scheduling.numbers import times
 
 # (set, requester, arrival, grant, finish, preemptions); transfer time 10, pause 20 in requester 0, 5 and 40 in 1.
 TASKS = [

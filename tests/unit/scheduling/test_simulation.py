@@ -7,8 +7,9 @@ import pytest
 
 from fusesoc_firm.scheduling.models import POLICIES, Generics
 from fusesoc_firm.scheduling.simulation import Trace, simulate
+from fusesoc_firm.scheduling.timeline import Recorder
 from fusesoc_firm.scheduling.workloads import Times, Workload
-from tests.unit.scheduling.recording import Recording, times
+from tests.unit.scheduling.numbers import times
 
 
 def run(
@@ -80,13 +81,13 @@ def test_sets_do_not_touch_each_other() -> None:
 
 def test_the_scheduler_sees_requests_that_stay_until_the_last_beat() -> None:
     workload = Workload(times([3, 2]), times([4, 4]))
-    model = Recording(POLICIES["fixed_priority"](Generics(workload.deadlines)))
+    model = Recorder(POLICIES["fixed_priority"](Generics(workload.deadlines)))
     simulate(model, workload, 12, times([0, 1]))
-    request = "".join("-01b"[int(r[0, 0]) * 1 + int(r[0, 1]) * 2] for r, _, _ in model.seen)
+    request = "".join("-01b"[int(r[0, 0]) * 1 + int(r[0, 1]) * 2] for r in model.request)
     assert request == "0bbb11--00bb"
-    lasts = [cycle for cycle, (_, beat, last) in enumerate(model.seen) if beat[0] and last[0]]
+    lasts = [cycle for cycle, last in enumerate(model.last) if last[0]]
     assert lasts == [3, 5, 11]
-    assert [cycle for cycle, (_, beat, _) in enumerate(model.seen) if beat[0]] == [1, 2, 3, 4, 5, 9, 10, 11]
+    assert [cycle for cycle, beat in enumerate(model.beat) if beat[0]] == [1, 2, 3, 4, 5, 9, 10, 11]
 
 
 @pytest.mark.parametrize("cycles", [1, 7])

@@ -1,0 +1,25 @@
+"""The combined schedulers of section 4.3.5: two schedulers of half the accelerators each below an LRU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+COMBINED_REQUESTERS = 256
+"""The accelerators of figure 4.18 and of table 4.5."""
+
+BASELINES: Mapping[str, str] = MappingProxyType({"LOEDF256": "edf_latency", "LST256": "lst"})
+"""What they are compared with: the name in table 4.5, and the policy."""
+
+COMBINATIONS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "(LOEDF128+LOEDF128)+LRU2": ("edf_latency", "edf_latency"),
+        "(LOEDF128+LST128)+LRU2": ("edf_latency", "lst"),
+        "(LST128+LST128)+LRU2": ("lst", "lst"),
+        "(LST128+LOEDF128)+LRU2": ("lst", "edf_latency"),
+    }
+)
+"""The policies of the lower and of the upper half of the accelerators, by the name in table 4.5."""
+
+TOP = "lru"
+"""The policy that chooses between the halves."""
