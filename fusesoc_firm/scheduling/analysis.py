@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf
+from math import floor, inf
 
 from fusesoc_firm.scheduling import area, response
 from fusesoc_firm.scheduling.dissertation import dissertation
@@ -211,7 +211,7 @@ def _lst(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
 
 def _least(task: Task, lateness: float, counted: int) -> int:
     """The lesser of two bounds, of which the first is on the lateness of any task."""
-    return int(min(task.deadline + lateness, counted))
+    return counted if lateness == inf else min(task.deadline + floor(lateness), counted)
 
 
 _RESPONSES: Mapping[str, Callable[[Sequence[Task], Overheads], list[int | None]]] = {

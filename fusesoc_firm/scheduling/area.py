@@ -35,9 +35,12 @@ Areas = Mapping[tuple[str, int], Area]
 def measured() -> Areas:
     """By policy and number of requesters; empty if nothing was measured."""
     file = resources.files(__package__) / FILE
-    if not file.is_file():
-        return {}
-    rows = csv.DictReader(file.read_text(encoding="utf-8").splitlines())
+    return read(file.read_text(encoding="utf-8")) if file.is_file() else {}
+
+
+def read(text: str) -> dict[tuple[str, int], Area]:
+    """The areas in the text of a file."""
+    rows = csv.DictReader(text.splitlines())
     return {(row["policy"], int(row["requesters"])): Area(int(row["lut"]), int(row["ff"])) for row in rows}
 
 

@@ -131,7 +131,7 @@ def _comparison_table(evaluation: Evaluation) -> Table:
             # Who never preempts does not take part, nor does it in the dissertation.
             taking_part = [name for name in policies if criterion != "preemptions" or POLICIES[name].is_preemptive]
             best = _best({name: score(name) for name in taking_part})
-            theirs = dissertation().comparison.get(number, {}).get(criterion, ())
+            theirs = dissertation().comparison.get(number, {}).get(criterion, [])
             rows.append((str(number), title, _names(best), _names(theirs)))
     note = "The least response time and lateness are those on average."
     return Table("4.6", "comparison", ("accelerators", "criterion", "best", "dissertation"), tuple(rows), note)

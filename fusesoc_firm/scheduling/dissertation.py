@@ -8,7 +8,7 @@ from importlib import resources
 
 import yaml
 
-Row = tuple[float, ...]
+Row = list[float]
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Dissertation:
     response_time: dict[str, dict[int, Row]]
     lateness: dict[str, dict[int, Row]]
     combined_area: dict[str, Row]
-    comparison: dict[int, dict[str, tuple[str, ...]]]
+    comparison: dict[int, dict[str, list[str]]]
 
 
 @cache

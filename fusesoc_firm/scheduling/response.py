@@ -87,8 +87,8 @@ def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], ov
 
 def taking_turns(task: Task, others: Sequence[Task], overheads: Overheads) -> int:
     """The bound under round robin and LRU: every other requester goes first at most once."""
-    waits = max(overheads.decision, sum(map(overheads.service, others)))
-    return overheads.acceptance + waits + overheads.service(task)
+    waits = overheads.acceptance + overheads.decision + sum(map(overheads.service, others))
+    return waits + overheads.service(task)
 
 
 def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
@@ -104,17 +104,19 @@ def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
         return inf
     late = overheads.acceptance
     services = [overheads.service(task) + overheads.resume for task in tasks]
+    shares = [service / task.period for task, service in zip(tasks, services, strict=True)]
+    spare = [task.period - task.deadline + late for task in tasks]
     # The demand up to u is never more than load * u + slope.
-    slope = sum(
-        service / task.period * max(0, task.period - task.deadline + late)
-        for task, service in zip(tasks, services, strict=True)
-    )
+    slope = sum(share * max(0, each) for share, each in zip(shares, spare, strict=True))
     least = float(max(service - task.deadline for task, service in zip(tasks, services, strict=True)))
     affordable = _MOST_DEADLINES / sum(1 / task.period for task in tasks)
     needed = (slope - least) / (1 - load) if load < 1 else inf
     horizon = min(affordable, needed)
     most = max(least, _most_excess(tasks, services, late, int(horizon)))
     if needed > horizon:
+        # From the last of the first deadlines on, the line lies lower.
+        if horizon >= max(task.deadline for task in tasks):
+            slope = sum(share * each for share, each in zip(shares, spare, strict=True))
         most = max(most, slope - (1 - load) * horizon)
     return overheads.blocking + late + most
 
@@ -129,7 +131,8 @@ def _most_excess(tasks: Sequence[Task], services: Sequence[int], late: int, hori
     time, demand = np.concatenate(times), np.concatenate(demands)
     order = np.argsort(time, kind="stable")
     # At equal deadlines only the last sum is the demand; those before it are less, and do no harm.
-    return float((np.cumsum(demand[order]) - time[order]).max(initial=-inf))
+    excess = np.cumsum(demand[order]) - time[order]
+    return float(excess.max()) if excess.size else -inf
 
 
 def edf_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) -> int:

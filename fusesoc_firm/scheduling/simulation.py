@@ -100,6 +100,8 @@ class _Environment:
         self.resume_beats = resume_beats
         self.lengths = workload.transfer_times.ravel()
         self.pauses = workload.frequencies.ravel()
+        periods = np.zeros_like(workload.frequencies) if workload.periods is None else workload.periods
+        self.periods = periods.ravel()
         self.base = np.arange(shape[0]) * shape[1]
         # 32 bits: these are compared with the time in every cycle.
         self.next_request = first_requests.astype(np.int32)
@@ -160,7 +162,7 @@ class _Environment:
         ends = np.full(done.size, time)
         self.finished.append((done, self.arrival[done], self.grant[done], ends, self.preemptions[done]))
         self.request.ravel()[done] = False
-        self.next_request.ravel()[done] = time + self.pauses[done]
+        self.next_request.ravel()[done] = np.maximum(time + self.pauses[done], self.arrival[done] + self.periods[done])
         self.remaining[done] = self.lengths[done]
         self.grant[done] = -1
         self.preemptions[done] = 0

@@ -77,7 +77,7 @@ def timelines() -> tuple[Timeline, Timeline]:
 
 
 def record(policy: str, workload: Workload, cycles: int) -> tuple[tuple[tuple[bool, ...], ...], tuple[int, ...]]:
-    """The requests and the grants of a timeline, for the workload's first set, whose accelerators all ask in cycle 1."""
+    """Requests and grants of a timeline: those of the workload's first set, whose accelerators all ask in cycle 1."""
     recorder = Recorder(model_of(policy, workload))
     simulate(recorder, workload, cycles, np.ones_like(workload.frequencies))
     requests = np.array(recorder.request)[:, 0, :].T

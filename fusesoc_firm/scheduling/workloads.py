@@ -64,10 +64,15 @@ DATA_SETS: Mapping[str, DataSet] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Workload:
-    """Accelerators of B sets of N each; both arrays have the shape (B, N) and count cycles, none below 1."""
+    """Accelerators of B sets of N each; the arrays have the shape (B, N) and count cycles.
+
+    A request comes `frequencies` after the last transmission, and no sooner than `periods` after the last request;
+    `periods` of None do not matter.
+    """
 
     transfer_times: Times
     frequencies: Times
+    periods: Times | None = None
 
     @property
     def sets(self) -> int:

@@ -50,6 +50,9 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["message", "verify"],
         ["system"],
         ["system", "check"],
+        ["scheduler"],
+        ["scheduler", "bench"],
+        ["scheduler", "choose"],
     ],
     ids=" ".join,
 )
