@@ -120,8 +120,9 @@ def _scheduler(system: DerivedSystem) -> Configuration:
     policy = scheduling.policy
     generics = {"REQUESTERS": str(len(system.publishers))}
     constants = []
-    if policy.startswith(_FIXED_PRIORITY):
-        generics["PREEMPTIVE"] = _boolean(scheduling.is_preemptive)
+    is_fixed = policy.startswith(_FIXED_PRIORITY)
+    if is_fixed and scheduling.is_preemptive:
+        generics["PREEMPTIVE"] = "true"
     if policy in WITH_DEADLINES:
         deadlines = [item.deadline for item in scheduling.times]
         periods = [item.period or item.deadline for item in scheduling.times]
@@ -134,10 +135,9 @@ def _scheduler(system: DerivedSystem) -> Configuration:
     if scheduling.is_preemptive:
         generics["SHORTEST_RUN"] = str(scheduling.shortest_run)
     return {
-        "scheduler": f"firm_sched_{_FIXED_PRIORITY if policy.startswith(_FIXED_PRIORITY) else policy}",
+        "scheduler": f"firm_sched_{_FIXED_PRIORITY if is_fixed else policy}",
         "scheduler_generics": _aligned(generics),
         "is_preemptive": scheduling.is_preemptive,
-        "preemptive": _boolean(scheduling.is_preemptive),
         "scheduler_times": {"constants": constants} if constants else None,
     }
 
@@ -162,10 +162,6 @@ def _aligned(generics: Mapping[str, str]) -> list[Configuration]:
         {"formal": name.ljust(width), "actual": actual, "comma": "" if name == last else ","}
         for name, actual in generics.items()
     ]
-
-
-def _boolean(value: bool) -> str:
-    return str(value).lower()
 
 
 def _blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]]:

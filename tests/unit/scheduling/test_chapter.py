@@ -17,6 +17,8 @@ from fusesoc_firm.scheduling.metrics import METRICS
 from fusesoc_firm.scheduling.policies import EVALUATED, POLICIES
 from fusesoc_firm.scheduling.tables import Table, figure_csv, figure_markdown, markdown, table_csv
 from fusesoc_firm.scheduling.workloads import DATA_SETS, REQUESTERS
+from tests.bench import tables as bench_tables
+from tests.bench.areas import write_areas
 
 
 def evaluation(areas: area.Areas | None = None) -> Evaluation:
@@ -146,6 +148,19 @@ def test_areas_are_written_and_read(tmp_path: Path) -> None:
     text = (tmp_path / area.FILE).read_text()
     assert text == "policy,requesters,lut,ff\nlru,8,80,40\nlru,256,1600,363\n"
     assert area.read(text) == areas
+
+
+def test_the_bench_writes_what_it_measured_of_schedulers(tmp_path: Path) -> None:
+    columns = ("design", "ROS", "bits", "LUT", "FF", "LUT as RAM", "result")
+    rows = (
+        ("lru, N = 8", "", "", "70", "40", "10", "met"),
+        ("edf_resources, N = 256", "", "", "900", "379", "", ""),
+        ("lst, N = 8", "", "", "", "", "", "FAILED"),
+    )
+    others = bench_tables.Table("Converters", columns, (("lru, N = 2", "", "", "1", "1", "", ""),))
+    path = tmp_path / "area.csv"
+    write_areas([others, bench_tables.Table("Schedulers", columns, rows)], path)
+    assert area.read(path.read_text()) == {("lru", 8): Area(80, 40), ("edf_resources", 256): Area(900, 379)}
 
 
 @pytest.mark.skipif(not pictures.are_possible(), reason="matplotlib is not installed")

@@ -77,8 +77,8 @@ def test_every_policy_gets_its_generics(tmp_path: Path, policy: str) -> None:
     configuration = system_configuration(found)
     generics = {item["formal"].strip(): item["actual"] for item in configuration["scheduler_generics"]}
     expected = {"REQUESTERS": "2"}
-    if policy.startswith("fixed_priority"):
-        expected["PREEMPTIVE"] = str(policy in PREEMPTIVE).lower()
+    if policy == "fixed_priority_preemptive":
+        expected["PREEMPTIVE"] = "true"
     if policy.startswith("edf") or policy == "lst":
         # 500 cycles and both frames, 3 bits more.
         expected |= {"PERIODS": "PERIODS", "DEADLINES": "DEADLINES", "TIME_BITS": "13"}
@@ -87,7 +87,7 @@ def test_every_policy_gets_its_generics(tmp_path: Path, policy: str) -> None:
     if policy in PREEMPTIVE:
         expected["SHORTEST_RUN"] = "4"
     assert generics == expected
-    assert configuration["preemptive"] == str(policy in PREEMPTIVE).lower()
+    assert configuration["is_preemptive"] == (policy in PREEMPTIVE)
     constants = (configuration["scheduler_times"] or {"constants": []})["constants"]
     cycles = {item["name"]: [value["cycles"] for value in item["values"]] for item in constants}
     known = {"PERIODS": [500, 90], "DEADLINES": [500, 80], "TRANSFER_TIMES": [29, 30]}

@@ -1,0 +1,87 @@
+"""The joiner of bursts that stands for the host's software: frames cut at random and mixed come out whole."""
+
+from __future__ import annotations
+
+import random
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from tests.sim.frames import Frame, random_frames, write_expected, write_stimulus
+from tests.sim.ghdl import Library, core_files
+
+BENCH = "firm_sim_join_tb"
+SEED = 20240719
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    library = Library("firm", tmp_path_factory.mktemp("join"))
+    library.analyse(core_files("axis/axis", "sim/host", "sim/parts"))
+    library.analyse(core_files("sim/parts", fileset="tb"))
+    return library
+
+
+def bursts_of(frame: Frame, width: int, source: random.Random) -> list[bytes]:
+    """A frame as a preempted publisher sends it: cut between beats; each burst but the first begins with a beat more."""
+    lanes = width // 8
+    data = frame.to_bytes()
+    beats = [data[start : start + lanes] for start in range(0, len(data), lanes)]
+    cuts = sorted({0, *source.sample(range(len(beats)), source.randint(0, min(5, len(beats))))})
+    pieces = [b"".join(beats[start:end]) for start, end in zip(cuts, [*cuts[1:], None], strict=True)]
+    return [pieces[0], *(bytes([frame.id]) + source.randbytes(lanes - 1) + piece for piece in pieces[1:])]
+
+
+def mixed(frames: list[Frame], width: int, seed: int) -> tuple[list[bytes], list[tuple[int, bytes]]]:
+    """Bursts, those of one id in their order, and the frames as they become whole, each with its last burst's number."""
+    source = random.Random(seed)
+    waiting: dict[int, list[tuple[bytes, bytes | None]]] = defaultdict(list)
+    for frame in frames:
+        *others, last = bursts_of(frame, width, source)
+        waiting[frame.id] += [*((burst, None) for burst in others), (last, frame.to_bytes())]
+    bursts: list[bytes] = []
+    whole = []
+    while waiting:
+        number = source.choice(sorted(waiting))
+        burst, frame_bytes = waiting[number].pop(0)
+        if frame_bytes is not None:
+            whole.append((len(bursts), frame_bytes))
+        bursts.append(burst)
+        if not waiting[number]:
+            del waiting[number]
+    return bursts, whole
+
+
+def run(library: Library, folder: Path, bursts: list[bytes], whole: list[tuple[int, bytes]], **generics: int) -> str:
+    write_stimulus(folder / "stimulus.txt", bursts)
+    write_expected(folder / "expected.txt", whole)
+    return library.run(BENCH, {"SEED": SEED, **generics}, directory=folder).output
+
+
+@pytest.mark.parametrize("width", [8, 16, 64, 512])
+@pytest.mark.parametrize("stall", [0, 50])
+def test_frames_come_out_whole(library: Library, tmp_path: Path, width: int, stall: int) -> None:
+    frames = random_frames([0, 1, 7, 255], 60, 3 * width // 8 + 9, SEED)
+    bursts, whole = mixed(frames, width, SEED)
+    assert len(bursts) > 1.5 * len(frames)
+    output = run(library, tmp_path, bursts, whole, WIDTH=width, STALL_PERCENT=stall)
+    assert output.splitlines()[-1] == "PASS 60/60", output
+
+
+def test_a_lost_byte_is_seen(library: Library, tmp_path: Path) -> None:
+    bursts, whole = mixed([Frame(1, b"abcdefgh"), Frame(2, b"ijkl")], 8, SEED)
+    assert "FAIL" in run(library, tmp_path, [*bursts[:-1], bursts[-1][:-1]], whole)
+
+
+@pytest.mark.parametrize(
+    ("bursts", "message"),
+    [
+        ([b"\x01\x02\0\0\0ab\x01"], "burst of id 1 goes on behind its frame"),
+        ([b"\x01\x02\0\0", b"\x01"], "burst of id 1 resumes a frame without a beat of it"),
+    ],
+)
+def test_a_burst_that_does_not_fit_is_named(
+    library: Library, tmp_path: Path, bursts: list[bytes], message: str
+) -> None:
+    assert message in run(library, tmp_path, bursts, [(0, b"\x01\x02\0\0\0ab")])
