@@ -56,11 +56,11 @@ class Overheads:
 def fixed_priority_preemptive(task: Task, higher: Sequence[Task], overheads: Overheads) -> int | None:
     """The bound with these tasks of higher priority; None if there is none, as they may take all the time there is.
 
-    Every request of higher priority may interrupt once, which costs a resumption. One that comes in the last cycles of
-    the task before this one waits for its end, so it counts as if it came that much later.
+    Every request of higher priority may interrupt once, which costs a resumption. The run that blocks is one of a
+    lower priority, or the last one of the task before this one, behind which requests of higher priority may wait.
     """
     wait = overheads.blocking + overheads.service(task)
-    return _fixed_point(wait, higher, overheads, before=overheads.shortest_run, after=overheads.resume)
+    return _fixed_point(wait, higher, overheads, after=overheads.resume)
 
 
 def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], overheads: Overheads) -> int | None:
