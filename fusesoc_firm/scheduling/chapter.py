@@ -57,13 +57,15 @@ def tables(evaluation: Evaluation) -> Iterator[Table]:
 
 
 def figures(evaluation: Evaluation) -> Iterator[Figure]:
-    """Figures 4.5 to 4.7 and 4.10 to 4.17, of what was evaluated."""
+    """Figures 4.5 to 4.7 and 4.10 to 4.18, of what was evaluated."""
     yield _area_figure(evaluation.areas)
     if numbers := evaluation.requesters(LARGE):
         yield from _large_figures(evaluation, numbers)
     cases = [name for name in CORNER_CASES if evaluation.requesters(name)]
     if cases:
         yield from _corner_figures(evaluation, cases)
+    if any(key.policy in COMBINATIONS for key in evaluation.means):
+        yield _combined_figure(evaluation)
 
 
 def _area_table(areas: Areas) -> Table:
@@ -222,6 +224,18 @@ def _corner_figures(evaluation: Evaluation, cases: Sequence[str]) -> Iterator[Fi
     ):
         panels = tuple(Panel(_case_title(case), _series(evaluation, case, numbers, metric)) for case in cases)
         yield Figure(number, title, unit, numbers, panels)
+
+
+def _combined_figure(evaluation: Evaluation) -> Figure:
+    panels = []
+    for metric in ("granted", "finished"):
+        series = {
+            name: [evaluation.value(LARGE, BASELINES.get(name, name), COMBINED_REQUESTERS, metric)]
+            for name in (*BASELINES, *COMBINATIONS)
+        }
+        panels.append(Panel(metric, series))
+    title = "combined schedulers: accelerators that got the grant and that finished"
+    return Figure("4.18", title, "accelerators", (COMBINED_REQUESTERS,), tuple(panels))
 
 
 def _case_title(case: str) -> str:

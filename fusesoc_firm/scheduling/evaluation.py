@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from fusesoc_firm.scheduling.combinations import COMBINATIONS, COMBINED_REQUESTERS, combined
 from fusesoc_firm.scheduling.metrics import Metrics, measure
 from fusesoc_firm.scheduling.models import POLICIES as MODELS
 from fusesoc_firm.scheduling.models import Generics
@@ -34,7 +35,7 @@ class Settings:
 
 @dataclass(frozen=True, order=True)
 class Key:
-    """What is evaluated: a scheduler, by the name of its policy, with a data set of so many accelerators."""
+    """What is evaluated: a policy or a combination, by its name, with so many accelerators of a data set."""
 
     data_set: str
     policy: str
@@ -59,8 +60,14 @@ class Outcome:
 
 
 def model_of(policy: str, workload: Workload) -> SchedulerModel:
-    """The model of a policy for a workload. The period of a requester is the least time between its requests."""
-    return MODELS[policy](Generics(workload.deadlines, workload.transfer_times))
+    """The model of a policy, or of a combination, for a workload.
+
+    The period of a requester is the least time between its requests, that is, its implicit deadline.
+    """
+    generics = Generics(workload.deadlines, workload.transfer_times)
+    if policy in COMBINATIONS:
+        return combined(COMBINATIONS[policy], generics)
+    return MODELS[policy](generics)
 
 
 def evaluate(job: Job) -> Outcome:
@@ -75,8 +82,18 @@ def evaluate(job: Job) -> Outcome:
 
 
 def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence[int], settings: Settings) -> list[Job]:
-    """All combinations; the longest come first, so that no worker is left with one of them at the end."""
+    """A job for all of everything; the longest come first, so that no worker is left with one of them at the end.
+
+    The combined schedulers of figure 4.18 join in if all that they consist of takes part.
+    """
+    data_sets = list(data_sets)
     keys = [Key(data_set, policy, number) for data_set in data_sets for policy in policies for number in requesters]
+    if "large" in data_sets and COMBINED_REQUESTERS in requesters:
+        keys += [
+            Key("large", name, COMBINED_REQUESTERS)
+            for name, parts in COMBINATIONS.items()
+            if set(parts) <= set(policies)
+        ]
     keys.sort(key=lambda key: -key.requesters * settings.cycles_of(key.data_set) * settings.sets_of(key.data_set))
     return [Job(key, settings) for key in keys]
 

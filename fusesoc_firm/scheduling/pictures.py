@@ -33,8 +33,9 @@ def draw_figure(figure: Figure, folder: Path) -> None:
     size = (_PANEL_INCHES[0] * columns, _PANEL_INCHES[1] * rows)
     drawing, axes = plots.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
     drawing.suptitle(f"Figure {figure.number}: {figure.title}")
+    draw_panel = _draw_lines if len(figure.requesters) > 1 else _draw_bars
     for panel, axis in zip(figure.panels, axes.flat, strict=False):
-        _draw_panel(axis, figure, panel)
+        draw_panel(axis, figure, panel)
     for axis in axes.flat[len(figure.panels) :]:
         axis.set_visible(False)
     _save(drawing, folder / figure.file_name)
@@ -63,7 +64,17 @@ def _plots() -> Any:
     return import_module("matplotlib.pyplot")
 
 
-def _draw_panel(axis: Any, figure: Figure, panel: Panel) -> None:
+def _draw_bars(axis: Any, figure: Figure, panel: Panel) -> None:
+    """Of a single number of accelerators: a bar for each scheduler."""
+    heights = [values[0] for values in panel.series.values()]
+    axis.barh(list(panel.series), heights)
+    axis.invert_yaxis()
+    axis.set_title(f"{panel.title}, {figure.requesters[0]} accelerators")
+    axis.set_xlabel(figure.unit)
+    axis.grid(visible=True, axis="x", alpha=0.3)
+
+
+def _draw_lines(axis: Any, figure: Figure, panel: Panel) -> None:
     places = range(len(figure.requesters))
     for index, (name, values) in enumerate(panel.series.items()):
         style = {"color": f"C{index}", "marker": _MARKERS[index % len(_MARKERS)], "markersize": 4}
