@@ -1,4 +1,4 @@
-"""`make bench`: measure, print the tables, write docs/figures.md.
+"""`make bench`: measure, print the tables, write docs/figures.md and the schedulers' areas.
 
     python -m tests.bench [area] [timing] [cycles] [fuzz] [--seed N] [--broken N]
 
@@ -12,6 +12,7 @@ import argparse
 import sys
 
 from tests.bench import area, cycles, figures, fuzz, timing
+from tests.bench.areas import write_areas
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import Table
 from tests.bench.yosys import Yosys
@@ -40,6 +41,8 @@ def main() -> int:
         is_good = is_good and all(table.is_good for table in tables)
         sections[part] = figures.section(part, tables)
         print(sections[part], flush=True)
+        if part == "area":
+            write_areas(tables)
     figures.write(sections)
     return 0 if is_good else 1
 

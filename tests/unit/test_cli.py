@@ -57,6 +57,9 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["system", "diagram"],
         ["system", "report"],
         ["system", "schema"],
+        ["scheduler"],
+        ["scheduler", "bench"],
+        ["scheduler", "choose"],
     ],
     ids=" ".join,
 )
