@@ -16,7 +16,6 @@ from tests.bench.areas import write_areas
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import Table
 from tests.bench.yosys import Yosys
-from tests.sim.ghdl import REPOSITORY
 
 SEED = 1
 
@@ -48,7 +47,7 @@ def main() -> int:
 
 
 def _measure(part: str, seed: int, broken: int) -> list[Table]:
-    yosys = Yosys(REPOSITORY / "build" / "bench")
+    yosys = Yosys()
     if part == "area":
         return area.measure(yosys, _tell)
     if part == "timing":

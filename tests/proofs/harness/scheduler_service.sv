@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A scheduler serves: while somebody waits and the sink is ready, somebody is served.
+module scheduler_service (input clk);
+
+`include "scheduler_environment.svh"
+
+// Cycles on end in which the sink is ready, somebody asks, and nothing is sent. A task that is not preempted may pause; that is
+// its requester's doing.
+wire      pausing = !`IS_PREEMPTIVE && begun[grant_select] && !request[grant_select];
+reg [3:0] idle;
+always @(posedge clk) begin
+    if (!rst_n || !ready || request == 0 || beat || pausing) idle <= 0;
+    else if (idle != 15) idle <= idle + 1;
+end
+
+// When a task ended, another requester was waiting.
+wire [N-1:0] granted_before = 1'b1 << grant_select_before;
+wire         was_awaited    = finished_before && (request_before & ~granted_before) != 0;
+
+always @* if (running) begin
+    no_deadlock: assert (idle <= `LATENCY);
+    if (was_awaited && ready) no_gap_between_tasks: assert (beat);
+end
+
+`include "helpers.svh"
+
+endmodule

@@ -1,0 +1,107 @@
+"""What a proof is: a harness, the entity it is about, the sizes it is done at, and faults that it must find."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.proofs.symbiyosys import Outcome, Task
+from tests.sim.ghdl import Generic, Library, core_files
+
+HARNESSES = Path(__file__).parent / "harness"
+
+_LABEL = re.compile(r"\b(\w+): assert\b")
+_HELPER = "helper_"
+_INCLUDE = re.compile(r'^`include "(\S+)"', re.MULTILINE)
+# A harness of several entities includes under this name what ties it to the registers of the one.
+_HELPERS = "helpers.svh"
+
+
+class MutationError(Exception):
+    """What a mutation replaces is not there."""
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """A fault in a copy of `file`: `old` stands there once, and with `new` instead each of `violates` must fail.
+
+    It is tried at the first of the proof's sizes or, if only another one shows it, at that of the index `size`.
+    """
+
+    file: str
+    old: str
+    new: str
+    violates: tuple[str, ...]
+    size: int = 0
+
+
+@dataclass(frozen=True)
+class Proof:
+    """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics, by induction.
+
+    `depth` is the induction's, `trace` that of the search for what a mutation violates, both in cycles. The harness gets
+    the generics and `defines` as macros. `helpers` is the entity's own part of a harness that is for several.
+    """
+
+    harness: str
+    entity: str
+    cores: tuple[str, ...]
+    sizes: tuple[Mapping[str, Generic], ...]
+    depth: int
+    mutations: tuple[Mutation, ...]
+    defines: Mapping[str, object] = field(default_factory=dict)
+    helpers: str | None = None
+    trace: int = 12
+
+    @property
+    def name(self) -> str:
+        """`scheduler_grants of firm_sched_lru`."""
+        return f"{self.harness} of {self.entity}"
+
+    @property
+    def properties(self) -> list[str]:
+        """The labels of what is proved, in order, but for the invariants that are only there for the induction."""
+        labels = [label for text in self._texts().values() for label in _LABEL.findall(text)]
+        return [label for label in labels if not label.startswith(_HELPER)]
+
+    def prove(self, size: Mapping[str, Generic], folder: Path) -> Outcome:
+        """Prove all assertions at a size; `folder` is empty."""
+        return self._task(core_files(*self.cores), size, folder).prove(folder, self.depth)
+
+    def search(self, mutation: Mutation, label: str, folder: Path) -> Outcome:
+        """Look for a trace in which a broken copy violates an assertion; `folder` is empty."""
+        files = _mutated(core_files(*self.cores), mutation, folder)
+        return self._task(files, self.sizes[mutation.size], folder).search(folder, self.trace, label)
+
+    def _task(self, files: Sequence[Path], size: Mapping[str, Generic], folder: Path) -> Task:
+        library = Library("firm", folder)
+        library.analyse(files)
+        netlist = library.synthesise(self.entity, size, "verilog")
+        defines = {**{name: int(value) for name, value in size.items()}, **self.defines}
+        return Task(f"{self.harness}.sv", {**self._texts(), "netlist.v": netlist}, defines)
+
+    def _texts(self) -> dict[str, str]:
+        """The harness and what it includes, by the name under which it does."""
+        name = f"{self.harness}.sv"
+        harness = (HARNESSES / name).read_text(encoding="utf-8")
+        return {name: harness} | {included: self._included(included) for included in _INCLUDE.findall(harness)}
+
+    def _included(self, name: str) -> str:
+        if name == _HELPERS:
+            return (HARNESSES / "helpers" / f"{self.helpers}.svh").read_text(encoding="utf-8") if self.helpers else ""
+        return (HARNESSES / name).read_text(encoding="utf-8")
+
+
+def _mutated(files: Sequence[Path], mutation: Mutation, folder: Path) -> list[Path]:
+    """The files, with a broken copy in `folder` in the place of one."""
+    (original,) = [file for file in files if file.name == mutation.file] or [None]
+    if original is None:
+        raise MutationError(f"{mutation.file} is none of the files")
+    text = original.read_text(encoding="utf-8")
+    if text.count(mutation.old) != 1:
+        raise MutationError(f"{mutation.file} holds {text.count(mutation.old)} times: {mutation.old}")
+    copy = folder / mutation.file
+    copy.write_text(text.replace(mutation.old, mutation.new), encoding="utf-8")
+    return [copy if file == original else file for file in files]
