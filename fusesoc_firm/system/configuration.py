@@ -387,6 +387,8 @@ def _accelerator(names: _Names, block: AcceleratorBlock, width: int) -> Configur
     formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type, width)]
     return {
         **_instance(names, block.block, accelerator_entity(block.type)),
+        "has_width": block.type.has_width,
+        "width": width,
         "ports": port_map(
             [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names.port(block.block, formal)) for formal in formals)]
         ),
