@@ -42,6 +42,7 @@ from fusesoc_firm.system.specification import (
     OutputType,
     Specification,
 )
+from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.timing import scheduling_of
 from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text
@@ -139,7 +140,8 @@ class _Analysis:
             outputs = self._sides("out", accelerator.interface.output)
             if inputs is None or outputs is None or not accelerator.interface.is_sound or not accelerator.name:
                 continue
-            found = AcceleratorType(accelerator, inputs, outputs)
+            sources = [self.folder / source for source in accelerator.sources]
+            found = AcceleratorType(accelerator, inputs, outputs, declares_width(accelerator, sources))
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
                 check_kernel(found, self.faults)

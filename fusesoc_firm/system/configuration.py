@@ -439,6 +439,8 @@ def _accelerator(names: _Names, block: AcceleratorBlock, width: int) -> Configur
     formals += [str(pin.name) for pin in block.type.accelerator.pins]
     return {
         **_instance(names, block.block, accelerator_entity(block.type)),
+        "has_width": block.type.has_width,
+        "width": width,
         "ports": port_map(
             [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names.port(block.block, formal)) for formal in formals)]
         ),

@@ -67,11 +67,12 @@ class MessageSide:
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with its messages resolved."""
+    """An accelerator with its messages resolved; `has_width` if its entity is to be told the streams' width."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
     outputs: tuple[MessageSide, ...]
+    has_width: bool = False
 
 
 @dataclass(frozen=True)
