@@ -146,6 +146,13 @@ def _add_system(commands: Any) -> None:
     show = _command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
     )
+    skeletons = _command(
+        actions,
+        "skeleton",
+        "write a first version of each accelerator that has no source",
+        "firm system skeleton robot.yaml",
+        _write_skeletons,
+    )
     draw = _command(
         actions,
         "diagram",
@@ -162,7 +169,7 @@ def _add_system(commands: Any) -> None:
         "firm system report robot.yaml",
         _report_system,
     )
-    for parser in (new, check, show, draw, report):
+    for parser in (new, check, show, skeletons, draw, report):
         parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
         _add_sources(parser)
     _command(
@@ -363,6 +370,18 @@ def _message_names(arguments: argparse.Namespace) -> list[str]:
     return sorted({str(name) for ros in (1, 2) for name in _library(arguments, ros).names()})
 
 
+def _write_skeletons(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.skeleton import missing_sources
+
+    loaded = _load(arguments, needs_sources=False)
+    texts = missing_sources(loaded.system, loaded.folder)
+    for path, text in texts.items():
+        _write(path, text)
+        print(path)
+    if not texts:
+        print("every accelerator has a source")
+
+
 def _draw_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.diagram import diagram
 
@@ -388,6 +407,7 @@ def _print_schema(_: argparse.Namespace) -> None:
 
 def _write(path: Path, text: str) -> None:
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         fail(f"cannot write {path}: {error.strerror}")
@@ -421,11 +441,12 @@ def _choose_scheduler(arguments: argparse.Namespace) -> None:
     print(show(choose(tasks_of(system), Criterion(arguments.criterion), channel), arguments.format), end="")
 
 
-def _load(arguments: argparse.Namespace) -> LoadedSystem:
+def _load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
     from fusesoc_firm.message.library import libraries
     from fusesoc_firm.system.generator import load_system
 
-    return load_system(arguments.spec, libraries(arguments.path, os.environ, arguments.distro))
+    known = libraries(arguments.path, os.environ, arguments.distro)
+    return load_system(arguments.spec, known, needs_sources=needs_sources)
 
 
 def _yaml(data: dict[str, Any]) -> str:

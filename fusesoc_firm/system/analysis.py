@@ -51,12 +51,19 @@ Libraries = Mapping[RosVersion, MessageLibrary]
 _MOST_CONVERTERS = 256
 
 
-def derive(specification: Specification, folder: Path, libraries: Libraries, faults: Diagnostics) -> DerivedSystem:
-    """The system that a specification in `folder` describes.
+def derive(
+    specification: Specification,
+    folder: Path,
+    libraries: Libraries,
+    faults: Diagnostics,
+    *,
+    needs_sources: bool = True,
+) -> DerivedSystem:
+    """The system that a specification in `folder` describes; unless it `needs_sources`, those may be missing.
 
     Raises `InputError` with the faults found here and those already in `faults`.
     """
-    analysis = _Analysis(specification, folder, libraries, faults)
+    analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
     analysis.check_names()
     analysis.resolve_accelerators()
     analysis.resolve_blocks()
@@ -106,6 +113,7 @@ class _Analysis:
     folder: Path
     libraries: Libraries
     faults: Diagnostics
+    needs_sources: bool
     types: dict[str, AcceleratorType] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
     inputs: dict[str, tuple[MessageSide, ...]] = field(default_factory=dict)
@@ -150,8 +158,8 @@ class _Analysis:
     def _check_sources(self, accelerator: Accelerator) -> None:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())
         for source in accelerator.sources:
-            if not (self.folder / source).is_file():
-                hint = "paths are relative to the specification"
+            if self.needs_sources and not (self.folder / source).is_file():
+                hint = "paths are relative to the specification; 'firm system skeleton' writes a first version"
                 self.faults.error(f"there is no source file '{source}'", source.source, hint)
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
                 hint = f"legal here: {', '.join(legal)}"

@@ -53,11 +53,14 @@ class LoadedSystem:
         return list(dict.fromkeys(found))
 
 
-def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary]) -> LoadedSystem:
-    """Read and derive the system of a specification. Raises `InputError` with all its faults."""
+def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary], *, needs_sources: bool = True) -> LoadedSystem:
+    """Read and derive the system of a specification. Raises `InputError` with all its faults.
+
+    Unless it `needs_sources`, those of accelerators may be missing.
+    """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
-    system = derive(specification, path.parent, libraries, faults)
+    system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system)
 
 

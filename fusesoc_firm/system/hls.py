@@ -90,6 +90,14 @@ def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[
     return found
 
 
+def prototype(accelerator: AcceleratorType) -> str:
+    """The function as it must be declared."""
+    inputs, outputs = arguments(accelerator)
+    parameters = [f"{_cpp_type(item)} {item.port}" for item in inputs]
+    parameters += [f"{_cpp_type(item)} *{item.port}" for item in outputs]
+    return f"void {function_name(accelerator)}({', '.join(parameters)})"
+
+
 def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
     """Note what keeps an accelerator from being a function: its name, or messages that no plain parameters carry."""
     name, sources = accelerator.accelerator.name, accelerator.accelerator.sources

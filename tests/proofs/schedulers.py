@@ -13,7 +13,9 @@ _THREE = 1  # the index of the size that is no power of two
 _AT_ONCE = {"LATENCY": 1, "IS_PREEMPTIVE": 0}
 
 
-def _proofs(core: str, defines: Mapping[str, object], mutations: Mapping[str, tuple[Mutation, ...]]) -> tuple[Proof, ...]:
+def _proofs(
+    core: str, defines: Mapping[str, object], mutations: Mapping[str, tuple[Mutation, ...]]
+) -> tuple[Proof, ...]:
     """A proof for each harness that has mutations."""
     entity = f"firm_sched_{core}"
     return tuple(
@@ -46,7 +48,9 @@ def _fixed_priority() -> tuple[Proof, ...]:
         ),
         "scheduler_service": (
             Mutation(file, "finished = '1' or (", "(finished and any(1)) = '1' or (", ("no_deadlock",)),
-            Mutation(file, "if any(1) = '1' then", "if (any(1) and not finished) = '1' then", ("no_gap_between_tasks",)),
+            Mutation(
+                file, "if any(1) = '1' then", "if (any(1) and not finished) = '1' then", ("no_gap_between_tasks",)
+            ),
         ),
     }
     return _proofs("fixed_priority", _AT_ONCE, mutations)

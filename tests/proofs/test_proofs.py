@@ -17,9 +17,7 @@ needs_solver = pytest.mark.skipif(
 )
 
 _SIZES = [(proof, size) for proof in PROOFS for size in proof.sizes]
-_FAULTS = [
-    (proof, mutation, label) for proof in PROOFS for mutation in proof.mutations for label in mutation.violates
-]
+_FAULTS = [(proof, mutation, label) for proof in PROOFS for mutation in proof.mutations for label in mutation.violates]
 
 
 def _size_name(proof: Proof, size: object) -> str:

@@ -54,6 +54,7 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["system", "new"],
         ["system", "check"],
         ["system", "show"],
+        ["system", "skeleton"],
         ["system", "diagram"],
         ["system", "report"],
         ["system", "schema"],
