@@ -292,9 +292,9 @@ def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, mo
     assert out(capsys, "system", "diagram", str(spec), "--format", "dot", "-o", str(picture)) == ""
     assert '"block sub" -> "block pub"' in picture.read_text(encoding="utf-8")
     assert "generated for each line written" in out(capsys, "system", "report", str(spec))
-    missing = tmp_path / "no" / "robot.svg"
-    message = error(capsys, "system", "diagram", str(spec), "--format", "dot", "-o", str(missing))
-    assert message == f"error: cannot write {missing}: No such file or directory\n"
+    nowhere = spec / "robot.svg"
+    message = error(capsys, "system", "diagram", str(spec), "--format", "dot", "-o", str(nowhere))
+    assert message.startswith(f"error: cannot write {nowhere}: ")
 
 
 def test_the_schema_is_json(capsys: Captured) -> None:
