@@ -60,8 +60,7 @@ def bench(selection: Selection, places: Places) -> None:
 
     Raises `InputError` if a place cannot be written, before anything is evaluated.
     """
-    for folder in (places.output, places.csv and places.csv.parent):
-        _make(folder)
+    _check(places)
     settings = selection.settings
     to_do = jobs(selection.data_sets, selection.policies, selection.requesters, settings)
     started = time.monotonic()
@@ -111,13 +110,15 @@ def write(evaluation: chapter.Evaluation, selection: Selection, folder: Path) ->
     return path
 
 
-def _make(folder: Path | None) -> None:
-    if folder is None:
-        return
+def _check(places: Places) -> None:
+    """Make the folder, and see whether the file can be written: an evaluation is too long to fail at its end."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if places.output:
+            places.output.mkdir(parents=True, exist_ok=True)
+        if places.csv:
+            places.csv.open("a", encoding="utf-8").close()
     except OSError as error:
-        fail(f"the folder '{folder}' cannot be made", hint=error.strerror or "")
+        fail(f"'{error.filename}' cannot be written: {error.strerror}")
 
 
 def _workers(places: Places) -> AbstractContextManager[Workers]:

@@ -75,7 +75,8 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
         (["--dataset", "cc5"], "there is no data set 'cc5'\n      = did you mean"),
         (["--requesters", "2,257"], "'257' is no number of accelerators\n      = legal: 1 to 256"),
         (["--requesters", "x"], "'x' is no number of accelerators"),
-        (["--output", "{file}/below"], "cannot be made"),
+        (["--output", "{file}/below"], "below' cannot be written: Not a directory"),
+        (["--csv", "{file}/values.csv"], "values.csv' cannot be written: Not a directory"),
     ],
 )
 def test_bad_arguments_of_bench(arguments: list[str], fault: str, tmp_path: Path, capsys: Captured) -> None:
