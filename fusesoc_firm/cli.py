@@ -432,13 +432,13 @@ def _bench_schedulers(arguments: argparse.Namespace) -> None:
 
 
 def _choose_scheduler(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.scheduling.analysis import Channel, Criterion, choose
+    from fusesoc_firm.scheduling.analysis import Criterion, choose
     from fusesoc_firm.scheduling.choice import show
-    from fusesoc_firm.scheduling.tasks import tasks_of
+    from fusesoc_firm.system.timing import channel_of, tasks_of
 
     system = _load(arguments).system
-    channel = Channel(system.width // 8, system.scheduling.shortest_run)
-    print(show(choose(tasks_of(system), Criterion(arguments.criterion), channel), arguments.format), end="")
+    choice = choose(tasks_of(system), Criterion(arguments.criterion), channel_of(system))
+    print(show(choice, arguments.format), end="")
 
 
 def _load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:

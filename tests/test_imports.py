@@ -27,8 +27,9 @@ ALLOWED: dict[str, set[str]] = {
     "message": _WORDS,
     "frame": _MESSAGE,
     "converter": _FRAME | _WRITING | _READING,
-    "system": _CONVERTER | {"prompts"},
-    "scheduling": _SYSTEM | {"workers"},
+    # It knows requesters, not systems.
+    "scheduling": {"diagnostics", "workers"},
+    "system": _CONVERTER | {"prompts", "scheduling"},
     "host": _SYSTEM,
     # The cores of its bench lie in the library.
     "verify": _SYSTEM | {"library_path", "workers"},

@@ -108,8 +108,10 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
     return Overheads(2, 3 * operation * requesters + 8, run, resume, shortest_service=4)
 
 
-def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel()) -> Analysis:
+def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *, is_ordered: bool = False) -> Analysis:
     """Bounds under a policy; with fixed priorities, under the best assignment that is found.
+
+    If the tasks are `is_ordered`, they stand in the order of their priorities, the highest first.
 
     The bounds hold for the cores' cycle-exact models with a sink that takes every beat; tests hold them against
     simulation.
@@ -117,7 +119,7 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel()) ->
     overheads = overheads_of(policy, len(tasks), channel.shortest_run)
     order: Sequence[Task] = ()
     if POLICIES[policy].is_fixed:
-        order = assign_priorities(policy, tasks, overheads)
+        order = tasks if is_ordered else assign_priorities(policy, tasks, overheads)
         by_name = {
             task.name: _fixed(policy, task, order[:place], order[place + 1 :], overheads)
             for place, task in enumerate(order)
@@ -241,13 +243,21 @@ class Choice:
         return self.analyses[0]
 
 
-def choose(tasks: Sequence[Task], criterion: Criterion = Criterion.LUTS, channel: Channel = Channel()) -> Choice:
-    """The best policy. Raises `ValueError` if there are no tasks, or two of one name."""
+def choose(
+    tasks: Sequence[Task],
+    criterion: Criterion = Criterion.LUTS,
+    channel: Channel = Channel(),
+    *,
+    is_ordered: bool = False,
+) -> Choice:
+    """The best policy; `is_ordered` as in `analyse`. Raises `ValueError` for no tasks, or two of one name."""
     if not tasks:
         raise ValueError("there are no tasks")
     if len({task.name for task in tasks}) < len(tasks):
         raise ValueError("two tasks have the same name")
-    analyses = sorted((analyse(policy, tasks, channel) for policy in POLICIES), key=_RANKS[criterion])
+    analyses = sorted(
+        (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in POLICIES), key=_RANKS[criterion]
+    )
     load = utilisation(tasks)
     return Choice(criterion, load, tuple(analyses), tuple(_reasons(analyses, criterion, load)))
 

@@ -1,11 +1,8 @@
-"""The tasks of a system: what its publishers send, and by when."""
+"""A task: what a requester sends, and by when."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-from fusesoc_firm.diagnostics import Diagnostics
-from fusesoc_firm.system.derived import DerivedSystem
 
 
 @dataclass(frozen=True)
@@ -26,19 +23,3 @@ class Task:
         for key in ("period", "transfer_time", "deadline"):
             if getattr(self, key) < 1:
                 raise ValueError(f"{key} of '{self.name}' is {getattr(self, key)}; legal: 1 and more cycles")
-
-
-def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
-    """The publishers' tasks, in the order of their ids. Raises `InputError` for every time that is not known."""
-    faults = Diagnostics()
-    found = []
-    for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
-        if times.period is None:
-            faults.error(f"the 'period' of publisher '{publisher.block}' is not given")
-        if times.transfer_time is None:
-            faults.error(f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound")
-        if times.period and times.transfer_time:
-            deadline = times.deadline or times.period
-            found.append(Task(publisher.block, times.period, times.transfer_time, deadline))
-    faults.raise_if_any()
-    return tuple(found)

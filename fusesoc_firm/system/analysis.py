@@ -32,6 +32,7 @@ from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.pins import check_pins
+from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.specification import (
     CONVERTER,
     PUBLISHER,
@@ -42,7 +43,6 @@ from fusesoc_firm.system.specification import (
     OutputType,
     Specification,
 )
-from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.timing import scheduling_of
 from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text

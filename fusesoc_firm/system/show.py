@@ -98,6 +98,8 @@ def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any
 
 def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
     shown: dict[str, Any] = {"scheduler": scheduling.policy}
+    if scheduling.reasons:
+        shown["because"] = [*scheduling.reasons]
     return shown | ({"shortestRun": scheduling.shortest_run} if scheduling.is_preemptive else {})
 
 

@@ -31,6 +31,8 @@ SCHEDULERS = (
     "edf_latency",
     "lst",
 )
+# The smallest of these that holds all deadlines.
+AUTO_SCHEDULER = "auto"
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 
@@ -47,7 +49,9 @@ class Project(Section):
     # The dissertation's listings 6.1, 6.6 and 5.1 spell it in three ways.
     fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
     width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
-    scheduler: Text = key("who may send to the host next", choices=SCHEDULERS, default=Text(SCHEDULERS[0]))
+    scheduler: Text = key(
+        "who may send to the host next", choices=(*SCHEDULERS, AUTO_SCHEDULER), default=Text(SCHEDULERS[0])
+    )
     shortest_run: int = key(
         "beats that a publisher sends at least before a preemptive scheduler interrupts it",
         name="shortestRun",
