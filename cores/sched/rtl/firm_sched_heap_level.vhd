@@ -73,6 +73,7 @@ architecture rtl of firm_sched_heap_level is
   signal left        : node_t;
   signal right       : node_t;
   signal item        : node_t;
+  signal node        : node_t;  -- on the item's path
   signal write_node  : node_t;
   signal write_left  : std_logic;
   signal write_right : std_logic;
@@ -85,13 +86,13 @@ architecture rtl of firm_sched_heap_level is
   signal second_rank  : rank_t;
   signal takes_second : std_logic;
 
-  function rank(node : node_t; is_right : std_logic) return rank_t is
+  function rank(of_node : node_t; is_right : std_logic) return rank_t is
     variable result : rank_t;
   begin
-    result(KEY_BITS+LOW_BITS downto LOW_BITS+1) := node(KEY_BITS+LOW_BITS-1 downto LOW_BITS);
+    result(KEY_BITS+LOW_BITS downto LOW_BITS+1) := of_node(KEY_BITS+LOW_BITS-1 downto LOW_BITS);
     result(LOW_BITS)                            := is_right;
     for place in 0 to LOW_BITS-1 loop
-      result(place) := node(place);
+      result(place) := of_node(place);
     end loop;
     return result;
   end function rank;
@@ -152,6 +153,8 @@ begin
     item(place) <= id_r(place);
   end generate low_bits_of_item;
 
+  node <= right when id_r(SIDE) = '1' else left;
+
   -- A leaf holds no item but that of its own index, so whoever comes to it finds it empty.
   leaves : if LOW_BITS = 0 generate
     first        <= left;
@@ -167,12 +170,12 @@ begin
   second_rank  <= rank(second, second_right);
   takes_second <= second(NODE_BITS-1) and (is_before(second_rank, first_rank) or not first(NODE_BITS-1));
 
-  hand_up : process (first, second, takes_second, id_r)
+  hand_up : process (left, right, takes_second, id_r)
     variable smaller : node_t;
   begin
-    smaller := first;
+    smaller := left;
     if takes_second = '1' then
-      smaller := second;
+      smaller := right;
     end if;
     smaller_valid    <= smaller(NODE_BITS-1);
     smaller_key      <= smaller(NODE_BITS-2 downto LOW_BITS);
@@ -183,27 +186,25 @@ begin
     end loop;
   end process hand_up;
 
-  -- Behind the last level there is no item to go on, only the hole of a FILL.
-  hand_down : process (first, second, takes_second, insert_r, fill_r, clear_r, id_r, key_r)
+  -- Of a FILL only the path to its hole goes on. Behind the last level nothing does but that.
+  hand_down : process (item, node, left, right, takes_second, insert_r, fill_r, clear_r, id_r)
     variable larger : node_t;
   begin
-    larger := second;
-    if takes_second = '1' then
-      larger := first;
+    larger := node;
+    if takes_second = '1' or clear_r = '1' then
+      larger := item;
     end if;
-    below_insert <= insert_r and second(NODE_BITS-1);
-    below_fill   <= fill_r and (first(NODE_BITS-1) or second(NODE_BITS-1));
+    below_insert <= insert_r and node(NODE_BITS-1);
+    below_fill   <= fill_r and (left(NODE_BITS-1) or right(NODE_BITS-1));
     below_clear  <= clear_r;
-    below_id     <= id_r;
     below_key    <= larger(NODE_BITS-2 downto LOW_BITS);
+    below_id     <= id_r;
     if fill_r = '1' then
       below_id(SIDE) <= takes_second;
     end if;
-    if clear_r = '0' then
-      for place in 0 to LOW_BITS-1 loop
-        below_id(place) <= larger(place);
-      end loop;
-    end if;
+    for place in 0 to LOW_BITS-1 loop
+      below_id(place) <= larger(place);
+    end loop;
   end process hand_down;
 
   choose_write : process (item, insert_r, clear_r, id_r, takes_second, hole, hole_right, filler_valid, filler_id, filler_key)

@@ -21,6 +21,7 @@ package firm_sched_pkg is
 
   -- The relative deadline of a requester's tasks.
   function deadline_of(requester : natural; periods, deadlines : times_t) return integer;
+  function deadlines_of(requesters : integer; periods, deadlines : times_t) return times_t;  -- of all
 
   -- A time less than this can be told from one that has passed, with `time_bits` bits that wrap around.
   function horizon(time_bits : integer) return positive;
@@ -62,6 +63,15 @@ package body firm_sched_pkg is
     end if;
     return time_of(requester, deadlines);
   end function deadline_of;
+
+  function deadlines_of(requesters : integer; periods, deadlines : times_t) return times_t is
+    variable result : times_t(0 to requesters-1);
+  begin
+    for requester in result'range loop
+      result(requester) := deadline_of(requester, periods, deadlines);
+    end loop;
+    return result;
+  end function deadlines_of;
 
   function horizon(time_bits : integer) return positive is
   begin
