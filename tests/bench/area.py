@@ -16,8 +16,8 @@ from fusesoc_firm.render import render
 from tests.bench.designs import CORES, PUBLISHER, SUBSCRIBER, Converter, NotConvertedError, generate
 from tests.bench.tables import FAILED, MET, MISSED, NOT_CONVERTED, Table, Tell
 from tests.bench.yosys import Cells, SynthesisError, Yosys
-from tests.sim.ghdl import CORES as CORE_FOLDER
 from tests.sim.ghdl import Generic, GhdlError, Library, core_files
+from tests.sim.schedulers import ENTITIES, POLICY_CORES
 
 WIDTHS = (8, 64, 128)
 STREAM_WIDTHS = (8, 16, 32, 64, 128, 256, 512)
@@ -267,12 +267,13 @@ def _managers() -> Iterator[Row]:
 
 
 def _schedulers() -> Iterator[Row]:
-    """Every policy that there is a core of."""
-    for core in sorted((CORE_FOLDER / "sched").glob("*.core")):
+    cores = [f"sched/{core}" for core in POLICY_CORES]
+    for policy, entity in ENTITIES.items():
         for channels in CHANNELS:
-            make = _core(f"firm_sched_{core.stem}", {"REQUESTERS": channels}, f"sched/{core.stem}")
-            dissertation = _SCHEDULERS.get(core.stem, {}).get(channels, "")
-            yield Row(f"{core.stem}, N = {channels}", "", None, make, dissertation)
+            if channels <= entity.most_requesters:
+                make = _core(entity.entity, {"REQUESTERS": channels, **entity.generics}, *cores)
+                dissertation = _SCHEDULERS.get(policy, {}).get(channels, "")
+                yield Row(f"{policy}, N = {channels}", "", None, make, dissertation)
 
 
 def _part(entity: str, width: int) -> Callable[[Path], Subject]:

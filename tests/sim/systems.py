@@ -11,7 +11,7 @@ from fusesoc_firm.system import generator
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
 
 DATA = Path(__file__).parent / "data"
-RUNTIME = ("axis/axis", "sched/fixed_priority", "manager/manager", "sim/host")
+RUNTIME = ("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host")
 
 
 @dataclass(frozen=True)

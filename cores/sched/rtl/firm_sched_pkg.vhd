@@ -1,9 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- What the schedulers share: the times of tasks and the check of generics.
+-- What the schedulers share: who comes first of those that ask, the times of tasks, and the check of generics.
 -- Generics may be illegal, and the assert that names them speaks only after elaboration. So no function here fails on
 -- them: one that is asked for a time that was not given answers 1.
 library ieee;
 use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 package firm_sched_pkg is
 
@@ -14,14 +16,32 @@ package firm_sched_pkg is
 
   type times_t is array (natural range <>) of integer;  -- in clock cycles, one for each requester
 
+  -- Whether a bit is '1', and the index of the lowest one, with index_bits(bits'length) bits; any index if there is none.
+  function any_of(bits : std_logic_vector) return std_logic;
+  function first_of(bits : std_logic_vector) return std_logic_vector;
+
+  -- The index of the only '1'; any index if there is none.
+  function index_of(one_hot : std_logic_vector) return std_logic_vector;
+
+  -- Bit k is '1' if k is more than `index`.
+  function above(index : std_logic_vector; outputs : natural) return std_logic_vector;
+
   -- In place of deadlines: each is its requester's period.
   constant IMPLICIT : times_t(0 to 0) := (0 => 0);
+
+  function has_deadlines(policy : policy_t) return boolean;
 
   function time_of(requester : natural; times : times_t) return integer;
 
   -- The relative deadline of a requester's tasks.
   function deadline_of(requester : natural; periods, deadlines : times_t) return integer;
   function deadlines_of(requesters : integer; periods, deadlines : times_t) return times_t;  -- of all
+
+  -- The times of `count` requesters from `first` on. Deadlines that are implicit stay so.
+  function part_of(times : times_t; first : natural; count : positive) return times_t;
+
+  -- Of the first `count` elements.
+  function sum_of(times : times_t; count : natural) return natural;
 
   -- A time less than this can be told from one that has passed, with `time_bits` bits that wrap around.
   function horizon(time_bits : integer) return positive;
@@ -35,6 +55,8 @@ package firm_sched_pkg is
   -- Of all generics of a policy with deadlines but the transfer times.
   function fault_of_deadlines(requesters : integer; periods, deadlines : times_t; time_bits, shortest_run : integer)
     return string;
+  function fault_of_groups(requesters : integer; sizes : times_t; policies : policies_t; top_policy : policy_t)
+    return string;
 
 end package firm_sched_pkg;
 
@@ -42,6 +64,66 @@ package body firm_sched_pkg is
 
   constant SHORTEST_TIME : positive := 8;   -- bits
   constant LONGEST_TIME  : positive := 31;
+
+  -- Both are trees: of a chain, synthesis makes long paths.
+  function any_of(bits : std_logic_vector) return std_logic is
+    constant COUNT : positive := bits'length;
+    alias numbered : std_logic_vector(COUNT-1 downto 0) is bits;
+  begin
+    if COUNT = 1 then
+      return numbered(0);
+    end if;
+    return any_of(numbered(COUNT-1 downto COUNT/2)) or any_of(numbered(COUNT/2-1 downto 0));
+  end function any_of;
+
+  function first_of(bits : std_logic_vector) return std_logic_vector is
+    constant COUNT  : positive := bits'length;
+    alias numbered  : std_logic_vector(COUNT-1 downto 0) is bits;
+    constant HALF   : natural := 2**clog2(COUNT) / 2;  -- the largest power of two below
+    variable lower  : std_logic_vector(index_bits(COUNT)-1 downto 0) := (others => '0');
+    variable higher : std_logic_vector(index_bits(COUNT)-1 downto 0) := (others => '0');
+  begin
+    if COUNT = 1 then
+      return lower;
+    elsif COUNT > 2 then
+      lower(index_bits(HALF)-1 downto 0)        := first_of(numbered(HALF-1 downto 0));
+      higher(index_bits(COUNT-HALF)-1 downto 0) := first_of(numbered(COUNT-1 downto HALF));
+    end if;
+    higher(higher'high) := '1';
+    if any_of(numbered(HALF-1 downto 0)) = '1' then
+      return lower;
+    end if;
+    return higher;
+  end function first_of;
+
+  function index_of(one_hot : std_logic_vector) return std_logic_vector is
+    variable bits  : std_logic_vector(one_hot'length-1 downto 0);
+    variable index : std_logic_vector(index_bits(one_hot'length)-1 downto 0) := (others => '0');
+  begin
+    bits := one_hot;
+    for value in bits'range loop
+      for place in index'range loop
+        if (value / 2**place) mod 2 = 1 then
+          index(place) := index(place) or bits(value);
+        end if;
+      end loop;
+    end loop;
+    return index;
+  end function index_of;
+
+  function above(index : std_logic_vector; outputs : natural) return std_logic_vector is
+    variable more : std_logic_vector(outputs-1 downto 0);
+  begin
+    for value in more'range loop
+      more(value) := is_below(index, value);
+    end loop;
+    return more;
+  end function above;
+
+  function has_deadlines(policy : policy_t) return boolean is
+  begin
+    return policy = EDF_RESOURCES or policy = EDF_LATENCY or policy = LST;
+  end function has_deadlines;
 
   function is_implicit(deadlines : times_t) return boolean is
   begin
@@ -72,6 +154,27 @@ package body firm_sched_pkg is
     end loop;
     return result;
   end function deadlines_of;
+
+  function part_of(times : times_t; first : natural; count : positive) return times_t is
+    variable part : times_t(0 to count-1);
+  begin
+    if is_implicit(times) then
+      return IMPLICIT;
+    end if;
+    for requester in part'range loop
+      part(requester) := time_of(first+requester, times);
+    end loop;
+    return part;
+  end function part_of;
+
+  function sum_of(times : times_t; count : natural) return natural is
+    variable sum : natural := 0;
+  begin
+    for place in 0 to count-1 loop
+      sum := sum + time_of(place, times);
+    end loop;
+    return sum;
+  end function sum_of;
 
   function horizon(time_bits : integer) return positive is
   begin
@@ -153,5 +256,27 @@ package body firm_sched_pkg is
     end if;
     return fault_of_times("DEADLINES", "deadline", deadlines, requesters, time_bits);
   end function fault_of_deadlines;
+
+  function fault_of_groups(requesters : integer; sizes : times_t; policies : policies_t; top_policy : policy_t)
+    return string is
+  begin
+    if sizes'length = 0 or sizes'length /= policies'length then
+      return "SIZES has " & integer'image(sizes'length) & " groups and POLICIES " & integer'image(policies'length) &
+        "; legal: 1 and more, as many in both";
+    elsif has_deadlines(top_policy) then
+      return "TOP_POLICY is " & policy_t'image(top_policy) & "; legal: a policy without deadlines";
+    end if;
+    for place in natural range 0 to sizes'length-1 loop
+      if time_of(place, sizes) < 1 or time_of(place, sizes) > MAX_REQUESTERS then
+        return "the size of group " & integer'image(place) & " is " & integer'image(time_of(place, sizes)) &
+          "; legal: 1 to " & integer'image(MAX_REQUESTERS);
+      end if;
+    end loop;
+    if sum_of(sizes, sizes'length) /= requesters then
+      return "the sizes of the groups add up to " & integer'image(sum_of(sizes, sizes'length)) & "; legal: " &
+        integer'image(requesters) & ", the number of requesters";
+    end if;
+    return "";
+  end function fault_of_groups;
 
 end package body firm_sched_pkg;

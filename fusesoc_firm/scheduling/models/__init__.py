@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from fusesoc_firm.scheduling.models.base import Generics, Scheduler
+from fusesoc_firm.scheduling.models.combined import Combined
 from fusesoc_firm.scheduling.models.fixed_priority import FixedPriority, PreemptiveFixedPriority
 from fusesoc_firm.scheduling.models.lru import ImmediateLru
 from fusesoc_firm.scheduling.models.round_robin import RoundRobin
 
-__all__ = ["POLICIES", "Generics", "Policy", "Scheduler"]
+__all__ = ["POLICIES", "Combined", "Generics", "Policy", "Scheduler"]
 
 # Makes a scheduler just after reset; raises `ValueError` for generics that the entity refuses.
 Policy = Callable[[Generics], Scheduler]
