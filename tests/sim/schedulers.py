@@ -11,7 +11,7 @@ from tests.sim.ghdl import Generic, Library, core_files
 from tests.sim.sched_trace import Trace, read_trace
 
 BENCH = "firm_sched_trace_tb"
-POLICY_CORES = ("fixed_priority", "round_robin", "lru")
+POLICY_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources")
 SEED = 20240503
 
 _WITHOUT_POLICIES = ("axis/axis", "sched/package")
@@ -34,6 +34,7 @@ ENTITIES: Mapping[str, PolicyEntity] = {
     "fixed_priority_preemptive": PolicyEntity("firm_sched_fixed_priority", {"PREEMPTIVE": True}, is_preemptive=True),
     "round_robin": PolicyEntity("firm_sched_round_robin"),
     "lru": PolicyEntity("firm_sched_lru", most_requesters=16),
+    "edf_resources": PolicyEntity("firm_sched_edf_resources", is_preemptive=True),
 }
 NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is_preemptive]
 

@@ -13,6 +13,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
 
 entity firm_sched_arrivals is
   generic (
@@ -38,14 +39,15 @@ end entity firm_sched_arrivals;
 
 architecture rtl of firm_sched_arrivals is
 
+  -- Two requesters are a row, of which another one is not used.
   constant ID_BITS     : positive := index_bits(REQUESTERS);
-  constant COLUMN_BITS : natural  := ID_BITS / 2;
-  constant ROW_BITS    : positive := ID_BITS - COLUMN_BITS;
+  constant COLUMN_BITS : positive := max(1, ID_BITS / 2);
+  constant ROW_BITS    : positive := max(1, ID_BITS - COLUMN_BITS);
   constant COLUMNS     : positive := 2**COLUMN_BITS;
   constant ROWS        : positive := 2**ROW_BITS;
-  subtype id_t is std_logic_vector(ID_BITS-1 downto 0);
   subtype row_t is std_logic_vector(ROW_BITS-1 downto 0);
   subtype rows_t is std_logic_vector(ROWS-1 downto 0);
+  subtype column_t is std_logic_vector(COLUMN_BITS-1 downto 0);
   subtype columns_t is std_logic_vector(COLUMNS-1 downto 0);
   subtype requesters_t is std_logic_vector(ROWS*COLUMNS-1 downto 0);
 
@@ -57,6 +59,7 @@ architecture rtl of firm_sched_arrivals is
 
   signal asks          : std_logic_vector(ROWS*COLUMNS-1 downto 0);
   signal rows_that_ask : rows_t;
+  signal rows_above    : rows_t;
   signal found_row     : row_t;
   signal next_row      : row_t;
   signal row_asks      : columns_t;  -- of the next row
@@ -67,50 +70,17 @@ architecture rtl of firm_sched_arrivals is
   signal new_accepted  : columns_t;
   signal load          : std_logic;
   signal accept_row    : std_logic;
-  signal first         : columns_t;  -- who leaves next, one-hot
 
+  signal first   : column_t;  -- who leaves next
+  signal next_id : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
+
+  signal padded_id       : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
   signal finished_row    : row_t;
   signal finished_column : columns_t;
   signal forgets         : std_logic;
   signal finish_task     : std_logic;
   signal old_finished    : columns_t;
   signal new_finished    : columns_t;
-
-  function any_of(bits : std_logic_vector) return std_logic is
-    variable result : std_logic := '0';
-  begin
-    for place in bits'range loop
-      result := result or bits(place);
-    end loop;
-    return result;
-  end function any_of;
-
-  -- The lowest '1' alone.
-  function lowest(bits : std_logic_vector) return std_logic_vector is
-    variable result : std_logic_vector(bits'length-1 downto 0);
-    variable found  : std_logic := '0';
-  begin
-    result := bits;
-    for place in natural range 0 to bits'length-1 loop
-      result(place) := result(place) and not found;
-      found         := found or result(place);
-    end loop;
-    return result;
-  end function lowest;
-
-  -- The number of the only '1'.
-  function index_of(one_hot : std_logic_vector; bits : natural) return std_logic_vector is
-    variable result : std_logic_vector(bits-1 downto 0) := (others => '0');
-  begin
-    for place in natural range 0 to one_hot'length-1 loop
-      for index_bit in 0 to bits-1 loop
-        if (place / 2**index_bit) mod 2 = 1 then
-          result(index_bit) := result(index_bit) or one_hot(place);
-        end if;
-      end loop;
-    end loop;
-    return result;
-  end function index_of;
 
 begin
 
@@ -131,19 +101,8 @@ begin
     rows_that_ask(row) <= any_of(asks((row+1)*COLUMNS-1 downto row*COLUMNS));
   end generate search_rows;
 
-  choose_row : process (rows_that_ask, row_r)
-    variable above : rows_t;
-  begin
-    for row in rows_t'range loop
-      above(row) := rows_that_ask(row) and is_below(row_r, row);
-    end loop;
-    if any_of(above) = '1' then
-      found_row <= index_of(lowest(above), ROW_BITS);
-    else
-      found_row <= index_of(lowest(rows_that_ask), ROW_BITS);
-    end if;
-  end process choose_row;
-
+  rows_above <= rows_that_ask and above(row_r, ROWS);
+  found_row  <= first_of(rows_above) when any_of(rows_above) = '1' else first_of(rows_that_ask);
   next_row <= std_logic_vector(cleared_r(ROW_BITS-1 downto 0)) when clearing = '1' else found_row;
 
   u_row_asks : entity firm.firm_axis_select
@@ -157,13 +116,9 @@ begin
 
   -- Its columns. The request of the one that finishes is its last beat's, not a new task's.
 
-  finished_row <= finished_id(ID_BITS-1 downto COLUMN_BITS);
-  single_column : if COLUMN_BITS = 0 generate
-    finished_column(0) <= finished;
-  end generate single_column;
-  several_columns : if COLUMN_BITS > 0 generate
-    finished_column <= decode(finished_id(COLUMN_BITS-1 downto 0), finished, COLUMNS);
-  end generate several_columns;
+  padded_id       <= std_logic_vector(resize(unsigned(finished_id), ROW_BITS+COLUMN_BITS));
+  finished_row    <= padded_id(ROW_BITS+COLUMN_BITS-1 downto COLUMN_BITS);
+  finished_column <= decode(padded_id(COLUMN_BITS-1 downto 0), finished, COLUMNS);
 
   row_known    <= row_accepted xor row_finished;
   row_new      <= row_asks and not row_known and not finished_column when found_row = finished_row else
@@ -202,8 +157,6 @@ begin
       address_2    => next_row,
       read_word_2  => row_finished);
 
-  first <= lowest(batch_r);
-
   hold_batch : process (clk)
     variable staying : columns_t;
   begin
@@ -215,7 +168,7 @@ begin
       else
         staying := batch_r;
         if leaves = '1' then
-          staying := staying and not first;
+          staying := staying and not decode(first, '1', COLUMNS);
         end if;
         if row_r = finished_row then
           staying := staying and not finished_column;
@@ -232,17 +185,9 @@ begin
     end if;
   end process hold_batch;
 
-  show_first : process (row_r, first)
-    variable column : id_t;
-  begin
-    column := (others => '0');
-    if COLUMN_BITS > 0 then
-      column(max(COLUMN_BITS, 1)-1 downto 0) := index_of(first, max(COLUMN_BITS, 1));
-    end if;
-    id                               <= column;
-    id(ID_BITS-1 downto COLUMN_BITS) <= row_r;
-  end process show_first;
-
-  valid <= any_of(batch_r);
+  first   <= first_of(batch_r);
+  next_id <= row_r & first;
+  valid   <= any_of(batch_r);
+  id      <= next_id(ID_BITS-1 downto 0);
 
 end architecture rtl;

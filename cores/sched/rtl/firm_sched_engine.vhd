@@ -13,7 +13,7 @@
 -- A task with a smaller key (EDF, LST) takes the grant; the one that had it goes back into the queue through B.
 --
 -- Keys are compared as numbers that wrap around. So that they stay less than half their range apart whatever the
--- host does, time stands still while the current task's or the root's is older than a quarter of the range.
+-- host does, time stands still while the current task's or the root's is overdue.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -55,7 +55,7 @@ architecture rtl of firm_sched_engine is
     if HAS_STAMPS then
       return STAMP_BITS;
     end if;
-    return max(TIME_BITS, 2);
+    return max(TIME_BITS, 3);
   end function bits_of_key;
 
   constant KEY_BITS : positive := bits_of_key;
@@ -143,14 +143,6 @@ begin
 
     constant OFFSET_OF : offsets_t := offset_table;
 
-    -- Older than a quarter of the range.
-    function is_late(now, key : std_logic_vector) return std_logic is
-      variable age : unsigned(key_t'range);
-    begin
-      age := unsigned(now) - unsigned(key);
-      return age(age'high-1) and not age(age'high);
-    end function is_late;
-
     signal time_r        : key_t;
     signal is_clearing   : std_logic;
     signal current_waits : std_logic;
@@ -162,8 +154,8 @@ begin
 
     -- The heap after reset; B may wait for it.
     is_clearing   <= empty and not insert_ready;
-    current_waits <= running_r and keyed_r and is_late(time_r, key_r);
-    root_waits    <= root_valid and is_late(time_r, root_key);
+    current_waits <= running_r and keyed_r and is_overdue(key_r, time_r);
+    root_waits    <= root_valid and is_overdue(root_key, time_r);
     advance       <= not (is_clearing or current_waits or root_waits);
 
     count_time : process (clk)

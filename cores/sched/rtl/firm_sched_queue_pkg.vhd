@@ -10,6 +10,10 @@ package firm_sched_queue_pkg is
   -- behind it, a key has an order without ties: the keys decide, and the index where they are equal.
   function is_before(left, right : std_logic_vector) return std_logic;
 
+  -- '1' if `key` lies two or three eighths of the range before `now`, each cut to whole eighths. If time stands still then, and
+  -- no new key is an eighth or more before or behind it, keys are never half the range apart.
+  function is_overdue(key, now : std_logic_vector) return std_logic;
+
 end package firm_sched_queue_pkg;
 
 package body firm_sched_queue_pkg is
@@ -20,5 +24,12 @@ package body firm_sched_queue_pkg is
     difference := unsigned(left) - unsigned(right);
     return difference(difference'high);
   end function is_before;
+
+  function is_overdue(key, now : std_logic_vector) return std_logic is
+    variable eighths : unsigned(2 downto 0);
+  begin
+    eighths := unsigned(now(now'high downto now'high-2)) - unsigned(key(key'high downto key'high-2));
+    return eighths(1) and not eighths(2);
+  end function is_overdue;
 
 end package body firm_sched_queue_pkg;
