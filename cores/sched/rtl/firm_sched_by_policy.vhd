@@ -93,4 +93,41 @@ begin
         grant_select => grant_select);
   end generate of_edf_resources;
 
+  of_edf_latency : if POLICY = EDF_LATENCY generate
+    u_scheduler : entity firm.firm_sched_edf_latency
+      generic map (
+        REQUESTERS   => REQUESTERS,
+        PERIODS      => PERIODS,
+        DEADLINES    => DEADLINES,
+        TIME_BITS    => TIME_BITS,
+        SHORTEST_RUN => SHORTEST_RUN)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select);
+  end generate of_edf_latency;
+
+  of_lst : if POLICY = LST generate
+    u_scheduler : entity firm.firm_sched_lst
+      generic map (
+        REQUESTERS     => REQUESTERS,
+        PERIODS        => PERIODS,
+        TRANSFER_TIMES => TRANSFER_TIMES,
+        DEADLINES      => DEADLINES,
+        TIME_BITS      => TIME_BITS,
+        SHORTEST_RUN   => SHORTEST_RUN)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select);
+  end generate of_lst;
+
 end architecture rtl;

@@ -9,6 +9,7 @@ from fusesoc_firm.scheduling.models.combined import Combined
 from fusesoc_firm.scheduling.models.edf import edf_latency, edf_resources
 from fusesoc_firm.scheduling.models.fixed_priority import FixedPriority, PreemptiveFixedPriority
 from fusesoc_firm.scheduling.models.lru import ImmediateLru
+from fusesoc_firm.scheduling.models.lst import lst
 from fusesoc_firm.scheduling.models.round_robin import RoundRobin
 
 __all__ = ["POLICIES", "Combined", "Generics", "Policy", "Scheduler"]
@@ -25,4 +26,5 @@ POLICIES: Mapping[str, Policy] = {
     "lru": lambda generics: ImmediateLru(generics.batch, generics.requesters),
     "edf_resources": edf_resources,
     "edf_latency": edf_latency,
+    "lst": lst,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fusesoc_firm.scheduling.models.base import Generics, Scheduler
 from fusesoc_firm.scheduling.models.engine import Engine, Heap, SortedQueue, Times
+from fusesoc_firm.scheduling.models.parallel import Parallel
 
 
 def edf_resources(generics: Generics) -> Scheduler:
@@ -12,7 +13,9 @@ def edf_resources(generics: Generics) -> Scheduler:
 
 
 def edf_latency(generics: Generics) -> Scheduler:
-    """With few cycles: the tasks wait in a sorted queue."""
+    """With few cycles: few requesters are compared all at once, the tasks of more of them wait in a sorted queue."""
+    if generics.requesters <= Parallel.MAX_REQUESTERS:
+        return Parallel(generics.relative_deadlines, generics.time_bits, shortest_run=generics.shortest_run)
     return _engine(generics, SortedQueue(generics.batch, generics.requesters))
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
