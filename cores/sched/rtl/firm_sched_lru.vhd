@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Least recently used, non-preemptive: of those that ask, who has waited longest since it completed a task.
--- A matrix of one bit for each pair says which of the two has waited longer. All pairs are looked at in one cycle, so the
--- next task is chosen in that of the last beat. Its area grows with the square of the requesters.
+-- A matrix of one bit for each pair says which of the two has waited longer. All pairs are looked at in one cycle,
+-- so the next task is chosen in that of the last beat. Its area grows with the square of the requesters.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

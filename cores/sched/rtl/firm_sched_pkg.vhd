@@ -16,7 +16,8 @@ package firm_sched_pkg is
 
   type times_t is array (natural range <>) of integer;  -- in clock cycles, one for each requester
 
-  -- Whether a bit is '1', and the index of the lowest one, with index_bits(bits'length) bits; any index if there is none.
+  -- Whether a bit is '1', and the index of the lowest one, with index_bits(bits'length) bits; any index if there is
+  -- none.
   function any_of(bits : std_logic_vector) return std_logic;
   function first_of(bits : std_logic_vector) return std_logic_vector;
 
