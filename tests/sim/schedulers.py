@@ -33,7 +33,7 @@ ENTITIES: Mapping[str, PolicyEntity] = {
     "fixed_priority": PolicyEntity("firm_sched_fixed_priority"),
     "fixed_priority_preemptive": PolicyEntity("firm_sched_fixed_priority", {"PREEMPTIVE": True}, is_preemptive=True),
     "round_robin": PolicyEntity("firm_sched_round_robin"),
-    "lru": PolicyEntity("firm_sched_lru", most_requesters=16),
+    "lru": PolicyEntity("firm_sched_lru"),
     "edf_resources": PolicyEntity("firm_sched_edf_resources", is_preemptive=True),
     "edf_latency": PolicyEntity("firm_sched_edf_latency", is_preemptive=True),
     "lst": PolicyEntity("firm_sched_lst", is_preemptive=True),
