@@ -9,7 +9,7 @@ import random
 import numpy as np
 import pytest
 
-from fusesoc_firm.scheduling.analysis import Channel, analyse
+from fusesoc_firm.scheduling.analysis import Channel, analyse, overheads_of
 from fusesoc_firm.scheduling.models import POLICIES as MODELS
 from fusesoc_firm.scheduling.models import Generics
 from fusesoc_firm.scheduling.policies import POLICIES
@@ -83,7 +83,9 @@ def test_over_the_hyperperiod_from_every_phase(policy: str, count: int) -> None:
         shortest_run = chance.choice((1, 1, 3))
         left += slack(policy, tasks, first, np.zeros_like(first), min(cycles, 400), Channel(1, shortest_run))
     assert left
-    assert min(left) <= 3, f"seed {SEED}: no bound of {len(left)} is nearly reached"
+    # What a queue costs at worst is seldom met, and LST's bound is no sharp one.
+    nearest = 5 if policy == "lst" else 3 + 2 * overheads_of(policy, count).acceptance
+    assert min(left) <= nearest, f"seed {SEED}: the nearest of {len(left)} bounds is {min(left)} cycles away"
 
 
 @pytest.mark.parametrize("policy", sorted(set(POLICIES) & set(MODELS)))
