@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- robotic_arm/ArmState to robotic_arm/ArmPoses: the poses of an arm's seven joints, measured and desired, and how far
--- those of its end effector are from what the state says.
+-- robotic_arm/ArmState, or franka_msgs/FrankaState, to robotic_arm/ArmPoses: the poses of an arm's seven joints, measured
+-- and desired, and how far those of its end effector are from what the state says.
 --
 -- Two chains do the same at the same time, with the measured angles and with the desired ones; the handshakes of the first
 -- stand for both. A message is taken when its result is there, and the next one is begun when that has been sent.
@@ -18,7 +18,9 @@ entity robotic_arm is
     in_q_d             : in  std_logic_vector(447 downto 0);
     in_o_t_ee          : in  std_logic_vector(1023 downto 0);
     in_o_t_ee_d        : in  std_logic_vector(1023 downto 0);
-    -- Not read: the message has no variable part, so its only segment comes with the whole message.
+    -- Not read: the fields above are in one segment, which comes with the whole message. A length comes only with
+    -- franka_msgs/FrankaState, whose header has a string.
+    in_payload_length  : in  std_logic_vector(31 downto 0) := (others => '0');
     in_segment_valid   : in  std_logic_vector(0 downto 0);
     in_msg_valid       : in  std_logic;
     in_msg_ready       : out std_logic;
