@@ -82,14 +82,18 @@ def filtered(
     }
 
 
-def pipeline(message: Message) -> Message:
-    """What the three accelerators make of an image one after the other."""
-    small = filtered(filtered(message, ("rgb8", "mono8"), gray), ("mono8", "mono8"), scaled)
-    return filtered(small, ("mono8", "32SC1"), integral, MAX_COLUMNS)
+# What each accelerator makes of a message.
+ACCELERATORS: dict[str, Callable[[Message], Message]] = {
+    "rgb_to_gray": lambda message: filtered(message, ("rgb8", "mono8"), gray),
+    "scale_down": lambda message: filtered(message, ("mono8", "mono8"), scaled),
+    "integral_image": lambda message: filtered(message, ("mono8", "32SC1"), integral, MAX_COLUMNS),
+}
 
 
 def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
     """The messages that the system publishes when `subscriber` receives `message`."""
     if subscriber != "camera":
         raise ValueError(f"unknown subscriber '{subscriber}', legal: 'camera'")
-    return [("sums", pipeline(message))]
+    for accelerator in ACCELERATORS.values():
+        message = accelerator(message)
+    return [("sums", message)]

@@ -61,6 +61,9 @@ def filtered(message: Message) -> Message:
     }
 
 
+ACCELERATORS = {"sobel": filtered}
+
+
 def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
     """The messages that the system publishes when `subscriber` receives `message`."""
     if subscriber != "camera":

@@ -31,6 +31,12 @@ def load_model(name: str) -> ModuleType:
     return module
 
 
+def filtered(model: ModuleType, entity: str, message: Message) -> Message:
+    """What one accelerator makes of an image."""
+    found: Message = model.ACCELERATORS[entity](message)
+    return found
+
+
 def header(ros: str, source: random.Random, frame_id: str = "camera") -> Message:
     """A header of `ROS` or `ROS2` with a random stamp."""
     seconds, fraction = source.getrandbits(31), source.randrange(10**9)

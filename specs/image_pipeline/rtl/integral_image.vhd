@@ -132,7 +132,7 @@ architecture rtl of integral_image is
   signal sums_count_r : unsigned(COUNT_BITS-1 downto 0);
   signal sums_end_r   : std_logic;
   signal sums_valid_r : std_logic;
-  signal part_r       : natural range 0 to PARTS-1;
+  signal part_r       : natural range 0 to PARTS;
   signal last_part    : std_logic;
 
 begin

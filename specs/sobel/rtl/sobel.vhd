@@ -153,7 +153,7 @@ architecture rtl of sobel is
 
   -- The two rows before, the later one low.
   signal memory : rows_t;
-  signal before : std_logic_vector(2*WIDTH-1 downto 0);
+  signal earlier : std_logic_vector(2*WIDTH-1 downto 0);
 
   -- A group of the row that comes.
   signal data_r    : pixels_t;
@@ -313,10 +313,10 @@ begin
   begin
     if rising_edge(clk) then
       if advance = '1' and valid_r = '1' then
-        memory(address_r) <= before(WIDTH-1 downto 0) & data_r;
+        memory(address_r) <= earlier(WIDTH-1 downto 0) & data_r;
       end if;
       if take = '1' then
-        before <= memory(index_r);
+        earlier <= memory(index_r);
       end if;
     end if;
   end process access_memory;
@@ -360,8 +360,8 @@ begin
     end if;
   end process take_group;
 
-  middle <= before(WIDTH-1 downto 0);
-  upper  <= middle when second_r = '1' else before(2*WIDTH-1 downto WIDTH);
+  middle <= earlier(WIDTH-1 downto 0);
+  upper  <= middle when second_r = '1' else earlier(2*WIDTH-1 downto WIDTH);
   lower  <= middle when lowest_r = '1' else data_r;
 
   columns : for lane in 0 to LANES-1 generate

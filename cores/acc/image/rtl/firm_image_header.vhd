@@ -8,6 +8,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_message_pkg.all;
 
 entity firm_image_header is
   generic (
@@ -86,35 +87,29 @@ architecture rtl of firm_image_header is
   constant LANES : positive := max(1, WIDTH/8);
   constant SIZE_BITS : positive := 16;
 
-  -- Beats of a text, and one of them with zeros in the lanes behind its end.
+  -- Beats of a text, a letter of it, and a beat; behind its end there are zeros.
   function beats_of(text : string) return positive is
   begin
     return (text'length + LANES - 1) / LANES;
   end function beats_of;
 
+  function letter_of(text : string; index : natural) return std_logic_vector is
+    constant LETTERS : string(1 to text'length) := text;
+  begin
+    if index >= LETTERS'length then
+      return X"00";
+    end if;
+    return std_logic_vector(to_unsigned(character'pos(LETTERS(index + 1)), 8));
+  end function letter_of;
+
   function beat_of(text : string; beat : natural) return std_logic_vector is
-    constant BYTES  : string(1 to text'length) := text;
-    variable result : std_logic_vector(WIDTH-1 downto 0) := (others => '0');
+    variable result : std_logic_vector(WIDTH-1 downto 0);
   begin
     for lane in 0 to LANES-1 loop
-      if LANES*beat + lane < BYTES'length then
-        result(8*lane+7 downto 8*lane) :=
-          std_logic_vector(to_unsigned(character'pos(BYTES(LANES*beat + lane + 1)), 8));
-      end if;
+      result(8*lane+7 downto 8*lane) := letter_of(text, LANES*beat + lane);
     end loop;
     return result;
   end function beat_of;
-
-  function keep_of(text : string; beat : natural) return std_logic_vector is
-    variable result : std_logic_vector(LANES-1 downto 0) := (others => '0');
-  begin
-    for lane in 0 to LANES-1 loop
-      if LANES*beat + lane < text'length then
-        result(lane) := '1';
-      end if;
-    end loop;
-    return result;
-  end function keep_of;
 
   constant IN_BEATS       : positive := beats_of(IN_ENCODING);
   constant OUT_BEATS      : positive := beats_of(OUT_ENCODING);
@@ -194,6 +189,7 @@ architecture rtl of firm_image_header is
   signal frame_id_taken     : std_logic;
   signal frame_id_length    : std_logic_vector(31 downto 0);
   signal frame_id_open      : std_logic;
+  signal frame_id_pop       : std_logic;
   signal frame_id_sent_r    : std_logic;
   signal encoding_last      : std_logic;
   signal encoding_sent_r    : std_logic;
@@ -229,6 +225,7 @@ begin
                      when state_r = SEND and unsigned(in_header_frame_id_length) < FRAME_ID_BYTES else
                      std_logic_vector(to_unsigned(FRAME_ID_BYTES, 32));
   frame_id_open   <= is_sending and not frame_id_sent_r;
+  frame_id_pop    <= frame_id_open and out_header_frame_id_axis_tready;
 
   in_header_frame_id_axis_tready  <= frame_id_ready;
   out_header_frame_id_axis_tvalid <= frame_id_valid and frame_id_open;
@@ -250,7 +247,7 @@ begin
       m_axis_tkeep  => out_header_frame_id_axis_tkeep,
       m_axis_tvalid => frame_id_valid,
       m_axis_tlast  => frame_id_last,
-      m_axis_tready => out_header_frame_id_axis_tready);
+      m_axis_tready => frame_id_pop);
 
   in_encoding_axis_tready <= '1' when state_r = ENCODING and in_segment_valid(1) = '1' else '0';
 
@@ -290,7 +287,7 @@ begin
             state_r <= SIZES;
           elsif in_encoding_axis_tvalid = '1' then
             for beat in 0 to IN_BEATS-1 loop
-              if beat_r = beat and in_encoding_axis_tdata /= beat_of(IN_ENCODING, beat) then
+              if beat_r = beat and not is_equal(in_encoding_axis_tdata, beat_of(IN_ENCODING, beat)) then
                 matches_r <= '0';
               end if;
             end loop;
@@ -361,7 +358,7 @@ begin
         state_r <= MULTIPLY_OUT;
 
       else
-        if frame_id_valid = '1' and frame_id_last = '1' and out_header_frame_id_axis_tready = '1' then
+        if frame_id_valid = '1' and frame_id_last = '1' and frame_id_pop = '1' then
           frame_id_sent_r <= '1';
         end if;
         if frame_id_sent_r = '1' and encoding_sent_r = '0' and out_encoding_axis_tready = '1' then
@@ -381,17 +378,20 @@ begin
 
   encoding_last <= '1' when beat_r = OUT_BEATS-1 else '0';
 
-  show_encoding : process (beat_r)
-  begin
-    out_encoding_axis_tdata <= beat_of(OUT_ENCODING, 0);
-    out_encoding_axis_tkeep <= keep_of(OUT_ENCODING, 0);
-    for beat in 1 to OUT_BEATS-1 loop
-      if beat_r = beat then
-        out_encoding_axis_tdata <= beat_of(OUT_ENCODING, beat);
-        out_encoding_axis_tkeep <= keep_of(OUT_ENCODING, beat);
-      end if;
-    end loop;
-  end process show_encoding;
+  -- Lane by lane: GHDL 2.0 writes constants of more than 32 bits into Verilog as a text.
+  show_encoding : for lane in 0 to LANES-1 generate
+    show_lane : process (beat_r)
+    begin
+      out_encoding_axis_tdata(8*lane+7 downto 8*lane) <= X"00";
+      out_encoding_axis_tkeep(lane)                   <= '0';
+      for beat in 0 to OUT_BEATS-1 loop
+        if beat_r = beat and LANES*beat + lane < OUT_ENCODING'length then
+          out_encoding_axis_tdata(8*lane+7 downto 8*lane) <= letter_of(OUT_ENCODING, LANES*beat + lane);
+          out_encoding_axis_tkeep(lane)                   <= '1';
+        end if;
+      end loop;
+    end process show_lane;
+  end generate show_encoding;
 
   out_encoding_axis_tvalid <= is_sending and frame_id_sent_r and not encoding_sent_r;
   out_encoding_axis_tlast  <= encoding_last;
