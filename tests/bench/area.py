@@ -292,7 +292,6 @@ def _use_case(message: str, width: int) -> Callable[[Path], Subject]:
 
 
 def _managers() -> Iterator[Row]:
-    bars = {256: Bar(1400, 64)}
     for width in WIDTHS:
         for channels in CHANNELS if width == WIDTHS[0] else CHANNELS[:2]:
             generics = {"WIDTH": width, "SUBSCRIBERS": channels, "PUBLISHERS": channels}

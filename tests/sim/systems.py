@@ -9,9 +9,10 @@ from fusesoc_firm.generation import GeneratedCore, Plain, Request
 from fusesoc_firm.host import simulation
 from fusesoc_firm.system import generator
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
+from tests.sim.schedulers import POLICY_CORES
 
 DATA = Path(__file__).parent / "data"
-RUNTIME = ("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host")
+RUNTIME = ("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES), "manager/manager", "sim/host")
 
 
 @dataclass(frozen=True)
