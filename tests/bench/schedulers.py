@@ -60,4 +60,4 @@ def _times(name: str, cycles: Sequence[int]) -> dict[str, Any]:
         {"id": number, "cycles": value, "comma": "," if number < len(cycles) - 1 else ""}
         for number, value in enumerate(cycles)
     ]
-    return {"name": name, "values": values}
+    return {"name": name, "high": len(cycles) - 1, "values": values}
