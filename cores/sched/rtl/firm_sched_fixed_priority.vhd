@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Fixed priority: the lowest index goes first. Non-preemptive, a task that has begun is never interrupted; preemptive, it
--- is by each request of a higher priority, but not before SHORTEST_RUN of its beats were taken in a row.
+-- Fixed priority: the lowest index goes first. Non-preemptive, a task that has begun is never interrupted;
+-- preemptive, it is by each request of a higher priority, but not before SHORTEST_RUN of its beats were taken in a row.
 -- The next task is chosen in the cycle of the last beat, so that ready requesters follow each other without a gap. The
 -- request that the granted one shows in that cycle is its last beat's, not a new task's: it is left out. If nobody
 -- else asks, the grant stays where it is, which costs nothing and serves a lone requester without a gap as well.

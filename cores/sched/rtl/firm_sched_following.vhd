@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Of those that ask, the next index after a given one, cyclically; the given one itself is the last. No registers.
--- Requesters lie in rows. First comes who is further on in the row of the given one; if nobody is, the lowest one of the
--- next row in which anybody asks, which may be that row again. Both are looked for at the same time.
+-- Requesters lie in rows. First comes who is further on in the row of the given one; if nobody is, the lowest one of
+-- the next row in which anybody asks, which may be that row again. Both are looked for at the same time.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

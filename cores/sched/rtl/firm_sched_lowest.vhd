@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The lowest index of those that ask, one of which may be left out. No registers.
--- A leaf is a pair: both requests, whether its row and its column are those of the index that is left out, and the lowest bit
--- of it are five inputs of one LUT. Pairs lie in rows. The first row that has one is found, then of it only the first
--- pair, then whether it is the even request of it. If the pair lost one of its two, it is the other.
--- So requests pass a multiplexer only once, at half their number; a tree that hands indices up takes half as much again.
+-- A leaf is a pair: both requests, whether its row and its column are those of the index that is left out, and the
+-- lowest bit of it are five inputs of one LUT. Pairs lie in rows. The first row that has one is found, then of it
+-- only the first pair, then whether it is the even request of it. If the pair lost one of its two, it is the other.
+-- A tree that hands indices up takes half as many LUTs again.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -42,6 +42,24 @@ architecture rtl of firm_sched_lowest is
     return at_first(mark(COUNT-1 downto HALF), value(COUNT-1 downto HALF));
   end function at_first;
 
+  -- The word of a number, found from its highest bit on, which is there first.
+  function word_at(words, number : std_logic_vector) return std_logic_vector is
+    constant HALF : positive := words'length / 2;
+    alias numbered : std_logic_vector(2*HALF-1 downto 0) is words;
+    alias bits     : std_logic_vector(number'length-1 downto 0) is number;
+    variable half_of_word : std_logic_vector(HALF-1 downto 0);
+  begin
+    if bits(bits'high) = '1' then
+      half_of_word := numbered(2*HALF-1 downto HALF);
+    else
+      half_of_word := numbered(HALF-1 downto 0);
+    end if;
+    if bits'length = 1 then
+      return half_of_word;
+    end if;
+    return word_at(half_of_word, bits(bits'high-1 downto 0));
+  end function word_at;
+
 begin
 
   flat : if REQUESTERS >= 1 and REQUESTERS <= FEW generate
@@ -54,7 +72,7 @@ begin
 
   in_rows : if REQUESTERS > FEW generate
     -- From the highest bit: the row, the pair in it, the request in that.
-    constant ROW_BITS  : positive := BITS / 2;
+    constant ROW_BITS  : positive := (BITS-1) / 2;
     constant PAIR_BITS : positive := BITS - ROW_BITS - 1;
     constant ROWS      : positive := 2**ROW_BITS;
     constant PAIRS     : positive := 2**PAIR_BITS;  -- in a row
@@ -63,8 +81,7 @@ begin
     subtype pair_bits_t is natural range PAIR_BITS downto 1;
 
     signal padded : std_logic_vector(2**BITS-1 downto 0);
-    signal row    : std_logic_vector(ROW_BITS-1 downto 0);
-    signal pair   : std_logic_vector(PAIR_BITS-1 downto 0);
+    signal row    : std_logic_vector(ROW_BITS-1 downto 0);  -- the first one that asks
 
     signal is_row  : std_logic_vector(ROWS-1 downto 0);   -- where one is left out
     signal is_pair : std_logic_vector(PAIRS-1 downto 0);  -- in each row
@@ -74,7 +91,8 @@ begin
     signal even_asks  : std_logic_vector(ROWS*PAIRS-1 downto 0);  -- nothing left out
     signal pairs_left : std_logic_vector(PAIRS-1 downto 0);       -- of the first row
     signal evens_left : std_logic_vector(PAIRS-1 downto 0);
-    signal is_odd     : std_logic;
+    signal lost_evens : std_logic_vector(PAIRS-1 downto 0);
+    signal is_first   : std_logic;  -- the first row is that where one is left out
   begin
     pad : process (request)
     begin
@@ -99,31 +117,14 @@ begin
       row_asks(row_index) <= any_of(pair_asks((row_index+1)*PAIRS-1 downto row_index*PAIRS));
     end generate each_row;
 
-    u_pairs : entity firm.firm_axis_select
-      generic map (
-        WORDS => ROWS,
-        WIDTH => PAIRS)
-      port map (
-        words_in => pair_asks,
-        index    => row,
-        word     => pairs_left);
-
-    u_evens : entity firm.firm_axis_select
-      generic map (
-        WORDS => ROWS,
-        WIDTH => PAIRS)
-      port map (
-        words_in => even_asks,
-        index    => row,
-        word     => evens_left);
-
-    row    <= first_of(row_asks);
-    pair   <= first_of(pairs_left);
-    is_odd <= not index(0) when leave_out = '1' and row & pair = index(BITS-1 downto 1) else
-              not at_first(pairs_left, evens_left);
+    pairs_left <= word_at(pair_asks, row);
+    evens_left <= word_at(even_asks, row);
+    row        <= first_of(row_asks);
+    is_first   <= '1' when leave_out = '1' and row = index(row_bits_t) else '0';
+    lost_evens <= decode(index(pair_bits_t), is_first and not index(0), PAIRS);
 
     found  <= any_of(row_asks);
-    lowest <= row & pair & is_odd;
+    lowest <= row & first_of(pairs_left) & not at_first(pairs_left, evens_left and not lost_evens);
   end generate in_rows;
 
 end architecture rtl;
