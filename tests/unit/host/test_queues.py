@@ -202,14 +202,14 @@ def test_threads_lose_nothing() -> None:
         for subscriber, item in queues:
             found[subscriber].append(item)
 
-    writers = [threading.Thread(target=write, args=[subscriber]) for subscriber in range(subscribers)]
-    reader = threading.Thread(target=read)
+    writers = [threading.Thread(target=write, args=[subscriber], daemon=True) for subscriber in range(subscribers)]
+    reader = threading.Thread(target=read, daemon=True)
     for thread in (*writers, reader):
         thread.start()
     for thread in writers:
-        thread.join(60)
+        thread.join(20)
     queues.close()
-    reader.join(60)
+    reader.join(20)
     assert found == [[*range(items)]] * subscribers
 
 
@@ -227,10 +227,10 @@ def test_a_writer_that_waits_is_told_of_the_end() -> None:
             queues.put(0, 2)
         told.set()
 
-    writer = threading.Thread(target=write)
+    writer = threading.Thread(target=write, daemon=True)
     writer.start()
     queues.close()
-    writer.join(60)
+    writer.join(20)
     assert told.is_set()
     assert [*queues] == [(0, 1)]
 
