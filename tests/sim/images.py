@@ -141,7 +141,7 @@ def fed(copy: Path, messages: Sequence[tuple[str, Message]]) -> GeneratedSystem:
 
 
 def replace_by_netlists(made: GeneratedSystem, entities: Sequence[str], width: int) -> None:
-    """Put the netlists of accelerators in their places. Each has parts of its own, which would else have the same names."""
+    """Put the netlists of accelerators in their places; parts that two of them have need two names."""
     for entity in entities:
         netlist = made.work.synthesise(entity, {"WIDTH": width})
         for part in re.findall(r"^entity (\w+) is", netlist, re.MULTILINE):

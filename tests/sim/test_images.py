@@ -1,4 +1,4 @@
-"""The systems for images and that of many types: every byte against their models, broken images and frames, netlists."""
+"""The systems for images and of many types: every byte against the models, broken images and frames, netlists."""
 
 from __future__ import annotations
 
