@@ -31,6 +31,7 @@ from fusesoc_firm.system.derived import (
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
+from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.specification import (
     SOURCE_SUFFIXES,
     Accelerator,
@@ -39,7 +40,6 @@ from fusesoc_firm.system.specification import (
     OutputType,
     Specification,
 )
-from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.timing import scheduling_of
 from fusesoc_firm.yaml_text import Text
 
