@@ -22,6 +22,7 @@ from tests.sim.images import (
     built,
     copied,
     fed,
+    header,
     image,
     odd_images,
     random_images,
@@ -133,6 +134,38 @@ def test_an_image_that_breaks_off_does_not_harm_the_next(tmp_path: Path, name: s
     stimuli.write_text(sent, encoding="ascii")
     answers.write_text(f"! frame_error {errors}\n{wanted}", encoding="ascii")
     check(made, 0, 40)
+
+
+def scan(ros: str, source: random.Random) -> Message:
+    lengths = [source.choice((0, 1, 2, 3, source.randrange(100))) for _ in range(2)]
+    angles = ("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time", "range_min", "range_max")
+    arrays = [[source.randrange(2**20) / 2**10 for _ in range(length)] for length in lengths]
+    numbers = {name: source.randrange(2**20) / 2**10 for name in angles}
+    return {"header": header(ros, source, "s" * source.randrange(20)), **numbers} | dict(
+        zip(("ranges", "intensities"), arrays, strict=True)
+    )
+
+
+def twist(ros: str, source: random.Random) -> Message:
+    parts = {part: {axis: source.uniform(-9, 9) for axis in "xyz"} for part in ("linear", "angular")}
+    return {"header": header(ros, source, "t" * source.randrange(20)), "twist": parts}
+
+
+@pytest.mark.parametrize("width", [8, 128])
+def test_many_types_side_by_side(tmp_path: Path, width: int) -> None:
+    source = random.Random(SEED + width)
+    print(f"seed {SEED + width}")
+    ros = source.choice(("ROS", "ROS2"))
+    messages = [("twist_in", twist(ros, source)) for _ in range(15)]
+    messages += [("scan_in", scan(ros, source)) for _ in range(15)]
+    messages += [("image_in", message) for message in random_images(ros, source, 3, 6, largest=12)]
+    source.shuffle(messages)
+    made = fed(copied(tmp_path, "multi_type", width, ros), messages)
+    check(made, 0, 50)
+    for entity in ("pass_twist", "pass_scan", "pass_image"):
+        assert made.work.latches(entity, {"WIDTH": width}) == []
+    replace_by_netlists(made, ("pass_twist", "pass_scan", "pass_image"), width)
+    check(made, 30)
 
 
 @pytest.mark.parametrize(

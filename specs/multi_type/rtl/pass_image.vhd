@@ -1,7 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Passes a sensor_msgs/Image through: what a system costs and how long it takes without any work in it. Nothing is
--- stored; every field and beat goes on in the cycle in which it comes. ROS 1 has seq and nsec, ROS 2 has nanosec: a
--- system connects those of its message.
+-- Passes a sensor_msgs/Image through. Nothing is stored: every field and beat goes on in the cycle in which it
+-- comes. ROS 1 has seq and nsec, ROS 2 has nanosec: a system connects those of its message.
 library ieee;
 use ieee.std_logic_1164.all;
 
