@@ -54,8 +54,8 @@ def filtered(
 ) -> Message:
     """The message that an accelerator makes of one whose pixels it does `work` on; `encodings` are in and out.
 
-    An image is empty if it is not in the encoding, or larger than the accelerator takes, or its data is not as long as its
-    height and step say.
+    An image is empty if it is not in the encoding, or larger than the accelerator takes, or its data is not as long
+    as its height and step say.
     """
     height, width, step, data = message["height"], message["width"], message["step"], bytes(message["data"])
     channels = 3 if encodings[0] == "rgb8" else 1

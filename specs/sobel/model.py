@@ -1,7 +1,7 @@
 """Model of the Sobel filter, to the bit, with NumPy, which rosbags brings.
 
-`edges` works on an array of rows and columns; `respond` adds the rules of the message: what is no image in mono8 becomes
-an empty one.
+`edges` works on an array of rows and columns; `respond` adds the rules of the message: what is no image in mono8
+becomes an empty one.
 """
 
 from __future__ import annotations

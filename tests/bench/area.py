@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fusesoc_firm.render import render
-from fusesoc_firm.scheduling import area as scheduling_area
 from tests.bench import schedulers
 from tests.bench.designs import CORES, PUBLISHER, SUBSCRIBER, Converter, NotConvertedError, generate
 from tests.bench.tables import FAILED, MET, MISSED, NOT_CONVERTED, Table, Tell
 from tests.bench.yosys import Cells, SynthesisError, Yosys
-from tests.sim.ghdl import REPOSITORY, Generic, GhdlError, Library, core_files
+from tests.sim.ghdl import Generic, GhdlError, Library, core_files
 
 WIDTHS = (8, 64, 128)
 STREAM_WIDTHS = (8, 16, 32, 64, 128, 256, 512)
@@ -104,10 +103,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Row:
-    """What is measured: `make` analyses it in an empty folder. `dissertation` is its LUT/FF there.
-
-    `scheduler` are the policy and the number of requesters of a scheduler.
-    """
+    """What is measured: `make` analyses it in an empty folder. `dissertation` is its LUT/FF there."""
 
     label: str
     ros: str
@@ -115,7 +111,6 @@ class Row:
     make: Callable[[Path], Subject]
     dissertation: str = ""
     bar: Bar | None = None
-    scheduler: tuple[str, int] | None = None
 
     @property
     def key(self) -> tuple[str, ...]:
@@ -168,22 +163,11 @@ def measure(yosys: Yosys, tell: Tell) -> list[Table]:
     yosys.prepare()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         found = dict(zip(map(id, everything), pool.map(outcome, everything), strict=True))
-    _note_schedulers({row.scheduler: found[id(row)] for row in everything if row.scheduler})
     tables = [
         Table(title, _COLUMNS, tuple(_cells(row, found[id(row)]) for row in of_table), _NOTES.get(title, ""))
         for title, of_table in table_rows.items()
     ]
     return [*tables, _matrix(parts, [found[id(row)] for row in parts])]
-
-
-def _note_schedulers(found: Mapping[tuple[str, int], Measured | str]) -> None:
-    """Write what the choice of a scheduler goes by."""
-    areas = {
-        key: scheduling_area.Area(each.cells.lut + each.cells.memory, each.cells.ff)
-        for key, each in found.items()
-        if isinstance(each, Measured)
-    }
-    scheduling_area.write(REPOSITORY / "fusesoc_firm" / "scheduling" / scheduling_area.FILE, areas)
 
 
 _COLUMNS = ("design", "ROS", "bits", "LUT", "FF", "LUT as RAM", "field bits", "lines", "dissertation", "bar", "result")
@@ -308,8 +292,7 @@ def _schedulers() -> Iterator[Row]:
         for channels in CHANNELS:
             dissertation = _SCHEDULERS.get(policy, {}).get(channels, "")
             bar = _SCHEDULER_BARS.get((policy, channels))
-            make = _scheduler(policy, channels)
-            yield Row(f"{policy}, N = {channels}", "", None, make, dissertation, bar, (policy, channels))
+            yield Row(f"{policy}, N = {channels}", "", None, _scheduler(policy, channels), dissertation, bar)
 
 
 def _scheduler(policy: str, channels: int) -> Callable[[Path], Subject]:

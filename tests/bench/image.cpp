@@ -3,8 +3,8 @@
 //
 //   bench FRAME_ID ENCODING HEIGHT WIDTH STEP DATA RESULT
 //
-// DATA and RESULT are files. The output is "<height> <width> <step> <encoding> <frame_id>", then the numbers of the cycles
-// in which the first and the last beat of data came in and went out, and in which the message was over; it begins in 0.
+// DATA and RESULT are files. The output is "<height> <width> <step> <encoding> <frame_id>", then the numbers of the
+// cycles in which the first and the last beat of data came in, those in which they went out, and the message's cycles.
 #include "Vimage.h"
 
 #include "bench.h"
@@ -36,10 +36,16 @@ struct Stream {
   template <typename Data, typename Keep> void take(const Data& tdata, const Keep& tkeep, bool is_valid) {
     if (!is_valid) return;
     moved();
-    for (unsigned lane = 0; lane < LANES && (static_cast<uint64_t>(tkeep) >> lane & 1); ++lane) bytes.push_back(byte_of(tdata, lane));
+    for (unsigned lane = 0; lane < LANES && (static_cast<uint64_t>(tkeep) >> lane & 1); ++lane)
+      bytes.push_back(byte_of(tdata, lane));
     place = bytes.size();
   }
 };
+
+#define SHOW(stream, port) \
+  stream.show(port##_axis_tdata, port##_axis_tkeep, port##_axis_tvalid, port##_axis_tlast)
+#define TAKEN(stream, port) stream.taken(port##_axis_tready && port##_axis_tvalid)
+#define TAKE(stream, port) stream.take(port##_axis_tdata, port##_axis_tkeep, port##_axis_tvalid)
 
 static Stream text(const char* letters) {
   Stream stream;
@@ -71,9 +77,9 @@ int main(int count, char** arguments) {
   for (bool is_over = false; !is_over; ++cycle) {
     if (cycle - beat > WATCHDOG) fail("nothing moves");
     top.in_segment_valid = 7;
-    frame_id.show(top.in_header_frame_id_axis_tdata, top.in_header_frame_id_axis_tkeep, top.in_header_frame_id_axis_tvalid, top.in_header_frame_id_axis_tlast);
-    if (frame_id.is_over()) encoding.show(top.in_encoding_axis_tdata, top.in_encoding_axis_tkeep, top.in_encoding_axis_tvalid, top.in_encoding_axis_tlast);
-    if (encoding.is_over()) data.show(top.in_data_axis_tdata, top.in_data_axis_tkeep, top.in_data_axis_tvalid, top.in_data_axis_tlast);
+    SHOW(frame_id, top.in_header_frame_id);
+    if (frame_id.is_over()) SHOW(encoding, top.in_encoding);
+    if (encoding.is_over()) SHOW(data, top.in_data);
     top.in_msg_valid = data.is_over();
     top.out_msg_ready = 0;
     top.clk = 0;
@@ -83,20 +89,26 @@ int main(int count, char** arguments) {
     is_over = top.out_msg_valid;
     const bool moves = (top.in_data_axis_tvalid && top.in_data_axis_tready) || top.out_data_axis_tvalid;
     if (moves) beat = cycle;
-    frame_id.taken(top.in_header_frame_id_axis_tready && top.in_header_frame_id_axis_tvalid);
-    encoding.taken(top.in_encoding_axis_tready && top.in_encoding_axis_tvalid);
-    data.taken(top.in_data_axis_tready && top.in_data_axis_tvalid);
-    got_frame_id.take(top.out_header_frame_id_axis_tdata, top.out_header_frame_id_axis_tkeep, top.out_header_frame_id_axis_tvalid);
-    got_encoding.take(top.out_encoding_axis_tdata, top.out_encoding_axis_tkeep, top.out_encoding_axis_tvalid);
-    got_data.take(top.out_data_axis_tdata, top.out_data_axis_tkeep, top.out_data_axis_tvalid);
-    if (is_over && (top.out_data_length != got_data.bytes.size() || top.out_encoding_length != got_encoding.bytes.size() || top.out_header_frame_id_length != got_frame_id.bytes.size()))
-      fail("a stream has another length than its port says");
+    TAKEN(frame_id, top.in_header_frame_id);
+    TAKEN(encoding, top.in_encoding);
+    TAKEN(data, top.in_data);
+    TAKE(got_frame_id, top.out_header_frame_id);
+    TAKE(got_encoding, top.out_encoding);
+    TAKE(got_data, top.out_data);
+    const bool is_right = top.out_data_length == got_data.bytes.size() &&
+                          top.out_encoding_length == got_encoding.bytes.size() &&
+                          top.out_header_frame_id_length == got_frame_id.bytes.size();
+    if (is_over && !is_right) fail("a stream has another length than its port says");
     top.clk = 1;
     top.eval();
   }
   std::FILE* file = std::fopen(arguments[7], "wb");
-  if (!file || std::fwrite(got_data.bytes.data(), 1, got_data.bytes.size(), file) != got_data.bytes.size()) fail("the result cannot be written");
+  const std::size_t size = got_data.bytes.size();
+  if (!file || std::fwrite(got_data.bytes.data(), 1, size, file) != size) fail("the result cannot be written");
   std::fclose(file);
-  std::printf("%u %u %u %s %s\n", top.out_height, top.out_width, top.out_step, words(got_encoding).c_str(), words(got_frame_id).c_str());
-  std::printf("%llu %llu %llu %llu %llu\n", number(data.first), number(data.last), number(got_data.first), number(got_data.last), number(cycle));
+  std::printf("%u %u %u ", top.out_height, top.out_width, top.out_step);
+  std::printf("%s %s\n", words(got_encoding).c_str(), words(got_frame_id).c_str());
+  for (const Stream* stream : {&data, &got_data})
+    std::printf("%llu %llu ", number(stream->first), number(stream->last));
+  std::printf("%llu\n", number(cycle));
 }

@@ -1,4 +1,4 @@
-"""Accelerators for images: cycles of a full HD image in a simulation of their netlists, and what they take of a device."""
+"""Accelerators for images: cycles of a full HD image, counted in simulations of their netlists, and their area."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CORES = ("axis/axis", "acc/image/image")
 FULL_HD = (1080, 1920)
 
 _HERE = Path(__file__).parent
-_COLUMNS = ("accelerator", "bits", "cycles", "first to last", "pixels a cycle", "LUT/FF", "RAM18", "bar", "result")
+_COLUMNS = ("accelerator", "bits", "cycles", "first to last", "pixels a cycle", "LUT/FF", "block RAM", "bar", "result")
 _NOTE = """
     A noise image and nobody who waits; the result is the model's, byte for byte. 'cycles' are those of the whole
     message, from its first segment to its end; 'first to last' those from the first beat of data to the last, both

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import importlib.util
 import random
+import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-
-import numpy as np
-import yaml
 
 from tests.sim.ghdl import REPOSITORY
 from tests.sim.systems import GeneratedSystem, build, call
@@ -97,7 +95,7 @@ def odd_images(ros: str, source: random.Random, channels: int) -> list[Message]:
     """Images of every kind that is an image."""
     sizes = [(0, 0), (0, 7), (5, 0), (1, 1), (1, 2), (2, 1), (3, 3), (1, 40), (40, 1), (2, 16), (3, 17), (9, 15)]
     found = [image(ros, source, *size, channels, padding) for size in sizes for padding in (0, source.randrange(1, 40))]
-    for frame_id in ("", "x", "a" * 255, "b" * 256):
+    for frame_id in ("", "x", "a" * 255, "b" * 256, "c" * 257, "d" * 400):
         found.append(image(ros, source, 2, 3, channels, frame_id=frame_id))
     return found
 
@@ -118,28 +116,47 @@ def random_images(ros: str, source: random.Random, channels: int, count: int, la
     ]
 
 
-def system(
-    folder: Path, name: str, width: int, ros: str, messages: Sequence[tuple[str, Message]], cores: Sequence[str] = CORES
-) -> GeneratedSystem:
-    """The system `name` at another width and, for ROS2, with the word `ROS` changed everywhere."""
+def copied(folder: Path, name: str, width: int | None = None, ros: str = "ROS") -> Path:
+    """A copy of a system's folder, at another width and, for ROS2, with the word `ROS` changed everywhere."""
     copy = folder / name
     shutil.copytree(SPECS / name, copy)
     spec = copy / f"{name}.yaml"
     text = spec.read_text(encoding="utf-8")
-    content = yaml.safe_load(text)
-    text = text.replace(f"width: {content['project']['width']}", f"width: {width}")
-    if ros == "ROS2":
-        text = text.replace("middleware: ROS,", "middleware: ROS2,")
-    spec.write_text(text, encoding="utf-8")
+    if width is not None:
+        text = re.sub(r"width: \d+", f"width: {width}", text)
+    spec.write_text(text.replace("middleware: ROS,", f"middleware: {ros},"), encoding="utf-8")
+    return copy
+
+
+def built(copy: Path, stimuli: Path) -> GeneratedSystem:
+    """The system of a copy, with its simulation, in the folder `work` beside it."""
+    return build(call(copy / f"{copy.name}.yaml", stimuli, copy / "model.py"), copy.parent / "work", *CORES)
+
+
+def fed(copy: Path, messages: Sequence[tuple[str, Message]]) -> GeneratedSystem:
+    """The same, with messages, each with the subscriber that it goes to."""
     stimuli = copy / "random.yaml"
     stimuli.write_text("".join(f"- {block}: {yaml_of(message)}\n" for block, message in messages), encoding="utf-8")
-    return build(call(spec, stimuli, copy / "model.py"), folder / "work", *cores)
+    return built(copy, stimuli)
+
+
+def replace_by_netlists(made: GeneratedSystem, entities: Sequence[str], width: int) -> None:
+    """Put the netlists of accelerators in their places; parts that two of them have need two names."""
+    for entity in entities:
+        netlist = made.work.synthesise(entity, {"WIDTH": width})
+        for part in re.findall(r"^entity (\w+) is", netlist, re.MULTILINE):
+            if part != entity:
+                netlist = re.sub(rf"\b{part}\b", f"{part}_of_{entity}", netlist)
+        file = made.folder / f"{entity}_netlist.vhd"
+        file.write_text(netlist, encoding="utf-8")
+        made.work.analyse([file])
+    made.work.analyse(made.folder / f"{made.entity}{end}.vhd" for end in ("", "_tb"))
 
 
 def yaml_of(value: Any) -> str:
     """A value in flow style; bytes are a list of numbers."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {yaml_of(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, bytes | list | tuple | np.ndarray):
-        return "[" + ", ".join(yaml_of(item) for item in value) + "]"
+    if isinstance(value, bytes | list):
+        return "[" + ", ".join(map(yaml_of, value)) + "]"
     return f"'{value}'" if isinstance(value, str) else repr(value)

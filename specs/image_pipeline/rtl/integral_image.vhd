@@ -97,6 +97,7 @@ architecture rtl of integral_image is
   signal group_data   : std_logic_vector(WIDTH-1 downto 0);
   signal group_count  : std_logic_vector(COUNT_BITS-1 downto 0);
   signal group_last   : std_logic;
+  signal group_final  : std_logic;
   signal group_end    : std_logic;
   signal group_valid  : std_logic;
   signal group_ready  : std_logic;
@@ -123,6 +124,7 @@ architecture rtl of integral_image is
   signal count_r   : unsigned(COUNT_BITS-1 downto 0);
   signal top_r     : std_logic;
   signal last_r    : std_logic;
+  signal final_r   : std_logic;
   signal end_r     : std_logic;
   signal valid_r   : std_logic;
 
@@ -130,6 +132,7 @@ architecture rtl of integral_image is
   signal sums         : sums_t;
   signal sums_r       : sums_t;
   signal sums_count_r : unsigned(COUNT_BITS-1 downto 0);
+  signal sums_final_r : std_logic;
   signal sums_end_r   : std_logic;
   signal sums_valid_r : std_logic;
   signal part_r       : natural range 0 to PARTS;
@@ -205,6 +208,7 @@ begin
       group_count                     => group_count,
       group_first                     => open,
       group_last                      => group_last,
+      group_final                     => group_final,
       group_end                       => group_end,
       group_valid                     => group_valid,
       group_ready                     => group_ready,
@@ -264,6 +268,7 @@ begin
         count_r <= unsigned(group_count);
         top_r   <= is_top_r;
         last_r  <= group_last;
+        final_r <= group_final and not group_end;
         end_r   <= group_end;
       end if;
     end if;
@@ -303,6 +308,7 @@ begin
       if advance = '1' then
         sums_r       <= sums;
         sums_count_r <= count_r;
+        sums_final_r <= final_r;
         sums_end_r   <= end_r;
       end if;
     end if;
@@ -326,7 +332,7 @@ begin
     result_count <= std_logic_vector(to_unsigned(LANES, COUNT_BITS)) when sums_end_r = '0' else (others => '0');
   end generate parts_of_sum;
 
-  result_last  <= sums_end_r;
+  result_last  <= last_part and (sums_final_r or sums_end_r);
   result_valid <= sums_valid_r;
 
 end architecture rtl;

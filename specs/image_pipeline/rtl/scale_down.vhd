@@ -202,6 +202,7 @@ begin
       group_count                     => group_count,
       group_first                     => open,
       group_last                      => group_last,
+      group_final                     => open,
       group_end                       => group_end,
       group_valid                     => group_valid,
       group_ready                     => group_ready,

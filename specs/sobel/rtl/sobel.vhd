@@ -4,8 +4,8 @@
 -- the two rows before wait in block RAM, and a row leaves while the next one comes.
 --
 -- Each column of three pixels counts twice: s = a + 2 b + c for Gx = s(x+1) - s(x-1), d = c - a for
--- Gy = d(x-1) + 2 d(x) + d(x+1). A group of pixels needs a column of the groups on both sides of it, so it waits for the
--- next one. Behind the last row the one before is read once more, and then one group comes that is none.
+-- Gy = d(x-1) + 2 d(x) + d(x+1). A group of pixels needs a column of the groups on both sides of it, so it waits for
+-- the next one. Behind the last row the one before is read once more, and then one group comes that is none.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -253,6 +253,7 @@ begin
       group_count                     => group_count,
       group_first                     => open,
       group_last                      => group_last,
+      group_final                     => open,
       group_end                       => group_end,
       group_valid                     => group_valid,
       group_ready                     => group_ready,

@@ -81,11 +81,13 @@ entity firm_image_frame is
     group_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     group_first : out std_logic;
     group_last  : out std_logic;
+    group_final : out std_logic;
     group_end   : out std_logic;
     group_valid : out std_logic;
     group_ready : in  std_logic;
 
-    -- What was made of the pixels, as at firm_axis_pack; the image ends with one `result_last`, which has no bytes.
+    -- What was made of the pixels, as at firm_axis_pack; `result_last` follows `group_end`, without bytes.
+    -- It may come with the image's last bytes, too, which do not wait for it then.
     result_data  : in  std_logic_vector(WIDTH-1 downto 0);
     result_count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     result_last  : in  std_logic;
@@ -196,6 +198,7 @@ begin
       group_count   => group_count,
       group_first   => group_first,
       group_last    => group_last,
+      group_final   => group_final,
       group_end     => group_end,
       group_valid   => group_valid,
       group_ready   => group_ready);

@@ -84,7 +84,7 @@ end entity firm_image_header;
 
 architecture rtl of firm_image_header is
 
-  constant LANES : positive := max(1, WIDTH/8);
+  constant LANES     : positive := max(1, WIDTH/8);
   constant SIZE_BITS : positive := 16;
 
   -- Beats of a text, a letter of it, and a beat; behind its end there are zeros.

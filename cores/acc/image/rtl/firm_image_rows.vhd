@@ -32,6 +32,7 @@ entity firm_image_rows is
     group_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     group_first : out std_logic;  -- of a row
     group_last  : out std_logic;  -- of a row
+    group_final : out std_logic;  -- of the image: it is the last one with pixels
     -- No group but the image's end: the stream is over. It comes once, and also if the stream is too short.
     group_end   : out std_logic;
     group_valid : out std_logic;
@@ -155,6 +156,7 @@ begin
   group_count <= std_logic_vector(wanted) when over_r = '0' else (others => '0');
   group_first <= first_r;
   group_last  <= ends_row;
+  group_final <= '1' when ends_row = '1' and rows_r = 1 else '0';
   group_end   <= over_r;
   group_valid <= has_group or (rst_n and over_r and not told_r);
 
