@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 SPEED_FRACTION = 8
-_TWIST_BITS, _TWIST_FRACTION = 24, 16
+_TWIST_BITS, _TWIST_FRACTION = 23, 16
 _GAIN_FRACTION, _BACK_FRACTION = 16, 32
 _PI = 3.14159265358979323846
 # Units of a motor's angle in a count.
@@ -30,9 +30,9 @@ class Parameters:
     wheel_radius_um: int = 100_000
     counts_per_turn: int = 204_800
     speed_limit: int = 40
-    kp: int = 35_600
-    ki: int = 3_560
-    kd: int = 5_000
+    kp: int = 50_000
+    ki: int = 5_500
+    kd: int = 10_000
     timeout: int = 5_000
     stall_periods: int = 200
     filter: int = 4
@@ -50,12 +50,12 @@ class Parameters:
 
     @property
     def seen_after(self) -> int:
-        """Cycles from an edge of an encoder to its count: two of synchronising, the filter, two to compare and count."""
+        """Cycles from an encoder's edge to its count: two to synchronise, the filter, two to compare and count."""
         return self.filter + 4
 
 
 def to_fixed(number: float) -> int | None:
-    """A speed in units of 2**-16, rounded to nearest, at most 128; None if it is not a number."""
+    """A speed in units of 2**-16, rounded to nearest, at most 64; None if it is not a number."""
     if math.isnan(number):
         return None
     limit = (1 << (_TWIST_BITS - 1)) - 1

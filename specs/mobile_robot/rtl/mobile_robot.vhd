@@ -26,11 +26,11 @@ entity mobile_robot is
     COUNTS_PER_TURN : positive := 204_800;
     -- Counts a period that a wheel is asked for at most: 1.23 m/s.
     SPEED_LIMIT     : positive := 40;
-    -- Cycles of duty for one count a period, in units of 2**-8. Of a motor that runs 48 counts a period, at a duty of
-    -- PWM_CYCLES, with a time constant of ten periods: by lambda tuning, with 6 periods for the loop and 1.5 of delay.
-    KP              : natural  := 35_600;
-    KI              : natural  := 3_560;
-    KD              : natural  := 5_000;
+    -- Cycles of duty for one count a period, in units of 2**-8. For a motor of 48 counts a period at full duty, K, and a time
+    -- constant of ten periods, T: KP = T/(K (4 + 1.5)) for a loop of 4 periods and a delay of 1.5, KI = KP/T and a tenth more.
+    KP              : natural  := 50_000;
+    KI              : natural  := 5_500;
+    KD              : natural  := 10_000;
     -- Periods: 0.5 s without a command; 20 ms at full duty without a count.
     TIMEOUT         : positive := 5_000;
     STALL_PERIODS   : positive := 200;

@@ -50,8 +50,8 @@ end entity skid_steer;
 architecture rtl of skid_steer is
 
   constant PI             : real     := 3.14159265358979323846;
-  -- m/s or rad/s: up to 128 of them, in units of 2**-16.
-  constant TWIST_BITS     : positive := 24;
+  -- m/s or rad/s: up to 64 of them, in units of 2**-16.
+  constant TWIST_BITS     : positive := 23;
   constant TWIST_FRACTION : positive := 16;
   constant SPEED_FRACTION : positive := 8;
   -- Fraction bits of the constants.
@@ -82,8 +82,8 @@ architecture rtl of skid_steer is
   constant Z_BACK : integer := scaled(0.25 / Z, BACK_FRACTION);
 
   constant PRODUCT_FRACTION : positive := TWIST_FRACTION + GAIN_FRACTION;
-  -- Sixteen bits without sign reach far beyond any SPEED_LIMIT.
   subtype product_t is signed(TWIST_BITS+31 downto 0);
+  -- 32 bits: ghdl 2.0 makes netlists that compare wider numbers with a negative integer as if that were positive.
   subtype speed_t is signed(TWIST_BITS+32-PRODUCT_FRACTION+SPEED_FRACTION downto 0);
   subtype back_t is signed(41 downto 0);
 
@@ -97,7 +97,7 @@ architecture rtl of skid_steer is
   -- The number is z; its product; the sides follow.
   signal is_z_r         : std_logic;
   signal product_r      : product_t;
-  signal product_valid_r: std_logic;
+  signal product_valid_r : std_logic;
   signal product_is_z_r : std_logic;
   signal forward_r      : product_t;
   signal x_lost_r       : std_logic;
@@ -149,7 +149,7 @@ begin
     severity failure;
   assert X_GAIN < integer'high and Z_GAIN < integer'high and X_BACK < integer'high and Z_BACK < integer'high
     and X_GAIN > 1000 and Z_GAIN > 1000 and X_BACK > 1000 and Z_BACK > 1000
-    report "skid_steer: a speed of 1 m/s or 1 rad/s makes less than 1 or more than 10000 counts a period"
+    report "skid_steer: 1 m/s or 1 rad/s makes too few or too many counts a period"
     severity failure;
 
   in_done  <= done_r;

@@ -35,6 +35,7 @@ architecture behaviour of motor is
   -- A turn of the encoder's disc by one line, four counts.
   constant LINE_STEPS  : integer := 4 * 2**24;
   constant COUNT_STEPS : integer := 2**24;
+  constant DELAY       : time    := 1 ns;
 
 begin
 
@@ -75,13 +76,14 @@ begin
           end if;
         end if;
       end if;
-      enc_a <= '0';
+      -- Behind the edge, as a netlist sees its clock some delta cycles late.
+      enc_a <= '0' after DELAY;
       if angle >= COUNT_STEPS and angle < 3 * COUNT_STEPS then
-        enc_a <= '1';
+        enc_a <= '1' after DELAY;
       end if;
-      enc_b <= '0';
+      enc_b <= '0' after DELAY;
       if angle >= 2 * COUNT_STEPS then
-        enc_b <= '1';
+        enc_b <= '1' after DELAY;
       end if;
     end if;
   end process turn;
