@@ -22,7 +22,8 @@ A = (0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088, 0.0)
 D = (0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.0, 0.107 + 0.1034)
 HAND_ANGLE = -math.pi / 4
 
-# Numbers from this on have no fixed-point form, and elements of a given pose only those of two's complement to ELEMENT_LIMIT.
+# Numbers from this on have no fixed-point form; of a given pose's elements, those that two's complement has up to
+# ELEMENT_LIMIT have a result.
 LIMIT = 16
 ELEMENT_LIMIT = 4
 

@@ -97,25 +97,29 @@ begin
     variable distance : signed(12 downto 0);
   begin
     if rising_edge(clk) then
-      exponent    := unsigned(in_number(62 downto 52));
-      distance    := to_signed(TOP_EXPONENT, 13) - signed(resize(exponent, 13));
-      mantissa_r  <= aligned(unsigned('1' & in_number(51 downto 0)));
-      negative_r  <= in_number(63);
-      overflow_r  <= distance(12);
-      undefined_r <= '0';
-      distance_r  <= unsigned(distance(SHIFT_WIDTH-1 downto 0));
-      if distance >= 2**SHIFT_WIDTH then
-        distance_r <= (others => '1');
-      end if;
-      if exponent = 2047 and unsigned(in_number(51 downto 0)) /= 0 then
-        overflow_r  <= '0';
-        undefined_r <= '1';
+      if in_valid = '1' then
+        exponent    := unsigned(in_number(62 downto 52));
+        distance    := to_signed(TOP_EXPONENT, 13) - signed(resize(exponent, 13));
+        mantissa_r  <= aligned(unsigned('1' & in_number(51 downto 0)));
+        negative_r  <= in_number(63);
+        overflow_r  <= distance(12);
+        undefined_r <= '0';
+        distance_r  <= unsigned(distance(SHIFT_WIDTH-1 downto 0));
+        if distance >= 2**SHIFT_WIDTH then
+          distance_r <= (others => '1');
+        end if;
+        if exponent = 2047 and unsigned(in_number(51 downto 0)) /= 0 then
+          overflow_r  <= '0';
+          undefined_r <= '1';
+        end if;
       end if;
 
-      shifted_r           <= shift_right(mantissa_r, to_integer(distance_r));
-      shifted_negative_r  <= negative_r;
-      shifted_overflow_r  <= overflow_r;
-      shifted_undefined_r <= undefined_r;
+      if valid_r(0) = '1' then
+        shifted_r           <= shift_right(mantissa_r, to_integer(distance_r));
+        shifted_negative_r  <= negative_r;
+        shifted_overflow_r  <= overflow_r;
+        shifted_undefined_r <= undefined_r;
+      end if;
     end if;
   end process shift;
 
@@ -127,18 +131,20 @@ begin
     variable defined : unsigned(WIDTH-1 downto 0);
   begin
     if rising_edge(clk) then
-      rounded := ('0' & shifted_r(WIDTH-1 downto 1)) + ('0' & shifted_r(0 downto 0));
-      beyond  := shifted_overflow_r or rounded(WIDTH-1);
-      highest := (others => beyond);
-      defined := (others => not shifted_undefined_r);
-      rounded := (rounded or highest) and defined;
-      rounded(WIDTH-1) := '0';
-      number_r <= signed(rounded);
-      if shifted_negative_r = '1' then
-        number_r <= -signed(rounded);
+      if valid_r(1) = '1' then
+        rounded := ('0' & shifted_r(WIDTH-1 downto 1)) + ('0' & shifted_r(0 downto 0));
+        beyond  := shifted_overflow_r or rounded(WIDTH-1);
+        highest := (others => beyond);
+        defined := (others => not shifted_undefined_r);
+        rounded := (rounded or highest) and defined;
+        rounded(WIDTH-1) := '0';
+        number_r <= signed(rounded);
+        if shifted_negative_r = '1' then
+          number_r <= -signed(rounded);
+        end if;
+        number_overflow_r  <= beyond and not shifted_undefined_r;
+        number_undefined_r <= shifted_undefined_r;
       end if;
-      number_overflow_r  <= beyond and not shifted_undefined_r;
-      number_undefined_r <= shifted_undefined_r;
     end if;
   end process round;
 
