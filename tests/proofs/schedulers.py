@@ -1,31 +1,39 @@
-"""The proofs of schedulers: whom they grant, and that they serve."""
+"""The proofs of schedulers: whom they grant, for how long, and that they serve."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tests.proofs.proof import Mutation, Proof
+from tests.proofs.proof import Mutation, Proof, Size
+
+Mutations = Mapping[str, tuple[Mutation, ...]]
 
 _SIZES = tuple({"REQUESTERS": requesters} for requesters in (2, 3, 4))
 _THREE = 1  # the index of the size that is no power of two
 
-# What the harness of a policy has to know: how many ready cycles may pass before a request is served, if nobody is.
-_AT_ONCE = {"LATENCY": 1, "IS_PREEMPTIVE": 0}
 
-
-def _proofs(core: str, defines: Mapping[str, object], mutations: Mapping[str, tuple[Mutation, ...]]) -> tuple[Proof, ...]:
-    """A proof for each harness that has mutations."""
+def _proofs(
+    core: str,
+    mutations: Mutations,
+    sizes: tuple[Size, ...] = _SIZES,
+    *,
+    helpers: str = "",
+    label: str = "",
+    **defines: int,
+) -> tuple[Proof, ...]:
+    """A proof for each harness that has mutations, of a scheduler that decides in a cycle and preempts nobody."""
     entity = f"firm_sched_{core}"
     return tuple(
         Proof(
             harness,
             entity,
-            cores=("axis/axis", f"sched/{core}"),
-            sizes=_SIZES,
+            cores=("axis/axis", "sched/package", f"sched/{core}"),
+            sizes=sizes,
             depth=4,
             mutations=found,
-            defines={"DUT": entity, **defines},
-            helpers=entity,
+            defines={"DUT": entity, "IS_PREEMPTIVE": 0, "LATENCY": 1, "SHORTEST_RUN": 1, **defines},
+            helpers=helpers or entity,
+            variant=label,
         )
         for harness, found in mutations.items()
     )
@@ -35,21 +43,128 @@ def _fixed_priority() -> tuple[Proof, ...]:
     file = "firm_sched_fixed_priority.vhd"
     mutations = {
         "scheduler_grants": (
-            Mutation(file, "any(LEAVES+leaf) <= '0';", "any(LEAVES+leaf) <= '1';", ("at_most_one_grant",), _THREE),
-            Mutation(file, "<= grant_valid_r or any(1)", "<= '1'", ("no_grant_unasked",)),
-            Mutation(file, "<= grant_valid_r or any(1)", "<= any(1)", ("grant_stays_valid",)),
-            Mutation(file, "<= not any(2*node)", "<= any(2*node)", ("only_to_a_requester",)),
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
+            Mutation(
+                file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
+            ),
+            Mutation(file, "if moves = '1' then", "if kept = '0' then", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
         ),
         "scheduler_whole_tasks": (
-            Mutation(file, "started_r <= '1'", "started_r <= '0'", ("whole_tasks", "only_to_who_has_not_begun")),
-            Mutation(file, "<= not any(2*node)", "<= any(2*node)", ("request_is_still_there",)),
+            Mutation(file, "(started_r or beat) and", "beat and", ("whole_tasks", "only_to_who_has_not_begun")),
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("request_is_still_there",)),
         ),
         "scheduler_service": (
-            Mutation(file, "finished = '1' or (", "(finished and any(1)) = '1' or (", ("no_deadlock",)),
-            Mutation(file, "if any(1) = '1' then", "if (any(1) and not finished) = '1' then", ("no_gap_between_tasks",)),
+            Mutation(file, "(started_r or beat) and not finished", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "and not kept;", "and not (kept or finished);", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_priority": (
+            Mutation(
+                "firm_sched_pkg.vhd",
+                "      return lower;\n    end if;\n    return higher;",
+                "      return higher;\n    end if;\n    return lower;",
+                ("lowest_index_first",),
+            ),
         ),
     }
-    return _proofs("fixed_priority", _AT_ONCE, mutations)
+    return _proofs("fixed_priority", mutations)
 
 
-PROOFS = _fixed_priority()
+def _fixed_priority_preemptive() -> tuple[Proof, ...]:
+    file = "firm_sched_fixed_priority.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
+            Mutation(
+                file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
+            ),
+            Mutation(file, "if moves = '1' then", "if kept = '0' then", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "    kept <= '0';", "    kept <= not beat;", ("no_deadlock",)),
+            Mutation(file, "    kept <= '0';", "    kept <= finished;", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_priority": (Mutation(file, "    kept <= '0';", "    kept <= beat;", ("lowest_index_first",)),),
+    }
+    sizes = tuple({**size, "PREEMPTIVE": True} for size in _SIZES)
+    helpers = "firm_sched_fixed_priority_preemptive"
+    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, label="preemptive", IS_PREEMPTIVE=1)
+
+
+def _fixed_priority_runs() -> tuple[Proof, ...]:
+    file = "firm_sched_fixed_priority.vhd"
+    mutations = {
+        "scheduler_preemption": (
+            Mutation(file, "beats < SHORTEST_RUN else", "beats < SHORTEST_RUN-1 else", ("no_short_run",)),
+        ),
+        "scheduler_priority": (Mutation(file, "or finished = '1' or (moves", "or (moves", ("lowest_index_first",)),),
+        "scheduler_service": (
+            Mutation(file, "offered(0) and not finished", "not finished", ("no_deadlock",)),
+            Mutation(file, "offered(0) and not finished", "offered(0)", ("no_gap_between_tasks",)),
+        ),
+    }
+    sizes = tuple({**size, "PREEMPTIVE": True, "SHORTEST_RUN": 3} for size in _SIZES)
+    helpers = "firm_sched_fixed_priority_runs"
+    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, label="runs", IS_PREEMPTIVE=1)
+
+
+def _round_robin() -> tuple[Proof, ...]:
+    file = "firm_sched_round_robin.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
+            Mutation(
+                file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
+            ),
+            Mutation(file, "goes_on = '0' and any_of(request) = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
+        ),
+        "scheduler_whole_tasks": (
+            Mutation(file, "(started_r or beat) and", "beat and", ("whole_tasks", "only_to_who_has_not_begun")),
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("request_is_still_there",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "(started_r or beat) and not (beat and last)", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_fairness": (
+            Mutation(file, "first_of(later) when any_of(later) = '1' else", "", ("after_at_most_all_others",)),
+        ),
+    }
+    return _proofs("round_robin", mutations)
+
+
+def _lru() -> tuple[Proof, ...]:
+    file = "firm_sched_lru.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "<= index_of(chosen)", "<= not index_of(chosen)", ("only_to_a_requester",)),
+            Mutation(file, "<= index_of(chosen)", "<= (others => '1')", ("at_most_one_grant",), _THREE),
+            Mutation(file, "goes_on = '0' and any_of(eligible) = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
+        ),
+        "scheduler_whole_tasks": (
+            Mutation(file, "(started_r or beat) and", "beat and", ("whole_tasks", "only_to_who_has_not_begun")),
+            Mutation(file, "<= index_of(chosen)", "<= not index_of(chosen)", ("request_is_still_there",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "(started_r or beat) and not (beat and last)", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_fairness": (
+            Mutation(
+                file, "elsif spent(i) = '1' then", "elsif spent(i) = '1' and i > 0 then", ("after_at_most_all_others",)
+            ),
+        ),
+    }
+    return _proofs("lru", mutations)
+
+
+PROOFS = (
+    *_fixed_priority(),
+    *_fixed_priority_preemptive(),
+    *_fixed_priority_runs(),
+    *_round_robin(),
+    *_lru(),
+)

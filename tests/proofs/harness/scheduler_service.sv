@@ -13,9 +13,10 @@ always @(posedge clk) begin
     else if (idle != 15) idle <= idle + 1;
 end
 
-// When a task ended, another requester was waiting.
-wire [N-1:0] granted_before = 1'b1 << grant_select_before;
-wire         was_awaited    = finished_before && (request_before & ~granted_before) != 0;
+// When a task ended, another requester was waiting: since that cycle or, of a scheduler that takes its time, longer.
+reg [N-1:0] request_earlier;
+always @(posedge clk) request_earlier <= running ? request_before : 0;
+wire was_awaited = finished_before && (eligible_before & (`LATENCY > 1 ? request_earlier : {N{1'b1}})) != 0;
 
 always @* if (running) begin
     no_deadlock: assert (idle <= `LATENCY);
