@@ -11,7 +11,7 @@ from tests.sim.ghdl import Generic, Library, core_files
 from tests.sim.sched_trace import Trace, read_trace
 
 BENCH = "firm_sched_trace_tb"
-POLICY_CORES = ("fixed_priority", "round_robin", "lru")
+POLICY_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources", "edf_latency", "lst")
 SEED = 20240503
 
 _WITHOUT_POLICIES = ("axis/axis", "sched/package")
@@ -33,7 +33,10 @@ ENTITIES: Mapping[str, PolicyEntity] = {
     "fixed_priority": PolicyEntity("firm_sched_fixed_priority"),
     "fixed_priority_preemptive": PolicyEntity("firm_sched_fixed_priority", {"PREEMPTIVE": True}, is_preemptive=True),
     "round_robin": PolicyEntity("firm_sched_round_robin"),
-    "lru": PolicyEntity("firm_sched_lru", most_requesters=16),
+    "lru": PolicyEntity("firm_sched_lru"),
+    "edf_resources": PolicyEntity("firm_sched_edf_resources", is_preemptive=True),
+    "edf_latency": PolicyEntity("firm_sched_edf_latency", is_preemptive=True),
+    "lst": PolicyEntity("firm_sched_lst", is_preemptive=True),
 }
 NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is_preemptive]
 

@@ -31,11 +31,6 @@ architecture rtl of firm_sched_by_policy is
 
 begin
 
-  assert POLICY = FIXED_PRIORITY or POLICY = FIXED_PRIORITY_PREEMPTIVE or POLICY = ROUND_ROBIN or POLICY = LRU
-    report "firm_sched_by_policy: POLICY is " & policy_t'image(POLICY) &
-      "; legal: fixed_priority, fixed_priority_preemptive, round_robin, lru"
-    severity failure;
-
   of_fixed_priority : if POLICY = FIXED_PRIORITY or POLICY = FIXED_PRIORITY_PREEMPTIVE generate
     u_scheduler : entity firm.firm_sched_fixed_priority
       generic map (
@@ -79,5 +74,60 @@ begin
         grant_valid  => grant_valid,
         grant_select => grant_select);
   end generate of_lru;
+
+  of_edf_resources : if POLICY = EDF_RESOURCES generate
+    u_scheduler : entity firm.firm_sched_edf_resources
+      generic map (
+        REQUESTERS   => REQUESTERS,
+        PERIODS      => PERIODS,
+        DEADLINES    => DEADLINES,
+        TIME_BITS    => TIME_BITS,
+        SHORTEST_RUN => SHORTEST_RUN)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select);
+  end generate of_edf_resources;
+
+  of_edf_latency : if POLICY = EDF_LATENCY generate
+    u_scheduler : entity firm.firm_sched_edf_latency
+      generic map (
+        REQUESTERS   => REQUESTERS,
+        PERIODS      => PERIODS,
+        DEADLINES    => DEADLINES,
+        TIME_BITS    => TIME_BITS,
+        SHORTEST_RUN => SHORTEST_RUN)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select);
+  end generate of_edf_latency;
+
+  of_lst : if POLICY = LST generate
+    u_scheduler : entity firm.firm_sched_lst
+      generic map (
+        REQUESTERS     => REQUESTERS,
+        PERIODS        => PERIODS,
+        TRANSFER_TIMES => TRANSFER_TIMES,
+        DEADLINES      => DEADLINES,
+        TIME_BITS      => TIME_BITS,
+        SHORTEST_RUN   => SHORTEST_RUN)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select);
+  end generate of_lst;
 
 end architecture rtl;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A scheduler of schedulers: requesters lie in groups, each with a scheduler of its own, and one more chooses among the
--- groups. A group asks if the requester asks to which its own scheduler gives the grant. A group that is not chosen sees no
--- beat, as if nobody took it.
+-- groups. A group asks if the requester asks to which its own scheduler gives the grant. A group that is not chosen
+-- sees no beat, as if nobody took it.
 -- The index of the granted requester is selected among those of the groups: registers, with a multiplexer behind them.
 library ieee;
 use ieee.std_logic_1164.all;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Fixed priority: the lowest index goes first. Non-preemptive, a task that has begun is never interrupted; preemptive, it
--- is by each request of a higher priority, but not before SHORTEST_RUN of its beats were taken in a row.
+-- Fixed priority: the lowest index goes first. Non-preemptive, a task that has begun is never interrupted;
+-- preemptive, it is by each request of a higher priority, but not before SHORTEST_RUN of its beats were taken in a row.
 -- The next task is chosen in the cycle of the last beat, so that ready requesters follow each other without a gap. The
 -- request that the granted one shows in that cycle is its last beat's, not a new task's: it is left out. If nobody
 -- else asks, the grant stays where it is, which costs nothing and serves a lone requester without a gap as well.
@@ -31,10 +31,10 @@ end entity firm_sched_fixed_priority;
 architecture rtl of firm_sched_fixed_priority is
 
   signal finished : std_logic;
-  signal eligible : std_logic_vector(REQUESTERS-1 downto 0);
-  signal moves    : std_logic;  -- unless nobody is eligible
+  signal found    : std_logic;
   signal choice   : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
   signal kept     : std_logic;  -- the granted requester keeps the grant, whoever asks
+  signal moves    : std_logic;  -- the choice becomes the grant
 
   signal grant_valid_r  : std_logic;
   signal grant_select_r : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
@@ -50,9 +50,17 @@ begin
     severity failure;
 
   finished <= beat and last;
-  eligible <= request and not decode(grant_select_r, finished, REQUESTERS);
-  choice   <= first_of(eligible);
-  moves    <= any_of(eligible) and not kept;
+  moves    <= found and not kept;
+
+  u_choice : entity firm.firm_sched_lowest
+    generic map (
+      REQUESTERS => REQUESTERS)
+    port map (
+      request   => request,
+      index     => grant_select_r,
+      leave_out => finished,
+      found     => found,
+      lowest    => choice);
 
   whole_tasks : if not PREEMPTIVE generate
     signal started_r : std_logic;  -- the granted task has had a beat and needs more

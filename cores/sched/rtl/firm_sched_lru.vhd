@@ -1,7 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Least recently used, non-preemptive: of those that ask, who has waited longest since it completed a task.
--- A matrix of one bit for each pair says which of the two has waited longer. All pairs are looked at in one cycle, so the
--- next task is chosen in that of the last beat. Its area grows with the square of the requesters.
+-- Up to 16 requesters are compared all at once, more of them wait in a heap in distributed RAM.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -25,81 +24,41 @@ end entity firm_sched_lru;
 
 architecture rtl of firm_sched_lru is
 
-  constant MOST : positive := 16;
-
-  subtype row_t is std_logic_vector(REQUESTERS-1 downto 0);
-  type matrix_t is array (0 to REQUESTERS-1) of row_t;
-
-  -- Bit j of row i: i has waited longer than j. Only those with i < j are registers; the others are their opposites.
-  signal longer   : matrix_t;
-  signal longer_r : matrix_t;
-
-  signal spent    : row_t;  -- the requester whose task ends in this cycle: its request is its last beat's
-  signal eligible : row_t;
-  signal chosen   : row_t;
-  signal goes_on  : std_logic;
-
-  signal grant_valid_r  : std_logic;
-  signal grant_select_r : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-  signal started_r      : std_logic;  -- the granted task has had a beat and needs more
+  constant FEW : positive := 16;
 
 begin
 
-  assert REQUESTERS >= 1 and REQUESTERS <= MOST
-    report "firm_sched_lru: REQUESTERS is " & integer'image(REQUESTERS) & "; legal: 1 to " & integer'image(MOST)
+  assert fault_of_size(REQUESTERS) = ""
+    report "firm_sched_lru: " & fault_of_size(REQUESTERS)
     severity failure;
 
-  spent    <= decode(grant_select_r, beat and last, REQUESTERS);
-  eligible <= request and not spent;
-  goes_on  <= (started_r or beat) and not (beat and last);
+  of_few : if REQUESTERS <= FEW generate
+    u_matrix : entity firm.firm_sched_age_matrix
+      generic map (
+        REQUESTERS => REQUESTERS)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select);
+  end generate of_few;
 
-  rows : for i in 0 to REQUESTERS-1 generate
-    columns : for j in 0 to REQUESTERS-1 generate
-      register_of_pair : if i < j generate
-        longer(i)(j) <= longer_r(i)(j);
-
-        note_use : process (clk)
-        begin
-          if rising_edge(clk) then
-            -- After reset the lower index has waited longer.
-            if rst_n = '0' or spent(j) = '1' then
-              longer_r(i)(j) <= '1';
-            elsif spent(i) = '1' then
-              longer_r(i)(j) <= '0';
-            end if;
-          end if;
-        end process note_use;
-      end generate register_of_pair;
-
-      opposite : if i > j generate
-        longer(i)(j) <= not longer_r(j)(i);
-      end generate opposite;
-
-      oneself : if i = j generate
-        longer(i)(j) <= '1';
-      end generate oneself;
-    end generate columns;
-
-    chosen(i) <= eligible(i) and not any_of(eligible and not longer(i));
-  end generate rows;
-
-  choose : process (clk)
-  begin
-    if rising_edge(clk) then
-      started_r <= goes_on;
-      if goes_on = '0' and any_of(eligible) = '1' then
-        grant_valid_r  <= '1';
-        grant_select_r <= index_of(chosen);
-      end if;
-      if rst_n = '0' then
-        started_r      <= '0';
-        grant_valid_r  <= '0';
-        grant_select_r <= (others => '0');
-      end if;
-    end if;
-  end process choose;
-
-  grant_valid  <= grant_valid_r;
-  grant_select <= grant_select_r;
+  of_many : if REQUESTERS > FEW generate
+    u_engine : entity firm.firm_sched_engine
+      generic map (
+        REQUESTERS => REQUESTERS,
+        POLICY     => LRU)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select);
+  end generate of_many;
 
 end architecture rtl;

@@ -16,7 +16,8 @@ package firm_sched_pkg is
 
   type times_t is array (natural range <>) of integer;  -- in clock cycles, one for each requester
 
-  -- Whether a bit is '1', and the index of the lowest one, with index_bits(bits'length) bits; any index if there is none.
+  -- Whether a bit is '1', and the index of the lowest one, with index_bits(bits'length) bits; any index if there is
+  -- none.
   function any_of(bits : std_logic_vector) return std_logic;
   function first_of(bits : std_logic_vector) return std_logic_vector;
 
@@ -35,6 +36,8 @@ package firm_sched_pkg is
 
   -- The relative deadline of a requester's tasks.
   function deadline_of(requester : natural; periods, deadlines : times_t) return integer;
+  function deadlines_of(requesters : integer; periods, deadlines : times_t) return times_t;  -- of all
+  function slacks_of(requesters : integer; deadlines, transfer_times : times_t) return times_t;  -- at the request
 
   -- The times of `count` requesters from `first` on. Deadlines that are implicit stay so.
   function part_of(times : times_t; first : natural; count : positive) return times_t;
@@ -144,6 +147,24 @@ package body firm_sched_pkg is
     end if;
     return time_of(requester, deadlines);
   end function deadline_of;
+
+  function deadlines_of(requesters : integer; periods, deadlines : times_t) return times_t is
+    variable result : times_t(0 to requesters-1);
+  begin
+    for requester in result'range loop
+      result(requester) := deadline_of(requester, periods, deadlines);
+    end loop;
+    return result;
+  end function deadlines_of;
+
+  function slacks_of(requesters : integer; deadlines, transfer_times : times_t) return times_t is
+    variable result : times_t(0 to requesters-1);
+  begin
+    for requester in result'range loop
+      result(requester) := time_of(requester, deadlines) - time_of(requester, transfer_times);
+    end loop;
+    return result;
+  end function slacks_of;
 
   function part_of(times : times_t; first : natural; count : positive) return times_t is
     variable part : times_t(0 to count-1);

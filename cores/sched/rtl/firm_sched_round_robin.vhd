@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Round robin, non-preemptive: the next index after the requester that was served last, cyclically.
--- The next task is chosen in the cycle of the last beat. The finishing requester needs no leaving out: it is the last in
--- the round, so it is chosen only if nobody else asks, which leaves the grant where it is.
+-- The next task is chosen in the cycle of the last beat. The finishing requester needs no leaving out: it is the
+-- last in the round, so it is chosen only if nobody else asks, which leaves the grant where it is.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -26,7 +26,7 @@ end entity firm_sched_round_robin;
 architecture rtl of firm_sched_round_robin is
 
   signal served  : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);  -- had the last beat
-  signal later   : std_logic_vector(REQUESTERS-1 downto 0);              -- requests that come before the round is over
+  signal found   : std_logic;
   signal choice  : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
   signal goes_on : std_logic;
 
@@ -42,16 +42,23 @@ begin
     severity failure;
 
   served  <= grant_select_r when beat = '1' else served_r;
-  later   <= request and above(served, REQUESTERS);
-  choice  <= first_of(later) when any_of(later) = '1' else first_of(request);
   goes_on <= (started_r or beat) and not (beat and last);
+
+  u_choice : entity firm.firm_sched_following
+    generic map (
+      REQUESTERS => REQUESTERS)
+    port map (
+      request   => request,
+      index     => served,
+      found     => found,
+      following => choice);
 
   choose : process (clk)
   begin
     if rising_edge(clk) then
       started_r <= goes_on;
       served_r  <= served;
-      if goes_on = '0' and any_of(request) = '1' then
+      if goes_on = '0' and found = '1' then
         grant_valid_r  <= '1';
         grant_select_r <= choice;
       end if;
