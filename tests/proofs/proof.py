@@ -46,7 +46,8 @@ class Proof:
     """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics, by induction.
 
     `depth` is the induction's, `trace` that of the search for what a mutation violates, both in cycles. The harness gets
-    the generics and `defines` as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `helpers` is the entity's own part of a harness that is for several.
+    the generics and `defines` as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `sources` are
+    VHDL files beside the harness, such as a wrapper; `helpers` is the entity's own part of a harness that is for several.
     """
 
     harness: str
@@ -56,7 +57,8 @@ class Proof:
     depth: int
     mutations: tuple[Mutation, ...]
     defines: Mapping[str, object] = field(default_factory=dict)
-    helpers: str | None = None
+    sources: tuple[str, ...] = ()
+    helpers: str = ""
     variant: str = ""
     trace: int = 12
 
@@ -73,12 +75,15 @@ class Proof:
 
     def prove(self, size: Size, folder: Path) -> Outcome:
         """Prove all assertions at a size; `folder` is empty."""
-        return self._task(core_files(*self.cores), size, folder).prove(folder, self.depth)
+        return self._task(self._sources(), size, folder).prove(folder, self.depth)
 
     def search(self, mutation: Mutation, label: str, folder: Path) -> Outcome:
         """Look for a trace in which a broken copy violates an assertion; `folder` is empty."""
-        files = _mutated(core_files(*self.cores), mutation, folder)
+        files = _mutated(self._sources(), mutation, folder)
         return self._task(files, self.sizes[mutation.size], folder).search(folder, self.trace, label)
+
+    def _sources(self) -> list[Path]:
+        return [*core_files(*self.cores), *(HARNESSES / name for name in self.sources)]
 
     def _task(self, files: Sequence[Path], size: Size, folder: Path) -> Task:
         library = Library("firm", folder)
@@ -106,8 +111,8 @@ class Proof:
 
 def _mutated(files: Sequence[Path], mutation: Mutation, folder: Path) -> list[Path]:
     """The files, with a broken copy in `folder` in the place of one."""
-    (original,) = [file for file in files if file.name == mutation.file] or [None]
-    if original is None:
+    original = next((file for file in files if file.name == mutation.file), None)
+    if not original:
         raise MutationError(f"{mutation.file} is none of the files")
     text = original.read_text(encoding="utf-8")
     if text.count(mutation.old) != 1:

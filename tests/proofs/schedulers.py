@@ -9,31 +9,38 @@ from tests.proofs.proof import Mutation, Proof, Size
 Mutations = Mapping[str, tuple[Mutation, ...]]
 
 _SIZES = tuple({"REQUESTERS": requesters} for requesters in (2, 3, 4))
+# Fixed priority that preempts takes the grant from who pauses.
+_YIELDS = {"IS_PREEMPTIVE": 1, "WAITS_FOR_PAUSES": 0}
 _THREE = 1  # the index of the size that is no power of two
 
 
 def _proofs(
-    core: str,
+    policy: str,
     mutations: Mutations,
     sizes: tuple[Size, ...] = _SIZES,
     *,
+    entity: str = "",
+    cores: tuple[str, ...] = (),
+    sources: tuple[str, ...] = (),
     helpers: str = "",
-    label: str = "",
+    variant: str = "",
     **defines: int,
 ) -> tuple[Proof, ...]:
-    """A proof for each harness that has mutations, of a scheduler that decides in a cycle and preempts nobody."""
-    entity = f"firm_sched_{core}"
+    """A proof for each harness that has mutations; unless said, of a scheduler that decides in a cycle and never preempts."""
+    entity = entity or f"firm_sched_{policy}"
+    behaviour = {"IS_PREEMPTIVE": 0, "WAITS_FOR_PAUSES": 1, "LATENCY": 1, "SHORTEST_RUN": 1}
     return tuple(
         Proof(
             harness,
             entity,
-            cores=("axis/axis", "sched/package", f"sched/{core}"),
+            cores=("axis/axis", "sched/package", *cores, f"sched/{policy}"),
             sizes=sizes,
             depth=4,
             mutations=found,
-            defines={"DUT": entity, "IS_PREEMPTIVE": 0, "LATENCY": 1, "SHORTEST_RUN": 1, **defines},
+            defines={"DUT": entity, **behaviour, **defines},
+            sources=sources,
             helpers=helpers or entity,
-            variant=label,
+            variant=variant,
         )
         for harness, found in mutations.items()
     )
@@ -89,7 +96,7 @@ def _fixed_priority_preemptive() -> tuple[Proof, ...]:
     }
     sizes = tuple({**size, "PREEMPTIVE": True} for size in _SIZES)
     helpers = "firm_sched_fixed_priority_preemptive"
-    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, label="preemptive", IS_PREEMPTIVE=1)
+    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, variant="preemptive", **_YIELDS)
 
 
 def _fixed_priority_runs() -> tuple[Proof, ...]:
@@ -106,7 +113,7 @@ def _fixed_priority_runs() -> tuple[Proof, ...]:
     }
     sizes = tuple({**size, "PREEMPTIVE": True, "SHORTEST_RUN": 3} for size in _SIZES)
     helpers = "firm_sched_fixed_priority_runs"
-    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, label="runs", IS_PREEMPTIVE=1)
+    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, variant="runs", **_YIELDS)
 
 
 def _round_robin() -> tuple[Proof, ...]:
@@ -117,7 +124,7 @@ def _round_robin() -> tuple[Proof, ...]:
             Mutation(
                 file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
             ),
-            Mutation(file, "goes_on = '0' and any_of(request) = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+            Mutation(file, "goes_on = '0' and found = '1'", "goes_on = '0'", ("no_grant_unasked",)),
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
         ),
         "scheduler_whole_tasks": (
@@ -129,14 +136,14 @@ def _round_robin() -> tuple[Proof, ...]:
             Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
         ),
         "scheduler_fairness": (
-            Mutation(file, "first_of(later) when any_of(later) = '1' else", "", ("after_at_most_all_others",)),
+            Mutation("firm_sched_following.vhd", "later := bits and above(index, COUNT);", "later := bits;", ("after_at_most_all_others",)),
         ),
     }
     return _proofs("round_robin", mutations)
 
 
 def _lru() -> tuple[Proof, ...]:
-    file = "firm_sched_lru.vhd"
+    file = "firm_sched_age_matrix.vhd"
     mutations = {
         "scheduler_grants": (
             Mutation(file, "<= index_of(chosen)", "<= not index_of(chosen)", ("only_to_a_requester",)),
@@ -158,7 +165,7 @@ def _lru() -> tuple[Proof, ...]:
             ),
         ),
     }
-    return _proofs("lru", mutations)
+    return _proofs("lru", mutations, cores=("sched/queue", "sched/engine"))
 
 
 PROOFS = (

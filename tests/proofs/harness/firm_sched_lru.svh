@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the registers of firm_sched_lru mean, for induction.
-(* hierconn *) wire           \dut.started_r ;
-(* hierconn *) wire [N*N-1:0] \dut.longer ;
+// What the registers of firm_sched_lru for few requesters mean, for induction.
+(* hierconn *) wire           \dut.of_few_u_matrix.started_r ;
+(* hierconn *) wire [N*N-1:0] \dut.of_few_u_matrix.longer ;
 always @* if (running) begin
     helper_range: assert (grant_select < N && (grant_valid || begun == 0));
     helper_asked: assert ((begun & ~asked) == 0);
-    helper_started: assert (begun == (\dut.started_r ? granted : 0));
+    helper_started: assert (begun == (\dut.of_few_u_matrix.started_r ? granted : 0));
 end
 
 // Bit j of row i: i has waited longer than j; row 0 lies highest. It is an order: who waits longest is always there.
 function longer(input integer i, input integer j);
-    longer = \dut.longer [(N-1-i)*N + j];
+    longer = \dut.of_few_u_matrix.longer [(N-1-i)*N + j];
 endfunction
 reg is_order;
 integer i, j, k;

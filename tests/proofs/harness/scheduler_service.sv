@@ -4,9 +4,9 @@ module scheduler_service (input clk);
 
 `include "scheduler_environment.svh"
 
-// Cycles on end in which the sink is ready, somebody asks, and nothing is sent. A task that is not preempted may pause; that is
-// its requester's doing.
-wire      pausing = !`IS_PREEMPTIVE && begun[grant_select] && !request[grant_select];
+// Cycles on end in which the sink is ready, somebody asks, and nothing is sent. Some policies wait while a task that has begun
+// pauses; that is its requester's doing.
+wire      pausing = `WAITS_FOR_PAUSES && grant_valid && begun[grant_select] && !request[grant_select];
 reg [3:0] idle;
 always @(posedge clk) begin
     if (!rst_n || !ready || request == 0 || beat || pausing) idle <= 0;
@@ -20,7 +20,7 @@ wire was_awaited = finished_before && (eligible_before & (`LATENCY > 1 ? request
 
 always @* if (running) begin
     no_deadlock: assert (idle <= `LATENCY);
-    if (was_awaited && ready) no_gap_between_tasks: assert (beat);
+    if (was_awaited && ready && !pausing) no_gap_between_tasks: assert (beat);
 end
 
 `include "helpers.svh"
