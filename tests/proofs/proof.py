@@ -43,9 +43,10 @@ class Mutation:
 
 @dataclass(frozen=True)
 class Proof:
-    """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics, by induction.
+    """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics.
 
-    `depth` is the induction's, `trace` that of the search for what a mutation violates, both in cycles. The harness gets
+    It is done by induction over `depth` cycles or, `is_bounded`, for all traces of so many cycles from reset; `trace` is the
+    length of those that are searched for what a mutation violates. The harness gets
     the generics and `defines` as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `sources` are
     VHDL files beside the harness, such as a wrapper; `helpers` is the entity's own part of a harness that is for several.
     """
@@ -61,11 +62,17 @@ class Proof:
     helpers: str = ""
     variant: str = ""
     trace: int = 12
+    is_bounded: bool = False
 
     @property
     def name(self) -> str:
         """`scheduler_grants of firm_sched_fixed_priority, preemptive`."""
         return f"{self.harness} of {self.entity}{self.variant and ', '}{self.variant}"
+
+    @property
+    def method(self) -> str:
+        """`induction over 4 cycles`, or `all traces of 16 cycles`."""
+        return f"all traces of {self.depth} cycles" if self.is_bounded else f"induction over {self.depth} cycles"
 
     @property
     def properties(self) -> list[str]:
@@ -75,7 +82,8 @@ class Proof:
 
     def prove(self, size: Size, folder: Path) -> Outcome:
         """Prove all assertions at a size; `folder` is empty."""
-        return self._task(self._sources(), size, folder).prove(folder, self.depth)
+        task = self._task(self._sources(), size, folder)
+        return task.check(folder, self.depth) if self.is_bounded else task.prove(folder, self.depth)
 
     def search(self, mutation: Mutation, label: str, folder: Path) -> Outcome:
         """Look for a trace in which a broken copy violates an assertion; `folder` is empty."""

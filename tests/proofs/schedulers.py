@@ -136,7 +136,12 @@ def _round_robin() -> tuple[Proof, ...]:
             Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
         ),
         "scheduler_fairness": (
-            Mutation("firm_sched_following.vhd", "later := bits and above(index, COUNT);", "later := bits;", ("after_at_most_all_others",)),
+            Mutation(
+                "firm_sched_following.vhd",
+                "later := bits and above(index, COUNT);",
+                "later := bits;",
+                ("after_at_most_all_others",),
+            ),
         ),
     }
     return _proofs("round_robin", mutations)
@@ -168,10 +173,53 @@ def _lru() -> tuple[Proof, ...]:
     return _proofs("lru", mutations, cores=("sched/queue", "sched/engine"))
 
 
+# Their places in policy_t.
+_EDF_RESOURCES, _EDF_LATENCY, _LST = 4, 5, 6
+_TIMED_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources", "edf_latency", "lst")
+
+
+def _timed(policy: int, name: str, helpers: str, mutations: Mutations, requesters: tuple[int, ...]) -> tuple[Proof, ...]:
+    """A policy with deadlines, in a wrapper that gives it some."""
+    return _proofs(
+        "by_policy",
+        mutations,
+        tuple({"REQUESTERS": count, "POLICY": policy, "SHORTEST_RUN": 3} for count in requesters),
+        entity="timed_scheduler",
+        cores=tuple(f"sched/{core}" for core in _TIMED_CORES),
+        sources=("timed_scheduler.vhd",),
+        helpers=helpers,
+        variant=name,
+        IS_PREEMPTIVE=1,
+        LATENCY=2,
+    )
+
+
+def _parallel(policy: int, name: str) -> tuple[Proof, ...]:
+    file = "firm_sched_parallel.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "grant_select_r <= id(1)", "grant_select_r <= not id(1)", ("only_to_a_requester",)),
+            Mutation(file, "grant_select_r <= id(1)", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE),
+            Mutation(file, "elsif valid(1) = '1' and kept = '0' then", "elsif kept = '0' then", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
+        ),
+        "scheduler_preemption": (
+            Mutation(file, "beats < SHORTEST_RUN else '0'", "beats < SHORTEST_RUN-1 else '0'", ("no_short_run",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "and not (current(leaf) and finished);\n          end if", ";\n          end if", ("no_deadlock",)),
+            Mutation(file, "and not finished when beats > 0", "when beats > 0", ("no_gap_between_tasks",)),
+        ),
+    }
+    return _timed(policy, name, f"timed_scheduler_{name}", mutations, (2, 3, 4))
+
+
 PROOFS = (
     *_fixed_priority(),
     *_fixed_priority_preemptive(),
     *_fixed_priority_runs(),
     *_round_robin(),
     *_lru(),
+    *_parallel(_EDF_LATENCY, "edf_latency"),
+    *_parallel(_LST, "lst"),
 )

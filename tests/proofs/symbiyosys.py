@@ -64,6 +64,10 @@ class Task:
         """
         return self._run(folder, "prove", depth, ("check -assert",))
 
+    def check(self, folder: Path, depth: int) -> Outcome:
+        """Check all assertions in all traces of `depth` cycles from reset; `folder` is empty."""
+        return self._run(folder, "bmc", depth, ("check -assert",))
+
     def search(self, folder: Path, depth: int, label: str) -> Outcome:
         """Look for a trace of `depth` cycles from reset that violates the assertion of this label; `folder` is empty."""
         assertion = f"{self._top}/{label}"

@@ -77,3 +77,6 @@ always @(posedge clk) run_before <= !rst_n ? 0 : run + (beat && run != 15);
 // Requests that the cycle before could answer: not the one that came with a task's last beat.
 wire [N-1:0] granted_before  = grant_valid_before << grant_select_before;
 wire [N-1:0] eligible_before = request_before & ~(finished_before ? granted_before : 0);
+
+// Who has asked and has not begun still asks: for induction.
+always @* if (running) helper_still_asks: assert ((asked & ~begun & ~request) == 0);

@@ -14,9 +14,9 @@ always @(posedge clk) begin
 end
 
 // When a task ended, another requester was waiting: since that cycle or, of a scheduler that takes its time, longer.
-reg [N-1:0] request_earlier;
-always @(posedge clk) request_earlier <= running ? request_before : 0;
-wire was_awaited = finished_before && (eligible_before & (`LATENCY > 1 ? request_earlier : {N{1'b1}})) != 0;
+reg [N-1:0] eligible_earlier;
+always @(posedge clk) eligible_earlier <= running ? eligible_before : 0;
+wire was_awaited = finished_before && (eligible_before & (`LATENCY > 1 ? eligible_earlier : {N{1'b1}})) != 0;
 
 always @* if (running) begin
     no_deadlock: assert (idle <= `LATENCY);
