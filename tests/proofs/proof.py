@@ -19,6 +19,10 @@ _INCLUDE = re.compile(r'^`include "(\S+)"', re.MULTILINE)
 _HELPERS = "helpers.svh"
 
 
+# Generics of an entity.
+Size = Mapping[str, Generic]
+
+
 class MutationError(Exception):
     """What a mutation replaces is not there."""
 
@@ -39,26 +43,36 @@ class Mutation:
 
 @dataclass(frozen=True)
 class Proof:
-    """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics, by induction.
+    """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics.
 
-    `depth` is the induction's, `trace` that of the search for what a mutation violates, both in cycles. The harness gets
-    the generics and `defines` as macros. `helpers` is the entity's own part of a harness that is for several.
+    It is done by induction over `depth` cycles or, `is_bounded`, for all traces of so many cycles from reset; `trace` is the
+    length of those that are searched for what a mutation violates. The harness gets
+    the generics and `defines` as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `sources` are
+    VHDL files beside the harness, such as a wrapper; `helpers` is the entity's own part of a harness that is for several.
     """
 
     harness: str
     entity: str
     cores: tuple[str, ...]
-    sizes: tuple[Mapping[str, Generic], ...]
+    sizes: tuple[Size, ...]
     depth: int
     mutations: tuple[Mutation, ...]
     defines: Mapping[str, object] = field(default_factory=dict)
-    helpers: str | None = None
+    sources: tuple[str, ...] = ()
+    helpers: str = ""
+    variant: str = ""
     trace: int = 12
+    is_bounded: bool = False
 
     @property
     def name(self) -> str:
-        """`scheduler_grants of firm_sched_lru`."""
-        return f"{self.harness} of {self.entity}"
+        """`scheduler_grants of firm_sched_fixed_priority, preemptive`."""
+        return f"{self.harness} of {self.entity}{self.variant and ', '}{self.variant}"
+
+    @property
+    def method(self) -> str:
+        """`induction over 4 cycles`, or `all traces of 16 cycles`."""
+        return f"all traces of {self.depth} cycles" if self.is_bounded else f"induction over {self.depth} cycles"
 
     @property
     def properties(self) -> list[str]:
@@ -66,38 +80,47 @@ class Proof:
         labels = [label for text in self._texts().values() for label in _LABEL.findall(text)]
         return [label for label in labels if not label.startswith(_HELPER)]
 
-    def prove(self, size: Mapping[str, Generic], folder: Path) -> Outcome:
+    def prove(self, size: Size, folder: Path) -> Outcome:
         """Prove all assertions at a size; `folder` is empty."""
-        return self._task(core_files(*self.cores), size, folder).prove(folder, self.depth)
+        task = self._task(self._sources(), size, folder)
+        return task.check(folder, self.depth) if self.is_bounded else task.prove(folder, self.depth)
 
     def search(self, mutation: Mutation, label: str, folder: Path) -> Outcome:
         """Look for a trace in which a broken copy violates an assertion; `folder` is empty."""
-        files = _mutated(core_files(*self.cores), mutation, folder)
+        files = _mutated(self._sources(), mutation, folder)
         return self._task(files, self.sizes[mutation.size], folder).search(folder, self.trace, label)
 
-    def _task(self, files: Sequence[Path], size: Mapping[str, Generic], folder: Path) -> Task:
+    def _sources(self) -> list[Path]:
+        return [*core_files(*self.cores), *(HARNESSES / name for name in self.sources)]
+
+    def _task(self, files: Sequence[Path], size: Size, folder: Path) -> Task:
         library = Library("firm", folder)
         library.analyse(files)
         netlist = library.synthesise(self.entity, size, "verilog")
-        defines = {**{name: int(value) for name, value in size.items()}, **self.defines}
+        generics = {name: int(value) for name, value in size.items()}
+        choices = {f"{name}_{value}": 1 for name, value in generics.items()}
+        defines = {**self.defines, **generics, **choices}
         return Task(f"{self.harness}.sv", {**self._texts(), "netlist.v": netlist}, defines)
 
     def _texts(self) -> dict[str, str]:
         """The harness and what it includes, by the name under which it does."""
         name = f"{self.harness}.sv"
         harness = (HARNESSES / name).read_text(encoding="utf-8")
-        return {name: harness} | {included: self._included(included) for included in _INCLUDE.findall(harness)}
+        texts = {name: harness} | {included: self._included(included) for included in _INCLUDE.findall(harness)}
+        return texts | {
+            included: self._included(included) for text in texts.values() for included in _INCLUDE.findall(text)
+        }
 
     def _included(self, name: str) -> str:
         if name == _HELPERS:
-            return (HARNESSES / "helpers" / f"{self.helpers}.svh").read_text(encoding="utf-8") if self.helpers else ""
+            name = f"{self.helpers}.svh"
         return (HARNESSES / name).read_text(encoding="utf-8")
 
 
 def _mutated(files: Sequence[Path], mutation: Mutation, folder: Path) -> list[Path]:
     """The files, with a broken copy in `folder` in the place of one."""
-    (original,) = [file for file in files if file.name == mutation.file] or [None]
-    if original is None:
+    original = next((file for file in files if file.name == mutation.file), None)
+    if not original:
         raise MutationError(f"{mutation.file} is none of the files")
     text = original.read_text(encoding="utf-8")
     if text.count(mutation.old) != 1:

@@ -62,7 +62,11 @@ class Task:
         No trace from reset violates one in the first `depth` cycles, and where all hold for `depth` cycles on end,
         from whatever state, they hold in the next one.
         """
-        return self._run(folder, "prove", depth, ())
+        return self._run(folder, "prove", depth, ("check -assert",))
+
+    def check(self, folder: Path, depth: int) -> Outcome:
+        """Check all assertions in all traces of `depth` cycles from reset; `folder` is empty."""
+        return self._run(folder, "bmc", depth, ("check -assert",))
 
     def search(self, folder: Path, depth: int, label: str) -> Outcome:
         """Look for a trace of `depth` cycles from reset that violates the assertion of this label; `folder` is empty."""
@@ -109,7 +113,6 @@ class Task:
                 "proc",
                 "memory_map",  # so that the harness can name the words of a memory
                 f"prep -flatten -top {self._top}",
-                "check -assert",
                 *commands,
             ),
             "files": tuple(self.files),

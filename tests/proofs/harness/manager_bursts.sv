@@ -152,7 +152,7 @@ wire [`PUBLISHERS-1:0] memory;
 (* hierconn *) wire \dut.parts_of_frames_u_burst.is_begun[1] ;
 assign memory[0] = \dut.parts_of_frames_u_burst.is_begun[0] ;
 assign memory[1] = \dut.parts_of_frames_u_burst.is_begun[1] ;
-`ifdef FOUR_PUBLISHERS
+`ifdef PUBLISHERS_4
 (* hierconn *) wire \dut.parts_of_frames_u_burst.is_begun[2] ;
 (* hierconn *) wire \dut.parts_of_frames_u_burst.is_begun[3] ;
 assign memory[2] = \dut.parts_of_frames_u_burst.is_begun[2] ;
@@ -192,7 +192,7 @@ always @* if (running) begin
         helper_marked_held: assert (marked_beat == held && marked_source == held_source && marked_begins == held_begins);
         helper_marked_alone: assert (!is_followed && (marked_resumes || !is_resumed));
         if (marked_resumes && !is_resumed && in_slice == 1)
-            helper_resumption_older: assert (is_first && !older[PAYLOAD_BITS-1] && older[7:0] == marked_source);
+            helper_resumption_older: assert (is_first && !older[PAYLOAD_BITS-1] && older[7:0] == marked_source && older_id == marked_source);
         if (marked_resumes && !is_resumed && in_slice == 2)
             helper_resumption_newer: assert (older[PAYLOAD_BITS-1] && !newer[PAYLOAD_BITS-1] && newer[7:0] == marked_source);
     end
@@ -201,13 +201,14 @@ always @* if (running) begin
         helper_newer: assert (newer == {marked_last || is_interrupted, marked_beat[PAYLOAD_BITS-2:0]});
         helper_newer_id: assert (newer_id == marked_source);
         helper_newer_begins: assert (older[PAYLOAD_BITS-1] == marked_begins);
-        if (marked_resumes) helper_newer_resumed: assert (is_first && older[7:0] == marked_source);
+        if (marked_resumes) helper_newer_resumed: assert (is_first && older[7:0] == marked_source && older_id == marked_source);
     end
     if (is_marked_older) begin
         helper_older: assert (older == {marked_last || is_interrupted, marked_beat[PAYLOAD_BITS-2:0]});
         helper_older_id: assert (older_id == marked_source);
         helper_older_begins: assert (is_first == marked_begins);
     end
+    if (marked) helper_marked_source: assert (marked_source < `PUBLISHERS);
     if (marked) helper_marked_begins: assert (!(marked_begins && marked_resumes) && (!is_interrupted || is_followed));
 end
 

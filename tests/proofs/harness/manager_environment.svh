@@ -4,7 +4,7 @@
 // All inputs are free (`anyseq`: the solver chooses them anew in each cycle) but for these assumptions:
 // * the first cycle is a reset; others may follow at any time;
 // * the host and the publishers keep a beat as it is until it is taken, as AXI-Stream asks.
-// The scheduler may grant whom it likes, or nobody, in each cycle, unless a harness says more.
+// The scheduler may grant any publisher, or none, in each cycle, unless a harness says more.
 
 localparam PAYLOAD_BITS = `WIDTH + `WIDTH/8 + 1;
 
@@ -81,6 +81,7 @@ always @(posedge clk) begin
     is_first_cycle <= 0;
 end
 always @* if (is_first_cycle) assume (!rst_n);
+always @* assume (sched_grant_select < `PUBLISHERS);
 
 // A beat that is not taken stays.
 wire [PAYLOAD_BITS-1:0]                    s_beat = {s_axis_tlast, s_axis_tkeep, s_axis_tdata};

@@ -124,7 +124,6 @@ end
 // What the registers mean, for induction: the slice holds up to two beats, the older one in its output.
 (* hierconn *) wire                     \dut.u_slice_in.valid_r ;
 (* hierconn *) wire                     \dut.u_slice_in.ready_r ;
-(* hierconn *) wire                     \dut.u_slice_in.skidded_r ;
 (* hierconn *) wire [SLICE_BITS-1:0]    \dut.u_slice_in.output_r ;
 (* hierconn *) wire [SLICE_BITS-1:0]    \dut.u_slice_in.skid_r ;
 (* hierconn *) wire                     \dut.u_demux.first_r ;
@@ -146,12 +145,12 @@ wire [7:0] newer_id    = newer_first ? newer[7:0] : older_id;
 wire       newer_goes  = has_newer && goes_on(newer_first, older_known, newer[`WIDTH-1:0]);
 
 always @* if (running) begin
-    helper_skidded: assert (\dut.u_slice_in.skidded_r == has_newer);
     helper_inside: assert (inside == older_goes + newer_goes);
     helper_untold: assert (untold == id_error + (has_older && is_for_nobody(older_first, older)) + (has_newer && is_for_nobody(newer_first, newer)));
     helper_first: assert (first == (has_newer ? newer[PAYLOAD_BITS-1] : newer_first));
     if (!first) helper_known: assert (known == (has_newer ? newer_known : has_older ? older_known : \dut.u_demux.known_r ));
     if (!first && known) helper_id: assert (id == (has_newer ? newer_id : has_older ? older_id : \dut.u_demux.index_r ));
+    helper_index: assert (\dut.u_demux.first_r || !\dut.u_demux.known_r || \dut.u_demux.index_r < `SUBSCRIBERS);
     if (marked) begin
         helper_ahead: assert (ahead < inside);
         if (ahead == 0 && older_goes) helper_older: assert (marked_payload == older && marked_id == older_id);

@@ -68,3 +68,15 @@ end
 
 // The grant has come to somebody in this cycle.
 wire moved = grant_valid && (!grant_valid_before || grant_select != grant_select_before);
+
+// Beats that the granted one has had in a row, of this task: up to the cycle before, and up to this one.
+reg  [3:0] run_before;
+wire [3:0] run = moved || finished_before ? 0 : run_before;
+always @(posedge clk) run_before <= !rst_n ? 0 : run + (beat && run != 15);
+
+// Requests that the cycle before could answer: not the one that came with a task's last beat.
+wire [N-1:0] granted_before  = grant_valid_before << grant_select_before;
+wire [N-1:0] eligible_before = request_before & ~(finished_before ? granted_before : 0);
+
+// Who has asked and has not begun still asks: for induction.
+always @* if (running) helper_still_asks: assert ((asked & ~begun & ~request) == 0);

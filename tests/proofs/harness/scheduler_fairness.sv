@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A fair scheduler: while a requester waits, each of the others ends one task at the most.
+`define WAITING
 module scheduler_fairness (input clk);
 
 `include "scheduler_environment.svh"
