@@ -20,12 +20,21 @@ _OF_POLICIES = ("sched/by_policy", "sched/combined")
 
 @dataclass(frozen=True)
 class PolicyEntity:
-    """The entity of a policy, what makes it so, and how many requesters it can have."""
+    """The entity of a policy, what makes it so, how many requesters it can have, and with how many it is immediate.
+
+    An immediate one chooses in the cycle of a request or of a task's last beat. Those with keys take a cycle more, and
+    have times among their generics.
+    """
 
     entity: str
     generics: Mapping[str, Generic] = field(default_factory=dict)
     most_requesters: int = 256
+    most_immediate: int = 256
     is_preemptive: bool = False
+
+    @property
+    def has_times(self) -> bool:
+        return not self.most_immediate
 
 
 # By their names in policy_t, and in its order.
@@ -33,10 +42,10 @@ ENTITIES: Mapping[str, PolicyEntity] = {
     "fixed_priority": PolicyEntity("firm_sched_fixed_priority"),
     "fixed_priority_preemptive": PolicyEntity("firm_sched_fixed_priority", {"PREEMPTIVE": True}, is_preemptive=True),
     "round_robin": PolicyEntity("firm_sched_round_robin"),
-    "lru": PolicyEntity("firm_sched_lru"),
-    "edf_resources": PolicyEntity("firm_sched_edf_resources", is_preemptive=True),
-    "edf_latency": PolicyEntity("firm_sched_edf_latency", is_preemptive=True),
-    "lst": PolicyEntity("firm_sched_lst", is_preemptive=True),
+    "lru": PolicyEntity("firm_sched_lru", most_immediate=16),
+    "edf_resources": PolicyEntity("firm_sched_edf_resources", most_immediate=0, is_preemptive=True),
+    "edf_latency": PolicyEntity("firm_sched_edf_latency", most_immediate=0, is_preemptive=True),
+    "lst": PolicyEntity("firm_sched_lst", most_immediate=0, is_preemptive=True),
 }
 NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is_preemptive]
 
@@ -44,6 +53,11 @@ NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is
 def cases(policies: list[str], sizes: tuple[int, ...]) -> list[tuple[str, int]]:
     """Each policy with each number of requesters that it can have."""
     return [(policy, size) for policy in policies for size in sizes if size <= ENTITIES[policy].most_requesters]
+
+
+def immediate_cases(sizes: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Each policy with each number of requesters with which it is immediate."""
+    return [(policy, size) for policy, size in cases(list(ENTITIES), sizes) if size <= ENTITIES[policy].most_immediate]
 
 
 def analysed(folder: Path) -> Library:
@@ -54,9 +68,12 @@ def analysed(folder: Path) -> Library:
     return library
 
 
-def analyse_bench(library: Library) -> None:
-    """What stands above the policies, again if one of them was replaced."""
+def analyse_bench(library: Library, by_policy: Path | None = None) -> None:
+    """What stands above the policies, again if one was replaced; `by_policy` is a firm_sched_by_policy to use instead."""
     library.analyse(core_files(*_OF_POLICIES))
+    if by_policy is not None:
+        library.analyse([by_policy])
+        library.analyse(core_files("sched/combined"))
     library.analyse(core_files("sched/combined", fileset="tb"))
 
 
