@@ -69,7 +69,7 @@ def analysed(folder: Path) -> Library:
 
 
 def analyse_bench(library: Library, by_policy: Path | None = None) -> None:
-    """What stands above the policies, again if one was replaced; `by_policy` is a firm_sched_by_policy to use instead."""
+    """What stands above the policies, again if one was replaced; `by_policy` is a firm_sched_by_policy to use."""
     library.analyse(core_files(*_OF_POLICIES))
     if by_policy is not None:
         library.analyse([by_policy])

@@ -8,24 +8,23 @@ import numpy as np
 import pytest
 
 from tests.sim.ghdl import Library
-from tests.sim.sched_trace import Trace, first_difference
+from tests.sim.sched_trace import Trace, first_difference, most_overtaken
 from tests.sim.schedulers import ENTITIES, analyse_bench, analysed, model_of, trace_of
 
 TIMED = [policy for policy, entity in ENTITIES.items() if entity.has_times]
-# With how many requesters each policy keeps its tasks in which queue.
-HEAP, SORTED, PARALLEL = "heap", "sorted queue", "parallel"
-QUEUES = [
-    ("edf_resources", 2, HEAP),
-    ("edf_resources", 8, HEAP),
-    ("edf_resources", 20, HEAP),
-    ("edf_latency", 3, PARALLEL),
-    ("edf_latency", 8, PARALLEL),
-    ("edf_latency", 20, SORTED),
-    ("lst", 3, PARALLEL),
-    ("lst", 20, HEAP),
-    ("lru", 20, HEAP),
+# Each policy with each way to keep its tasks: in a heap, in a sorted queue, all at once.
+LST_IN_HEAP = 20
+SIZES = [
+    ("edf_resources", 2),
+    ("edf_resources", 8),
+    ("edf_resources", 20),
+    ("edf_latency", 3),
+    ("edf_latency", 8),
+    ("edf_latency", 20),
+    ("lst", 3),
+    ("lst", LST_IN_HEAP),
+    ("lru", 20),
 ]
-SIZES = [(policy, requesters) for policy, requesters, _ in QUEUES]
 # After reset the heap is cleared and stamps are written.
 RESET_CYCLES = 300
 
@@ -94,6 +93,18 @@ def test_stamps_of_the_idle_do_not_wrap_around(library: Library, tmp_path: Path)
     assert first_difference(trace, model_of(trace, "lru")) == ""
 
 
+@pytest.mark.parametrize("beats", [2, 5])
+@pytest.mark.parametrize("saturated", [False, True])
+@pytest.mark.parametrize("requesters", [20, 100])
+def test_each_other_goes_first_once_at_most(
+    library: Library, tmp_path: Path, requesters: int, saturated: bool, beats: int
+) -> None:
+    trace = trace_of(
+        library, tmp_path, POLICY="lru", REQUESTERS=requesters, SATURATED=saturated, TASK_BEATS=beats, CYCLES=4000
+    )
+    assert 0 < most_overtaken(trace) <= requesters - 1
+
+
 @pytest.mark.parametrize(("policy", "requesters"), [*SIZES, ("edf_resources", 256), ("edf_latency", 256), ("lru", 256)])
 def test_a_lone_request_is_granted_in_two_cycles(
     library: Library, tmp_path: Path, policy: str, requesters: int
@@ -119,25 +130,15 @@ def test_a_lone_request_is_granted_in_two_cycles(
     assert found > 0
 
 
-# Share of cycles with a beat, where everybody always has a task of so many beats.
-THROUGHPUT = {
-    HEAP: {1: 0.49, 2: 0.99, 4: 1.0, 7: 1.0},
-    SORTED: {1: 0.8, 2: 1.0, 4: 1.0, 7: 1.0},
-    PARALLEL: {1: 0.6, 2: 1.0, 4: 1.0, 7: 1.0},
-}
-
-
 @pytest.mark.parametrize("beats", [1, 2, 4, 7])
-@pytest.mark.parametrize(("policy", "requesters", "queue"), QUEUES)
-def test_tasks_follow_each_other(
-    library: Library, tmp_path: Path, policy: str, requesters: int, queue: str, beats: int
-) -> None:
+@pytest.mark.parametrize(("policy", "requesters"), SIZES)
+def test_tasks_follow_each_other(library: Library, tmp_path: Path, policy: str, requesters: int, beats: int) -> None:
     trace = trace_of(
         library, tmp_path, POLICY=policy, REQUESTERS=requesters, SATURATED=True, TASK_BEATS=beats, CYCLES=2000
     )
     share = float(trace.beat[:, RESET_CYCLES:].mean())
-    print(f"{policy}, {requesters} requesters, {beats} beats: {share}")
-    assert share >= THROUGHPUT[queue][beats]
+    # LST interrupts tasks, so that what is left of one may be a single beat, too short for the heap to be ready again.
+    assert share >= 0.95 if policy == "lst" and requesters == LST_IN_HEAP else share == 1
 
 
 @pytest.mark.parametrize("shortest_run", [1, 3])

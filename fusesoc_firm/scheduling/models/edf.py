@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fusesoc_firm.scheduling.models.base import Generics, Scheduler
-from fusesoc_firm.scheduling.models.engine import Engine, Heap, SortedQueue, Times
+from fusesoc_firm.scheduling.models.engine import Engine, Heap, Preemption, SortedQueue, Times
 from fusesoc_firm.scheduling.models.parallel import Parallel
 
 
@@ -25,6 +25,5 @@ def _engine(generics: Generics, queue: Heap | SortedQueue) -> Scheduler:
         generics.requesters,
         queue,
         Times(generics.relative_deadlines, generics.time_bits),
-        is_preemptive=True,
-        shortest_run=generics.shortest_run,
+        Preemption(generics.shortest_run),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fusesoc_firm.scheduling.models.base import Generics, Scheduler
-from fusesoc_firm.scheduling.models.engine import Engine, Heap, Times
+from fusesoc_firm.scheduling.models.engine import Engine, Heap, Preemption, Times
 from fusesoc_firm.scheduling.models.parallel import Parallel
 
 
@@ -22,7 +22,5 @@ def lst(generics: Generics) -> Scheduler:
         generics.requesters,
         Heap(generics.batch, generics.requesters),
         Times(slacks, generics.time_bits),
-        is_preemptive=True,
-        sends_own_time=True,
-        shortest_run=generics.shortest_run,
+        Preemption(generics.shortest_run, sends_own_time=True),
     )
