@@ -20,7 +20,7 @@ entity firm_manager_burst_tb is
     PREEMPTIVE : boolean := true;
     -- The fixed-priority scheduler instead of the random grant.
     SCHEDULED  : boolean := false;
-    -- Frames of each publisher; of frame f of publisher p the payload has (MULTIPLIER*p + 29*f) mod (LONGEST+1) bytes.
+    -- Frames of each publisher; of frame f of publisher p the payload has (17*p + 29*f) mod (LONGEST+1) bytes.
     FRAMES     : positive := 10;
     LONGEST    : natural  := 100;
     -- Publisher 0 stops for ever behind its first beat.
@@ -41,7 +41,6 @@ architecture simulation of firm_manager_burst_tb is
 
   constant LANES        : positive := WIDTH/8;
   constant HEADER_BYTES : positive := 5;
-  constant MULTIPLIER   : positive := 17;
 
   function speaking_publishers return natural is
   begin
@@ -89,7 +88,7 @@ architecture simulation of firm_manager_burst_tb is
 
   function payload_bytes(publisher, frame : natural) return natural is
   begin
-    return (MULTIPLIER*publisher + 29*frame) mod (LONGEST+1);
+    return (17*publisher + 29*frame) mod (LONGEST+1);
   end function payload_bytes;
 
   function byte_of(publisher, frame, place : natural) return natural is
