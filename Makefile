@@ -27,7 +27,7 @@ PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
 
-.PHONY: help sim test bench corpus lint setup tools clean distclean
+.PHONY: help sim test bench proofs corpus lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -39,7 +39,7 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIO
 	  $(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)") 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator
+test: TOOLS = iverilog verilator dot:graphviz
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -60,6 +60,9 @@ bench: TOOLS = verilator
 bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area timing cycles fuzz images'
 	@$(BIN)/python -m tests.bench $(BENCH)
 
+proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
+	@$(BIN)/python -m tests.proofs
+
 lint: setup ## Check style and types
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
@@ -79,9 +82,9 @@ $(VENV)/.installed: pyproject.toml | tools
 	  { echo "pip could not install what pyproject.toml lists; its message is above." >&2; exit 1; }
 	@touch $@
 
-# Yosys alone is as large as all the rest.
+# Yosys is there for the proofs; nextpnr is for the bench alone.
 $(VENV)/.bench: $(VENV)/.installed
-	@echo "Installing Yosys into $(VENV)"
+	@echo "Installing nextpnr into $(VENV)"
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	@touch $@
 

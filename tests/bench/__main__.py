@@ -1,4 +1,4 @@
-"""`make bench`: measure, print the tables, write docs/figures.md.
+"""`make bench`: measure, print the tables, write docs/figures.md and the schedulers' areas.
 
     python -m tests.bench [area] [timing] [cycles] [fuzz] [images] [--seed N] [--broken N]
 
@@ -12,10 +12,10 @@ import argparse
 import sys
 
 from tests.bench import area, cycles, figures, fuzz, images, timing
+from tests.bench.areas import write_areas
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import Table
 from tests.bench.yosys import Yosys
-from tests.sim.ghdl import REPOSITORY
 
 SEED = 1
 
@@ -40,12 +40,14 @@ def main() -> int:
         is_good = is_good and all(table.is_good for table in tables)
         sections[part] = figures.section(part, tables)
         print(sections[part], flush=True)
+        if part == "area":
+            write_areas(tables)
     figures.write(sections)
     return 0 if is_good else 1
 
 
 def _measure(part: str, seed: int, broken: int) -> list[Table]:
-    yosys = Yosys(REPOSITORY / "build" / "bench")
+    yosys = Yosys()
     if part == "area":
         return area.measure(yosys, _tell)
     if part == "timing":

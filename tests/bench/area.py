@@ -282,6 +282,9 @@ def _managers() -> Iterator[Row]:
             dissertation = _MANAGER[channels] if width == WIDTHS[0] else ""
             bar = _MANAGER_BAR if (width, channels) == (WIDTHS[0], 256) else None
             yield Row(f"N = {channels}", "", width, _core("firm_manager", generics), dissertation, bar)
+    for channels in CHANNELS:
+        generics = {"WIDTH": WIDTHS[0], "SUBSCRIBERS": channels, "PUBLISHERS": channels, "PREEMPTIVE": True}
+        yield Row(f"N = {channels}, preemptive", "", WIDTHS[0], _core("firm_manager", generics))
 
 
 def _schedulers() -> Iterator[Row]:

@@ -19,7 +19,7 @@ from fusesoc_firm.message.parser import parse_name
 from tests.sim.ghdl import Library, core_files
 
 SUBSCRIBER, PUBLISHER = "subscriber", "publisher"
-CORES = ("axis/axis", "sched/fixed_priority", "manager/manager")
+CORES = ("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager")
 # A folder of ros1/<package>/msg/*.msg and ros2/..., for messages that no distribution holds.
 CORPUS = "CORPUS"
 

@@ -8,6 +8,7 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 
+from tests import yowasp
 from tests.bench import area, cycles, fuzz, images, nextpnr, timing, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
@@ -67,9 +68,9 @@ def _section_of(text: str, heading: str) -> str:
 def _versions(part: str) -> str:
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
-        tools += [_first_line("verilator"), f"{yosys.PACKAGE} {yosys.version()}"]
+        tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
     elif part in ("area", "timing"):
-        tools.append(f"{yosys.PACKAGE} {yosys.version()}")
+        tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
         tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]

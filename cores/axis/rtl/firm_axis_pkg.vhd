@@ -21,6 +21,9 @@ package firm_axis_pkg is
   -- '1' if `index`, read as an unsigned number, is less than `bound`.
   function is_below(index : std_logic_vector; bound : natural) return std_logic;
 
+  -- '1' if `index` is `value`.
+  function is_equal(index : std_logic_vector; value : natural) return std_logic;
+
   -- The number of ones in a contiguous `keep`, which is one of a stream: it has 1 to 64 bits.
   function lanes_kept(keep : std_logic_vector) return std_logic_vector;
 
@@ -101,7 +104,6 @@ package body firm_axis_pkg is
     return count;
   end function lanes_kept;
 
-  -- '1' if the bits of `index` spell `value`.
   function is_equal(index : std_logic_vector; value : natural) return std_logic is
     variable bits  : std_logic_vector(index'length-1 downto 0);
     variable equal : std_logic := '1';

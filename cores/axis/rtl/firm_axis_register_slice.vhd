@@ -1,6 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Cuts every path of a stream at the full rate of a beat a cycle. All outputs are registers, `s_axis_tready`
 -- included: as it is a cycle late, a second register holds the beat that arrives when the output has just stalled.
+-- `m_axis_tid` is the lowest byte of the frame's first beat, its id, on every beat of it: taken here it needs neither
+-- logic nor a second register. `tuser` is for whatever else goes along. Who leaves either open pays nothing for it.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -15,13 +17,14 @@ entity firm_axis_register_slice is
 
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
-    s_axis_tid    : in  std_logic_vector(7 downto 0) := (others => '0');
+    s_axis_tuser  : in  std_logic_vector(7 downto 0) := (others => '0');
     s_axis_tvalid : in  std_logic;
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tuser  : out std_logic_vector(7 downto 0);
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
@@ -33,16 +36,21 @@ architecture rtl of firm_axis_register_slice is
   type beat_t is record
     tdata : std_logic_vector(WIDTH-1 downto 0);
     tkeep : std_logic_vector(WIDTH/8-1 downto 0);
-    tid   : std_logic_vector(7 downto 0);
+    tuser : std_logic_vector(7 downto 0);
     tlast : std_logic;
   end record beat_t;
 
   signal arriving  : beat_t;
+  signal next_beat : beat_t;
   signal output_r  : beat_t;
   signal skid_r    : beat_t;
+  signal id_r      : std_logic_vector(7 downto 0);
   signal valid_r   : std_logic;
-  signal skidded_r : std_logic;  -- skid_r holds a beat
-  signal ready_r   : std_logic;  -- `not skidded_r`, but '0' in reset
+  signal ready_r   : std_logic;
+
+  signal skidded   : std_logic;  -- skid_r holds a beat
+  signal available : std_logic;  -- next_beat is one
+  signal move      : std_logic;  -- the output is free for it
 
 begin
 
@@ -52,8 +60,14 @@ begin
 
   arriving.tdata <= s_axis_tdata;
   arriving.tkeep <= s_axis_tkeep;
-  arriving.tid   <= s_axis_tid;
+  arriving.tuser <= s_axis_tuser;
   arriving.tlast <= s_axis_tlast;
+
+  -- `ready_r` is low without a beat in the output only in reset.
+  skidded   <= valid_r and not ready_r;
+  next_beat <= skid_r when skidded = '1' else arriving;
+  available <= skidded or (s_axis_tvalid and ready_r);
+  move      <= m_axis_tready or not valid_r;
 
   move_beats : process (clk)
   begin
@@ -61,12 +75,15 @@ begin
       if ready_r = '1' then
         skid_r <= arriving;
       end if;
-      if valid_r = '0' or m_axis_tready = '1' then
-        if skidded_r = '1' then
-          output_r <= skid_r;
-        else
-          output_r <= arriving;
+      if move = '1' and available = '1' then
+        output_r <= next_beat;
+        -- The output keeps its last beat's `tlast`, so it tells that the next one is a first one.
+        if output_r.tlast = '1' then
+          id_r <= next_beat.tdata(7 downto 0);
         end if;
+      end if;
+      if rst_n = '0' then
+        output_r.tlast <= '1';
       end if;
     end if;
   end process move_beats;
@@ -75,16 +92,13 @@ begin
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
-        valid_r   <= '0';
-        skidded_r <= '0';
-        ready_r   <= '0';
-      elsif valid_r = '0' or m_axis_tready = '1' then
-        valid_r   <= skidded_r or (s_axis_tvalid and ready_r);
-        skidded_r <= '0';
-        ready_r   <= '1';
+        valid_r <= '0';
+        ready_r <= '0';
+      elsif move = '1' then
+        valid_r <= available;
+        ready_r <= '1';
       elsif s_axis_tvalid = '1' then
-        skidded_r <= '1';
-        ready_r   <= '0';
+        ready_r <= '0';
       end if;
     end if;
   end process track_beats;
@@ -92,7 +106,8 @@ begin
   s_axis_tready <= ready_r;
   m_axis_tdata  <= output_r.tdata;
   m_axis_tkeep  <= output_r.tkeep;
-  m_axis_tid    <= output_r.tid;
+  m_axis_tuser  <= output_r.tuser;
+  m_axis_tid    <= id_r;
   m_axis_tlast  <= output_r.tlast;
   m_axis_tvalid <= valid_r;
 

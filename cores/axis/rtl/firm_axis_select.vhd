@@ -1,6 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- One word out of many: a tree of multiplexers, two levels of which fit a 6-input LUT a bit. A dynamic array index costs
 -- about twice of it through `ghdl --synth`. An index beyond the last word reads any of them.
+-- If DECODED, the tree is written as ANDs of words and decoded pairs of index bits, and ORs. Yosys maps that as it stands,
+-- at the 4-to-1 multiplexers that fit a LUT, and takes nested multiplexers apart. That saves a third of the LUTs for many
+-- words that share nothing, and costs more for words with constants, which nested multiplexers absorb.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -8,8 +11,9 @@ use firm.firm_axis_pkg.all;
 
 entity firm_axis_select is
   generic (
-    WORDS : integer  := 4;  -- 1 and more
-    WIDTH : positive := 8);
+    WORDS   : integer  := 4;  -- 1 and more
+    WIDTH   : positive := 8;
+    DECODED : boolean  := false);
   port (
     words_in : in  std_logic_vector(WORDS*WIDTH-1 downto 0);  -- word 0 lowest
     index    : in  std_logic_vector(index_bits(WORDS)-1 downto 0);
@@ -35,11 +39,41 @@ architecture rtl of firm_axis_select is
     end if;
   end function chosen;
 
+  -- The same with ANDs and ORs: by the highest two bits, or by one where their number is odd.
+  function gathered(candidates, number : std_logic_vector) return std_logic_vector is
+    constant COUNT  : positive := candidates'length / WIDTH;
+    constant LOW    : natural  := candidates'low;
+    constant PLACES : natural  := clog2(COUNT);
+    -- The bits that choose a part, and those that choose within it. No word is parted in none, but GHDL evaluates it, too.
+    constant HERE   : natural  := 2 - PLACES mod 2;
+    constant BELOW  : natural  := max(0, PLACES-HERE);
+    variable first  : natural;
+    variable beyond : natural;
+    variable word   : std_logic_vector(WIDTH-1 downto 0) := (others => '0');
+  begin
+    if COUNT = 1 then
+      return candidates;
+    end if;
+    for part in natural range 0 to 2**HERE-1 loop
+      first  := part * 2**BELOW;
+      beyond := COUNT - max(0, COUNT - first - 2**BELOW);
+      if first < COUNT then
+        if is_equal(number(PLACES-1 downto BELOW), part) = '1' then
+          word := word or gathered(candidates(LOW+beyond*WIDTH-1 downto LOW+first*WIDTH), number);
+        end if;
+      end if;
+    end loop;
+    return word;
+  end function gathered;
+
 begin
 
   -- An illegal number is for the entity above to name.
-  legal : if WORDS >= 1 generate
+  nested : if WORDS >= 1 and not DECODED generate
     word <= chosen(words_in, index);
-  end generate legal;
+  end generate nested;
+  decoded_pairs : if WORDS >= 1 and DECODED generate
+    word <= gathered(words_in, index);
+  end generate decoded_pairs;
 
 end architecture rtl;

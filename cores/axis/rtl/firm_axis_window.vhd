@@ -119,14 +119,14 @@ begin
     -- A legal number, that the assert above can speak first.
     constant VOID : natural := max(0, VOID_LANES);
 
-    signal starting_r   : std_logic;  -- the next beat to enter is the first of a frame
-    signal entering     : count_t;    -- the bytes of the beat that enters
-    signal entering_tid : std_logic_vector(7 downto 0);
+    signal starting_r    : std_logic;  -- the next beat to enter is the first of a frame
+    signal entering      : count_t;    -- the bytes of the beat that enters
+    signal entering_user : std_logic_vector(7 downto 0);
 
     -- The beat behind the window's first one. The slice carries the number of its bytes, and whether it is the first
-    -- of a frame, as `tid`.
+    -- of a frame, as `tuser`.
     signal next_tdata  : std_logic_vector(WIDTH-1 downto 0);
-    signal next_tid    : std_logic_vector(7 downto 0);
+    signal next_user   : std_logic_vector(7 downto 0);
     signal next_tvalid : std_logic;
     signal next_tlast  : std_logic;
     signal next_first  : std_logic;
@@ -175,7 +175,7 @@ begin
       end if;
     end process mark_first;
 
-    entering_tid  <= starting_r & std_logic_vector(resize(entering, 7));
+    entering_user <= starting_r & std_logic_vector(resize(entering, 7));
     s_axis_tready <= s_axis_tready_out;
 
     u_slice : entity firm.firm_axis_register_slice
@@ -186,19 +186,19 @@ begin
         rst_n         => rst_n,
         s_axis_tdata  => s_axis_tdata,
         s_axis_tkeep  => s_axis_tkeep,
-        s_axis_tid    => entering_tid,
+        s_axis_tuser  => entering_user,
         s_axis_tvalid => s_axis_tvalid,
         s_axis_tlast  => s_axis_tlast,
         s_axis_tready => s_axis_tready_out,
         m_axis_tdata  => next_tdata,
         m_axis_tkeep  => open,
-        m_axis_tid    => next_tid,
+        m_axis_tuser  => next_user,
         m_axis_tvalid => next_tvalid,
         m_axis_tlast  => next_tlast,
         m_axis_tready => move);
 
-    next_first <= next_tid(7);
-    next_bytes <= resize(unsigned(next_tid(6 downto 0)), COUNT_BITS);
+    next_first <= next_user(7);
+    next_bytes <= resize(unsigned(next_user(6 downto 0)), COUNT_BITS);
 
     both_beats <= next_tdata(WIDTH-9 downto 0) & tdata_r;
     window     <= bytes_from(both_beats, offset_r);

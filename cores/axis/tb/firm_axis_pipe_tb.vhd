@@ -30,7 +30,6 @@ architecture simulation of firm_axis_pipe_tb is
 
   signal in_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal in_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
-  signal in_tid    : std_logic_vector(7 downto 0);
   signal in_tvalid : std_logic;
   signal in_tlast  : std_logic;
   signal in_tready : std_logic;
@@ -83,19 +82,6 @@ begin
 
   slice : if PART = "register_slice" generate
 
-    -- The part carries `tid`: it is made where the frames go in.
-    u_tid : entity firm.firm_sim_tid
-      generic map (
-        WIDTH => WIDTH)
-      port map (
-        clk         => clk,
-        rst_n       => rst_n,
-        axis_tdata  => in_tdata,
-        axis_tvalid => in_tvalid,
-        axis_tlast  => in_tlast,
-        axis_tready => in_tready,
-        axis_tid    => in_tid);
-
     u_part : entity firm.firm_axis_register_slice
       generic map (
         WIDTH => WIDTH)
@@ -104,7 +90,6 @@ begin
         rst_n         => rst_n,
         s_axis_tdata  => in_tdata,
         s_axis_tkeep  => in_tkeep,
-        s_axis_tid    => in_tid,
         s_axis_tvalid => in_tvalid,
         s_axis_tlast  => in_tlast,
         s_axis_tready => in_tready,

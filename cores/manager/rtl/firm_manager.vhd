@@ -2,6 +2,7 @@
 -- Stands between the host's two streams and the converters. Host to subscribers: takes the id off a frame and routes
 -- it. Publishers to host: sends the frames of the publisher that the scheduler in the slot grants. Register slices on
 -- the host's sides cut every path between the host and the converters.
+-- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host gets bursts (docs/manager.md).
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -11,7 +12,9 @@ entity firm_manager is
   generic (
     WIDTH       : integer := 8;
     SUBSCRIBERS : integer := 1;
-    PUBLISHERS  : integer := 1);
+    PUBLISHERS  : integer := 1;
+    -- The scheduler may move the grant between any two beats of a frame.
+    PREEMPTIVE : boolean := false);
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -23,7 +26,7 @@ entity firm_manager is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- To the host; `tid` is the publisher's id on every beat.
+    -- To the host; `tid` is the id of the frame on every beat.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tid    : out std_logic_vector(7 downto 0);
@@ -66,10 +69,17 @@ architecture rtl of firm_manager is
 
   signal granted_tdata  : std_logic_vector(WIDTH-1 downto 0);
   signal granted_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
-  signal granted_tid    : std_logic_vector(7 downto 0);
   signal granted_tvalid : std_logic;
   signal granted_tlast  : std_logic;
   signal granted_tready : std_logic;
+
+  signal sent_tdata  : std_logic_vector(WIDTH-1 downto 0);
+  signal sent_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal sent_tvalid : std_logic;
+  signal sent_tlast  : std_logic;
+  signal sent_tready : std_logic;
+
+  signal out_tid : std_logic_vector(7 downto 0);
 
 begin
 
@@ -131,10 +141,38 @@ begin
       s_axis_tready => pub_axis_tready,
       m_axis_tdata  => granted_tdata,
       m_axis_tkeep  => granted_tkeep,
-      m_axis_tid    => granted_tid,
       m_axis_tvalid => granted_tvalid,
       m_axis_tlast  => granted_tlast,
       m_axis_tready => granted_tready);
+
+  whole_frames : if not PREEMPTIVE generate
+    sent_tdata     <= granted_tdata;
+    sent_tkeep     <= granted_tkeep;
+    sent_tvalid    <= granted_tvalid;
+    sent_tlast     <= granted_tlast;
+    granted_tready <= sent_tready;
+  end generate whole_frames;
+
+  parts_of_frames : if PREEMPTIVE generate
+    u_burst : entity firm.firm_axis_burst
+      generic map (
+        WIDTH   => WIDTH,
+        SOURCES => PUBLISHERS)
+      port map (
+        clk           => clk,
+        rst_n         => rst_n,
+        source        => sched_grant_select,
+        s_axis_tdata  => granted_tdata,
+        s_axis_tkeep  => granted_tkeep,
+        s_axis_tvalid => granted_tvalid,
+        s_axis_tlast  => granted_tlast,
+        s_axis_tready => granted_tready,
+        m_axis_tdata  => sent_tdata,
+        m_axis_tkeep  => sent_tkeep,
+        m_axis_tvalid => sent_tvalid,
+        m_axis_tlast  => sent_tlast,
+        m_axis_tready => sent_tready);
+  end generate parts_of_frames;
 
   u_slice_out : entity firm.firm_axis_register_slice
     generic map (
@@ -142,18 +180,27 @@ begin
     port map (
       clk           => clk,
       rst_n         => rst_n,
-      s_axis_tdata  => granted_tdata,
-      s_axis_tkeep  => granted_tkeep,
-      s_axis_tid    => granted_tid,
-      s_axis_tvalid => granted_tvalid,
-      s_axis_tlast  => granted_tlast,
-      s_axis_tready => granted_tready,
+      s_axis_tdata  => sent_tdata,
+      s_axis_tkeep  => sent_tkeep,
+      s_axis_tvalid => sent_tvalid,
+      s_axis_tlast  => sent_tlast,
+      s_axis_tready => sent_tready,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tkeep  => m_axis_tkeep,
-      m_axis_tid    => m_axis_tid,
+      m_axis_tid    => out_tid,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
       m_axis_tready => m_axis_tready);
+
+  -- No publisher has an id of more bits.
+  name_publisher : for place in 0 to 7 generate
+    of_index : if place < index_bits(PUBLISHERS) generate
+      m_axis_tid(place) <= out_tid(place);
+    end generate of_index;
+    above : if place >= index_bits(PUBLISHERS) generate
+      m_axis_tid(place) <= '0';
+    end generate above;
+  end generate name_publisher;
 
   sched_request <= pub_axis_tvalid;
   sched_beat    <= granted_tvalid and granted_tready;

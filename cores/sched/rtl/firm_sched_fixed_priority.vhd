@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Fixed priority, non-preemptive: the lowest index goes first, and a task that has begun is never interrupted.
+-- Fixed priority: the lowest index goes first. Non-preemptive, a task that has begun is never interrupted;
+-- preemptive, it is by each request of a higher priority, but not before SHORTEST_RUN of its beats were taken in a row.
 -- The next task is chosen in the cycle of the last beat, so that ready requesters follow each other without a gap. The
 -- request that the granted one shows in that cycle is its last beat's, not a new task's: it is left out. If nobody
 -- else asks, the grant stays where it is, which costs nothing and serves a lone requester without a gap as well.
@@ -7,10 +8,14 @@ library ieee;
 use ieee.std_logic_1164.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
 
 entity firm_sched_fixed_priority is
   generic (
-    REQUESTERS : integer := 2);
+    REQUESTERS : integer := 2;
+    PREEMPTIVE : boolean := false;
+    -- Beats; of a preemptive one only. A requester that pauses may be interrupted all the same.
+    SHORTEST_RUN : integer := 1);
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -25,73 +30,94 @@ end entity firm_sched_fixed_priority;
 
 architecture rtl of firm_sched_fixed_priority is
 
-  constant LEVELS : natural  := clog2(REQUESTERS);
-  constant LEAVES : positive := 2**LEVELS;
-
-  -- A binary tree as a heap: node 1 is the root, node n has the children 2n (the higher priority) and 2n+1.
-  -- Of the indices, node n of level l (from the root) uses the lowest LEVELS-l bits.
-  type index_tree_t is array (1 to 2*LEAVES-1) of std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-  signal any   : std_logic_vector(1 to 2*LEAVES-1);
-  signal index : index_tree_t;
-
   signal finished : std_logic;
-  signal spent    : std_logic_vector(REQUESTERS-1 downto 0);  -- the requester whose task ends in this cycle
+  signal found    : std_logic;
+  signal choice   : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+  signal kept     : std_logic;  -- the granted requester keeps the grant, whoever asks
+  signal moves    : std_logic;  -- the choice becomes the grant
 
   signal grant_valid_r  : std_logic;
   signal grant_select_r : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-  signal started_r      : std_logic;  -- the granted task has had a beat and needs more
 
 begin
 
-  assert REQUESTERS >= 1 and REQUESTERS <= 256
-    report "firm_sched_fixed_priority: REQUESTERS is " & integer'image(REQUESTERS) & "; legal: 1 to 256"
+  assert fault_of_size(REQUESTERS) = ""
+    report "firm_sched_fixed_priority: " & fault_of_size(REQUESTERS)
+    severity failure;
+
+  assert fault_of_run(SHORTEST_RUN) = ""
+    report "firm_sched_fixed_priority: " & fault_of_run(SHORTEST_RUN)
     severity failure;
 
   finished <= beat and last;
-  spent    <= decode(grant_select_r, finished, REQUESTERS);
+  moves    <= found and not kept;
 
-  leaves_of_tree : for leaf in 0 to LEAVES-1 generate
-    used : if leaf < REQUESTERS generate
-      any(LEAVES+leaf) <= request(leaf) and not spent(leaf);
-    end generate used;
-    unused : if leaf >= REQUESTERS generate
-      any(LEAVES+leaf) <= '0';
-    end generate unused;
-    index(LEAVES+leaf) <= (others => '0');
-  end generate leaves_of_tree;
+  u_choice : entity firm.firm_sched_lowest
+    generic map (
+      REQUESTERS => REQUESTERS)
+    port map (
+      request   => request,
+      index     => grant_select_r,
+      leave_out => finished,
+      found     => found,
+      lowest    => choice);
 
-  levels_of_tree : for level in 0 to LEVELS-1 generate
-    nodes : for node in natural range 2**level to 2**(level+1)-1 generate
-      constant BIT_OF_LEVEL : natural := LEVELS-1-level;
+  whole_tasks : if not PREEMPTIVE generate
+    signal started_r : std_logic;  -- the granted task has had a beat and needs more
+  begin
+    kept <= (started_r or beat) and not finished;
+
+    follow_task : process (clk)
     begin
-      any(node) <= any(2*node) or any(2*node+1);
+      if rising_edge(clk) then
+        started_r <= kept and rst_n;
+      end if;
+    end process follow_task;
+  end generate whole_tasks;
 
-      below : if BIT_OF_LEVEL > 0 generate
-        index(node)(BIT_OF_LEVEL-1 downto 0) <= index(2*node)(BIT_OF_LEVEL-1 downto 0) when any(2*node) = '1' else
-                                                index(2*node+1)(BIT_OF_LEVEL-1 downto 0);
-      end generate below;
-      index(node)(BIT_OF_LEVEL) <= not any(2*node);
-      above : if level > 0 generate
-        index(node)(LEVELS-1 downto BIT_OF_LEVEL+1) <= (others => '0');
-      end generate above;
-    end generate nodes;
-  end generate levels_of_tree;
+  any_beat : if PREEMPTIVE and SHORTEST_RUN <= 1 generate
+    kept <= '0';
+  end generate any_beat;
+
+  whole_runs : if PREEMPTIVE and SHORTEST_RUN > 1 generate
+    subtype beats_t is natural range 0 to SHORTEST_RUN;
+    signal beats   : beats_t;
+    signal beats_r : beats_t;                       -- of the run, no further than to the shortest
+    signal offered : std_logic_vector(0 downto 0);  -- the granted requester's request
+  begin
+    beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
+    kept  <= offered(0) and not finished when beats > 0 and beats < SHORTEST_RUN else '0';
+
+    u_offered : entity firm.firm_axis_select
+      generic map (
+        WORDS => REQUESTERS,
+        WIDTH => 1)
+      port map (
+        words_in => request,
+        index    => grant_select_r,
+        word     => offered);
+
+    follow_run : process (clk)
+    begin
+      if rising_edge(clk) then
+        beats_r <= beats;
+        if rst_n = '0' or finished = '1' or (moves = '1' and choice /= grant_select_r) then
+          beats_r <= 0;
+        end if;
+      end if;
+    end process follow_run;
+  end generate whole_runs;
 
   choose : process (clk)
   begin
     if rising_edge(clk) then
+      if moves = '1' then
+        grant_valid_r  <= '1';
+        grant_select_r <= choice;
+      end if;
       if rst_n = '0' then
         grant_valid_r  <= '0';
         grant_select_r <= (others => '0');
-        started_r      <= '0';
-      elsif finished = '1' or (started_r = '0' and beat = '0') then
-        started_r     <= '0';
-        grant_valid_r <= grant_valid_r or any(1);
-        if any(1) = '1' then
-          grant_select_r <= index(1);
-        end if;
-      else
-        started_r <= '1';
       end if;
     end if;
   end process choose;

@@ -1,0 +1,193 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Which tasks have come: a task is accepted once and stays `known` until it finishes; accepted ones leave one a cycle.
+--
+-- The requesters stand in rows. When no accepted task is here, the next row in which somebody asks is looked at, and
+-- all of its new requests are accepted at once; they leave lowest index first. Rows take turns, so nobody waits for
+-- ever behind lower indices that come again and again, and a lone request is accepted in the cycle in which it comes.
+--
+-- What is known lies in distributed RAM, a row a word: a requester is known where its bits in `accepted` and `finished` differ.
+-- So the row that is accepted and the task that finishes write to memories of their own.
+-- The RAM keeps what was there before a reset: after it the rows are made equal, one a cycle.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
+
+entity firm_sched_arrivals is
+  generic (
+    REQUESTERS : integer := 2);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    enable : in std_logic;  -- accept tasks
+
+    request : in std_logic_vector(REQUESTERS-1 downto 0);
+
+    -- An accepted task, until it leaves.
+    valid  : out std_logic;
+    id     : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+    leaves : in  std_logic;
+
+    -- A requester finishes a task, which may be known or not. If it has not left, it is forgotten.
+    finished       : in std_logic;
+    finished_known : in std_logic;  -- it has left; read with `finished` only
+    finished_id    : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+end entity firm_sched_arrivals;
+
+architecture rtl of firm_sched_arrivals is
+
+  -- Two requesters are a row, of which another one is not used.
+  constant ID_BITS     : positive := index_bits(REQUESTERS);
+  constant COLUMN_BITS : positive := max(1, ID_BITS / 2);
+  constant ROW_BITS    : positive := max(1, ID_BITS - COLUMN_BITS);
+  constant COLUMNS     : positive := 2**COLUMN_BITS;
+  constant ROWS        : positive := 2**ROW_BITS;
+  subtype row_t is std_logic_vector(ROW_BITS-1 downto 0);
+  subtype rows_t is std_logic_vector(ROWS-1 downto 0);
+  subtype column_t is std_logic_vector(COLUMN_BITS-1 downto 0);
+  subtype columns_t is std_logic_vector(COLUMNS-1 downto 0);
+  subtype requesters_t is std_logic_vector(ROWS*COLUMNS-1 downto 0);
+
+  signal cleared_r : unsigned(ROW_BITS downto 0);  -- the next row to be made equal; the highest bit: all are
+  signal clearing  : std_logic;
+
+  signal batch_r : columns_t;  -- accepted and still here
+  signal row_r   : row_t;      -- their row; after they have left the last one
+
+  signal asks          : std_logic_vector(ROWS*COLUMNS-1 downto 0);
+  signal rows_that_ask : rows_t;
+  signal rows_above    : rows_t;
+  signal found_row     : row_t;
+  signal next_row      : row_t;
+  signal row_asks      : columns_t;  -- of the next row
+  signal row_accepted  : columns_t;
+  signal row_finished  : columns_t;
+  signal row_known     : columns_t;
+  signal row_new       : columns_t;
+  signal new_accepted  : columns_t;
+  signal load          : std_logic;
+  signal accept_row    : std_logic;
+
+  signal first   : column_t;  -- who leaves next
+  signal next_id : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
+
+  signal padded_id       : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
+  signal finished_row    : row_t;
+  signal finished_column : columns_t;
+  signal forgets         : std_logic;
+  signal finish_task     : std_logic;
+  signal old_finished    : columns_t;
+  signal new_finished    : columns_t;
+
+begin
+
+  clearing <= not cleared_r(ROW_BITS);
+
+  requests : for requester in 0 to ROWS*COLUMNS-1 generate
+    used : if requester < REQUESTERS generate
+      asks(requester) <= request(requester);
+    end generate used;
+    unused : if requester >= REQUESTERS generate
+      asks(requester) <= '0';
+    end generate unused;
+  end generate requests;
+
+  -- The next row: the lowest one above the last one, else the lowest.
+
+  search_rows : for row in rows_t'range generate
+    rows_that_ask(row) <= any_of(asks((row+1)*COLUMNS-1 downto row*COLUMNS));
+  end generate search_rows;
+
+  rows_above <= rows_that_ask and above(row_r, ROWS);
+  found_row  <= first_of(rows_above) when any_of(rows_above) = '1' else first_of(rows_that_ask);
+  next_row <= std_logic_vector(cleared_r(ROW_BITS-1 downto 0)) when clearing = '1' else found_row;
+
+  u_row_asks : entity firm.firm_axis_select
+    generic map (
+      WORDS => ROWS,
+      WIDTH => COLUMNS)
+    port map (
+      words_in => asks,
+      index    => found_row,
+      word     => row_asks);
+
+  -- Its columns. The request of the one that finishes is its last beat's, not a new task's.
+
+  padded_id       <= std_logic_vector(resize(unsigned(finished_id), ROW_BITS+COLUMN_BITS));
+  finished_row    <= padded_id(ROW_BITS+COLUMN_BITS-1 downto COLUMN_BITS);
+  finished_column <= decode(padded_id(COLUMN_BITS-1 downto 0), finished, COLUMNS);
+
+  row_known    <= row_accepted xor row_finished;
+  row_new      <= row_asks and not row_known and not finished_column when found_row = finished_row else
+                  row_asks and not row_known;
+  load         <= enable and not any_of(batch_r) and not clearing;
+
+  accept_row   <= load or clearing;
+  new_accepted <= row_finished when clearing = '1' else row_finished xor (row_known or row_new);
+
+  u_accepted : entity firm.firm_sched_ram
+    generic map (
+      ADDRESS_BITS => ROW_BITS,
+      WORD_BITS    => COLUMNS)
+    port map (
+      clk          => clk,
+      address      => next_row,
+      read_word    => row_accepted,
+      write_enable => accept_row,
+      write_word   => new_accepted);
+
+  -- Whoever is known no longer is. A task that is forgotten is known, too.
+  forgets      <= any_of(batch_r and finished_column) when row_r = finished_row else '0';
+  finish_task  <= finished and (finished_known or forgets);
+  new_finished <= old_finished xor finished_column;
+
+  u_finished : entity firm.firm_sched_ram_2
+    generic map (
+      ADDRESS_BITS => ROW_BITS,
+      WORD_BITS    => COLUMNS)
+    port map (
+      clk          => clk,
+      address      => finished_row,
+      read_word    => old_finished,
+      write_enable => finish_task,
+      write_word   => new_finished,
+      address_2    => next_row,
+      read_word_2  => row_finished);
+
+  hold_batch : process (clk)
+    variable staying : columns_t;
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        batch_r   <= (others => '0');
+        row_r     <= (others => '1');
+        cleared_r <= (others => '0');
+      else
+        staying := batch_r;
+        if leaves = '1' then
+          staying := staying and not decode(first, '1', COLUMNS);
+        end if;
+        if row_r = finished_row then
+          staying := staying and not finished_column;
+        end if;
+        batch_r <= staying;
+        if load = '1' and any_of(rows_that_ask) = '1' then
+          batch_r <= row_new;
+          row_r   <= found_row;
+        end if;
+        if clearing = '1' then
+          cleared_r <= cleared_r + 1;
+        end if;
+      end if;
+    end if;
+  end process hold_batch;
+
+  first   <= first_of(batch_r);
+  next_id <= row_r & first;
+  valid   <= any_of(batch_r);
+  id      <= next_id(ID_BITS-1 downto 0);
+
+end architecture rtl;

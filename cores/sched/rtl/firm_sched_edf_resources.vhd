@@ -1,0 +1,54 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Earliest deadline first, preemptive, with few LUTs: the tasks wait in a heap in distributed RAM.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
+
+entity firm_sched_edf_resources is
+  generic (
+    REQUESTERS   : integer := 2;
+    PERIODS      : times_t;
+    DEADLINES    : times_t := IMPLICIT;
+    TIME_BITS    : integer := 16;
+    SHORTEST_RUN : integer := 1);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    request : in std_logic_vector(REQUESTERS-1 downto 0);
+    beat    : in std_logic;  -- a beat of the granted requester is taken in this cycle
+    last    : in std_logic;  -- and is its task's last; read with `beat` only
+
+    grant_valid  : out std_logic;
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+end entity firm_sched_edf_resources;
+
+architecture rtl of firm_sched_edf_resources is
+
+  constant FAULT : string := fault_of_deadlines(REQUESTERS, PERIODS, DEADLINES, TIME_BITS, SHORTEST_RUN);
+
+begin
+
+  assert FAULT = ""
+    report "firm_sched_edf_resources: " & FAULT
+    severity failure;
+
+  u_engine : entity firm.firm_sched_engine
+    generic map (
+      REQUESTERS   => REQUESTERS,
+      POLICY       => EDF_RESOURCES,
+      OFFSETS      => deadlines_of(REQUESTERS, PERIODS, DEADLINES),
+      TIME_BITS    => TIME_BITS,
+      SHORTEST_RUN => SHORTEST_RUN)
+    port map (
+      clk          => clk,
+      rst_n        => rst_n,
+      request      => request,
+      beat         => beat,
+      last         => last,
+      grant_valid  => grant_valid,
+      grant_select => grant_select);
+
+end architecture rtl;

@@ -1,0 +1,351 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- The scheduler of the policies that keep their tasks in a priority queue: the smallest key goes first.
+--
+--   request -> arrivals -> B, a task with its key -> queue -> current, the task that has the grant
+--
+-- A task's key is its deadline (EDF), its deadline less its transfer time, which is its latest start (LST), or the stamp of
+-- its requester's last completion (LRU). All tasks' slack shrinks by one a cycle but that of the one that sends: its
+-- key grows by one a beat instead, so that no other key ever changes.
+--
+-- When a task finishes, the next is the queue's root; if the queue is empty B, else who arrives. If there is nobody, the
+-- grant stays where it is, parked: its requester may begin a task before that is accepted, which then has no key yet
+-- and keeps the grant until it has. While the queue fills its root, nobody is granted.
+-- A task with a smaller key (EDF, LST) takes the grant; the one that had it goes back into the queue through B.
+--
+-- Keys are compared as numbers that wrap around. So that they stay less than half their range apart whatever the
+-- host does, time stands still while the current task's or the root's is overdue.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
+use firm.firm_sched_queue_pkg.all;
+
+entity firm_sched_engine is
+  generic (
+    REQUESTERS   : integer  := 2;
+    POLICY       : policy_t := LRU;        -- or EDF_RESOURCES, EDF_LATENCY, LST
+    -- From the time at which a task leaves the arrivals to its key; not for LRU.
+    OFFSETS      : times_t  := IMPLICIT;
+    TIME_BITS    : integer  := 16;
+    SHORTEST_RUN : integer  := 1);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    request : in std_logic_vector(REQUESTERS-1 downto 0);
+    beat    : in std_logic;  -- a beat of the granted requester is taken in this cycle
+    last    : in std_logic;  -- and is its task's last; read with `beat` only
+
+    grant_valid  : out std_logic;
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+end entity firm_sched_engine;
+
+architecture rtl of firm_sched_engine is
+
+  constant ID_BITS : positive := index_bits(REQUESTERS);
+  -- Stamps are sparse enough for the sweep of firm_sched_stamps with 5 bits more than an index.
+  constant STAMP_BITS : positive := ID_BITS + 5;
+  constant HAS_STAMPS : boolean  := POLICY = LRU;
+  constant IS_SORTED  : boolean  := POLICY = EDF_LATENCY;
+
+  function bits_of_key return positive is
+  begin
+    if HAS_STAMPS then
+      return STAMP_BITS;
+    end if;
+    return max(TIME_BITS, 3);
+  end function bits_of_key;
+
+  constant KEY_BITS : positive := bits_of_key;
+  subtype id_t is std_logic_vector(ID_BITS-1 downto 0);
+  subtype key_t is std_logic_vector(KEY_BITS-1 downto 0);
+
+  -- The first task of the arrivals, A.
+  signal accept     : std_logic;
+  signal a_valid    : std_logic;
+  signal a_id       : id_t;
+  signal a_key      : key_t;
+  signal a_is_own   : std_logic;  -- of the requester that has the grant
+  signal a_leaves   : std_logic;
+  signal a_enters_b : std_logic;
+  signal key_ready  : std_logic;
+
+  signal b_valid_r : std_logic;
+  signal b_id_r    : id_t;
+  signal b_key_r   : key_t;
+  signal b_is_free : std_logic;  -- is empty or leaves
+  signal b_inserts : std_logic;
+
+  signal insert_valid : std_logic;
+  signal insert_ready : std_logic;
+  signal root_valid   : std_logic;
+  signal root_id      : id_t;
+  signal root_key     : key_t;
+  signal pop          : std_logic;
+  signal empty        : std_logic;
+
+  signal grant_valid_r  : std_logic;
+  signal grant_select_r : id_t;
+  signal running_r      : std_logic;  -- the grant is a task's, not parked
+  signal keyed_r        : std_logic;  -- and the task has a key
+  signal key_r          : key_t;
+  signal next_key       : key_t;
+
+  signal finished  : std_logic;
+  signal choose    : std_logic;  -- nobody has the grant in the next cycle by right
+  signal take_root : std_logic;
+  signal take_b    : std_logic;
+  signal take_a    : std_logic;
+  signal may_leave : std_logic;
+  signal preempt   : std_logic;
+  signal get_key   : std_logic;  -- the current task gets its key
+
+  signal advance : std_logic;    -- time does
+
+begin
+
+  finished <= beat and last;
+
+  -- Who arrives.
+
+  u_arrivals : entity firm.firm_sched_arrivals
+    generic map (
+      REQUESTERS => REQUESTERS)
+    port map (
+      clk            => clk,
+      rst_n          => rst_n,
+      enable         => accept,
+      request        => request,
+      valid          => a_valid,
+      id             => a_id,
+      leaves         => a_leaves,
+      finished       => finished,
+      finished_known => keyed_r,
+      finished_id    => grant_select_r);
+
+  a_is_own <= '1' when a_id = grant_select_r else '0';
+
+  -- Keys.
+
+  timed : if not HAS_STAMPS generate
+    type offsets_t is array (natural range 0 to 2**ID_BITS-1) of key_t;
+
+    function offset_table return offsets_t is
+      variable table : offsets_t;
+    begin
+      for requester in table'range loop
+        table(requester) := std_logic_vector(to_signed(time_of(requester, OFFSETS), KEY_BITS));
+      end loop;
+      return table;
+    end function offset_table;
+
+    constant OFFSET_OF : offsets_t := offset_table;
+
+    signal time_r        : key_t;
+    signal is_clearing   : std_logic;
+    signal current_waits : std_logic;
+    signal root_waits    : std_logic;
+  begin
+    a_key     <= std_logic_vector(unsigned(time_r) + unsigned(OFFSET_OF(to_integer(unsigned(a_id)))));
+    key_ready <= '1';
+    accept    <= '1';
+
+    -- The heap after reset; B may wait for it.
+    is_clearing   <= empty and not insert_ready;
+    current_waits <= running_r and keyed_r and is_overdue(key_r, time_r);
+    root_waits    <= root_valid and is_overdue(root_key, time_r);
+    advance       <= not (is_clearing or current_waits or root_waits);
+
+    count_time : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          time_r <= (others => '0');
+        elsif advance = '1' then
+          time_r <= std_logic_vector(unsigned(time_r) + 1);
+        end if;
+      end if;
+    end process count_time;
+  end generate timed;
+
+  stamped : if HAS_STAMPS generate
+    signal initialised : std_logic;
+  begin
+    u_stamps : entity firm.firm_sched_stamps
+      generic map (
+        REQUESTERS => REQUESTERS,
+        STAMP_BITS => STAMP_BITS)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        initialised  => initialised,
+        completed    => finished,
+        completed_id => grant_select_r,
+        read         => a_valid,
+        read_id      => a_id,
+        read_ready   => key_ready,
+        stamp        => a_key);
+
+    accept  <= initialised;
+    advance <= '0';
+  end generate stamped;
+
+  -- The queue.
+
+  insert_valid <= b_valid_r and not take_b;
+  pop          <= take_root or preempt;
+
+  of_few_luts : if not IS_SORTED generate
+    u_heap : entity firm.firm_sched_heap
+      generic map (
+        ITEMS    => max(REQUESTERS, 1),
+        KEY_BITS => KEY_BITS)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        insert_valid => insert_valid,
+        insert_ready => insert_ready,
+        insert_id    => b_id_r,
+        insert_key   => b_key_r,
+        root_valid   => root_valid,
+        root_id      => root_id,
+        root_key     => root_key,
+        pop          => pop,
+        empty        => empty);
+  end generate of_few_luts;
+
+  of_few_cycles : if IS_SORTED generate
+    u_sorted : entity firm.firm_sched_sorted_queue
+      generic map (
+        ITEMS    => max(REQUESTERS, 1),
+        KEY_BITS => KEY_BITS)
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        insert_valid => insert_valid,
+        insert_ready => insert_ready,
+        insert_id    => b_id_r,
+        insert_key   => b_key_r,
+        root_valid   => root_valid,
+        root_id      => root_id,
+        root_key     => root_key,
+        pop          => pop,
+        empty        => empty);
+  end generate of_few_cycles;
+
+  -- Who is granted next.
+
+  choose    <= finished or not (running_r or beat);
+  take_root <= choose and root_valid;
+  take_b    <= choose and empty and b_valid_r;
+  take_a    <= choose and empty and not b_valid_r and a_valid and not (finished and a_is_own);
+  get_key   <= a_valid and a_is_own and not choose;
+
+  preemptive : if not HAS_STAMPS generate
+    signal root_is_before : std_logic;
+    signal b_has_room     : std_logic;
+  begin
+    root_is_before <= root_valid and is_before(root_key, key_r);
+    b_has_room     <= '1' when IS_SORTED else not b_valid_r;
+    preempt        <= running_r and keyed_r and root_is_before and b_has_room and may_leave and not finished;
+  end generate preemptive;
+  non_preemptive : if HAS_STAMPS generate
+    preempt <= '0';
+  end generate non_preemptive;
+
+  runs_of_one : if SHORTEST_RUN <= 1 generate
+    may_leave <= '1';
+  end generate runs_of_one;
+  longer_runs : if SHORTEST_RUN > 1 generate
+    signal beats_r : natural range 0 to SHORTEST_RUN;  -- of the run, no further than to the shortest
+    signal beats   : natural range 0 to SHORTEST_RUN;  -- with that of this cycle
+    signal pauses  : std_logic;
+  begin
+    beats     <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
+    pauses    <= '0' when (request and decode(grant_select_r, '1', REQUESTERS)) /= (request'range => '0') else '1';
+    may_leave <= '1' when beats = 0 or beats = SHORTEST_RUN or pauses = '1' else '0';
+
+    count_beats : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' or choose = '1' or preempt = '1' then
+          beats_r <= 0;
+        else
+          beats_r <= beats;
+        end if;
+      end if;
+    end process count_beats;
+  end generate longer_runs;
+
+  a_leaves   <= take_a or get_key or a_enters_b;
+  a_enters_b <= a_valid and b_is_free and key_ready and not (preempt or take_a or (a_is_own and (finished or not choose)));
+  b_inserts  <= insert_valid and insert_ready;
+  b_is_free  <= not b_valid_r or take_b or b_inserts;
+
+  hold_b : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        b_valid_r <= '0';
+      else
+        b_valid_r <= preempt or a_enters_b or not b_is_free;
+      end if;
+      if preempt = '1' then
+        b_id_r  <= grant_select_r;
+        b_key_r <= next_key;
+      elsif a_enters_b = '1' then
+        b_id_r  <= a_id;
+        b_key_r <= a_key;
+      end if;
+    end if;
+  end process hold_b;
+
+  sends_own_time : if POLICY = LST generate
+    next_key <= std_logic_vector(unsigned(key_r) + 1) when beat = '1' and advance = '1' else key_r;
+  end generate sends_own_time;
+  keeps_key : if POLICY /= LST generate
+    next_key <= key_r;
+  end generate keeps_key;
+
+  grant : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        grant_valid_r  <= '0';
+        grant_select_r <= (others => '0');
+        running_r      <= '0';
+        keyed_r        <= '0';
+      else
+        if pop = '1' then
+          grant_select_r <= root_id;
+        elsif take_b = '1' then
+          grant_select_r <= b_id_r;
+        elsif take_a = '1' then
+          grant_select_r <= a_id;
+        end if;
+        if pop = '1' or take_b = '1' or take_a = '1' then
+          grant_valid_r <= '1';
+        elsif choose = '1' and empty = '0' then
+          grant_valid_r <= '0';
+        end if;
+        running_r <= not choose or take_root or take_b or take_a;
+        keyed_r   <= take_root or take_b or take_a or (not choose and (keyed_r or get_key));
+      end if;
+      if pop = '1' then
+        key_r <= root_key;
+      elsif take_b = '1' then
+        key_r <= b_key_r;
+      elsif take_a = '1' or get_key = '1' then
+        key_r <= a_key;
+      else
+        key_r <= next_key;
+      end if;
+    end if;
+  end process grant;
+
+  grant_valid  <= grant_valid_r;
+  grant_select <= grant_select_r;
+
+end architecture rtl;

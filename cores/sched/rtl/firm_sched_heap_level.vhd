@@ -1,0 +1,226 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- A level of firm_sched_heap below the root: 2**LEVEL nodes, and the operation that is at this level in this cycle.
+--
+-- A node is a pair's left or right one; the pairs lie under the address of their common node above, so that a pair is
+-- read at once. That address is the highest LEVEL-1 bits of the operation's index.
+-- INSERT compares its item with the node on the item's path: the one that comes first is the node's from now on, the
+-- other goes on to the level below. FILL finds the smaller one of a pair, which the level above takes in the same cycle,
+-- and goes on to the level below to fill the hole that this leaves. CLEAR empties the pair.
+--
+-- In the cycle behind a FILL no operation may come, since then the level below writes to the pair. Its address is
+-- still here, for the index changes with an operation only.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_queue_pkg.all;
+
+entity firm_sched_heap_level is
+  generic (
+    LEVEL    : positive;   -- 1 to ID_BITS
+    ID_BITS  : positive;
+    KEY_BITS : positive);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- The operation that comes from the level above, at most one, and its item; of a FILL the index tells the hole.
+    insert : in std_logic;
+    fill   : in std_logic;
+    clear  : in std_logic;
+    id     : in std_logic_vector(ID_BITS-1 downto 0);
+    key    : in std_logic_vector(KEY_BITS-1 downto 0);
+
+    -- FILL: what the level above takes.
+    smaller_valid : out std_logic;
+    smaller_id    : out std_logic_vector(ID_BITS-1 downto 0);
+    smaller_key   : out std_logic_vector(KEY_BITS-1 downto 0);
+
+    -- The operation for the level below.
+    below_insert : out std_logic;
+    below_fill   : out std_logic;
+    below_clear  : out std_logic;
+    below_id     : out std_logic_vector(ID_BITS-1 downto 0);
+    below_key    : out std_logic_vector(KEY_BITS-1 downto 0);
+
+    -- The level below fills the hole here, its left or right one, with what it has.
+    hole         : in std_logic;
+    hole_right   : in std_logic;
+    filler_valid : in std_logic;
+    filler_id    : in std_logic_vector(ID_BITS-1 downto 0);
+    filler_key   : in std_logic_vector(KEY_BITS-1 downto 0));
+end entity firm_sched_heap_level;
+
+architecture rtl of firm_sched_heap_level is
+
+  -- Of an item's index the highest LEVEL bits are the node's address; the node keeps the others only.
+  constant LOW_BITS     : natural  := ID_BITS - LEVEL;
+  constant SIDE         : natural  := LOW_BITS;  -- the bit of the index that tells left from right
+  constant ADDRESS_BITS : positive := max(1, LEVEL-1);
+  -- A node: valid, key, the low bits of its item's index.
+  constant NODE_BITS    : positive := 1 + KEY_BITS + LOW_BITS;
+  subtype node_t is std_logic_vector(NODE_BITS-1 downto 0);
+  -- What is compared: key, side and low bits of the index.
+  subtype rank_t is std_logic_vector(KEY_BITS+LOW_BITS downto 0);
+
+  signal insert_r : std_logic;
+  signal fill_r   : std_logic;
+  signal clear_r  : std_logic;
+  signal id_r     : std_logic_vector(ID_BITS-1 downto 0);
+  signal key_r    : std_logic_vector(KEY_BITS-1 downto 0);
+
+  signal address     : std_logic_vector(ADDRESS_BITS-1 downto 0);
+  signal left        : node_t;
+  signal right       : node_t;
+  signal item        : node_t;
+  signal node        : node_t;  -- on the item's path
+  signal write_node  : node_t;
+  signal write_left  : std_logic;
+  signal write_right : std_logic;
+
+  -- The two that are compared: INSERT the item with its node, FILL left with right.
+  signal first        : node_t;
+  signal second       : node_t;
+  signal second_right : std_logic;
+  signal first_rank   : rank_t;
+  signal second_rank  : rank_t;
+  signal takes_second : std_logic;
+
+  function rank(of_node : node_t; is_right : std_logic) return rank_t is
+    variable result : rank_t;
+  begin
+    result(KEY_BITS+LOW_BITS downto LOW_BITS+1) := of_node(KEY_BITS+LOW_BITS-1 downto LOW_BITS);
+    result(LOW_BITS)                            := is_right;
+    for place in 0 to LOW_BITS-1 loop
+      result(place) := of_node(place);
+    end loop;
+    return result;
+  end function rank;
+
+begin
+
+  hold_operation : process (clk)
+  begin
+    if rising_edge(clk) then
+      if rst_n = '0' then
+        insert_r <= '0';
+        fill_r   <= '0';
+        clear_r  <= '0';
+      else
+        insert_r <= insert;
+        fill_r   <= fill;
+        clear_r  <= clear;
+      end if;
+      if insert = '1' or fill = '1' or clear = '1' then
+        id_r  <= id;
+        key_r <= key;
+      end if;
+    end if;
+  end process hold_operation;
+
+  only_pair : if LEVEL = 1 generate
+    address <= "0";
+  end generate only_pair;
+  pairs : if LEVEL > 1 generate
+    address <= id_r(ID_BITS-1 downto LOW_BITS+1);
+  end generate pairs;
+
+  u_left : entity firm.firm_sched_ram
+    generic map (
+      ADDRESS_BITS => ADDRESS_BITS,
+      WORD_BITS    => NODE_BITS)
+    port map (
+      clk          => clk,
+      address      => address,
+      read_word    => left,
+      write_enable => write_left,
+      write_word   => write_node);
+
+  u_right : entity firm.firm_sched_ram
+    generic map (
+      ADDRESS_BITS => ADDRESS_BITS,
+      WORD_BITS    => NODE_BITS)
+    port map (
+      clk          => clk,
+      address      => address,
+      read_word    => right,
+      write_enable => write_right,
+      write_word   => write_node);
+
+  item(NODE_BITS-1)                 <= insert_r;
+  item(NODE_BITS-2 downto LOW_BITS) <= key_r;
+  low_bits_of_item : for place in 0 to LOW_BITS-1 generate
+    item(place) <= id_r(place);
+  end generate low_bits_of_item;
+
+  node <= right when id_r(SIDE) = '1' else left;
+
+  -- A leaf holds no item but that of its own index, so whoever comes to it finds it empty.
+  leaves : if LOW_BITS = 0 generate
+    first        <= left;
+    second       <= right;
+    second_right <= '1';
+  end generate leaves;
+  inner_nodes : if LOW_BITS > 0 generate
+    first        <= left  when fill_r = '1'                       else item;
+    second       <= right when fill_r = '1' or id_r(SIDE) = '1'   else left;
+    second_right <= fill_r or id_r(SIDE);
+  end generate inner_nodes;
+  first_rank   <= rank(first, not fill_r and id_r(SIDE));
+  second_rank  <= rank(second, second_right);
+  takes_second <= second(NODE_BITS-1) and (is_before(second_rank, first_rank) or not first(NODE_BITS-1));
+
+  hand_up : process (left, right, takes_second, id_r)
+    variable smaller : node_t;
+  begin
+    smaller := left;
+    if takes_second = '1' then
+      smaller := right;
+    end if;
+    smaller_valid    <= smaller(NODE_BITS-1);
+    smaller_key      <= smaller(NODE_BITS-2 downto LOW_BITS);
+    smaller_id       <= id_r;
+    smaller_id(SIDE) <= takes_second;
+    for place in 0 to LOW_BITS-1 loop
+      smaller_id(place) <= smaller(place);
+    end loop;
+  end process hand_up;
+
+  -- Of a FILL only the path to its hole goes on. Behind the last level nothing does but that.
+  hand_down : process (item, node, left, right, takes_second, insert_r, fill_r, clear_r, id_r)
+    variable larger : node_t;
+  begin
+    larger := node;
+    if takes_second = '1' or clear_r = '1' then
+      larger := item;
+    end if;
+    below_insert <= insert_r and node(NODE_BITS-1);
+    below_fill   <= fill_r and (left(NODE_BITS-1) or right(NODE_BITS-1));
+    below_clear  <= clear_r;
+    below_key    <= larger(NODE_BITS-2 downto LOW_BITS);
+    below_id     <= id_r;
+    if fill_r = '1' then
+      below_id(SIDE) <= takes_second;
+    end if;
+    for place in 0 to LOW_BITS-1 loop
+      below_id(place) <= larger(place);
+    end loop;
+  end process hand_down;
+
+  choose_write : process (item, insert_r, clear_r, id_r, takes_second, hole, hole_right, filler_valid, filler_id, filler_key)
+    variable keep_item : std_logic;
+  begin
+    write_node <= item;
+    if hole = '1' then
+      write_node(NODE_BITS-1)                 <= filler_valid;
+      write_node(NODE_BITS-2 downto LOW_BITS) <= filler_key;
+      for place in 0 to LOW_BITS-1 loop
+        write_node(place) <= filler_id(place);
+      end loop;
+    end if;
+    keep_item   := insert_r and not takes_second;
+    write_left  <= clear_r or (keep_item and not id_r(SIDE)) or (hole and not hole_right);
+    write_right <= clear_r or (keep_item and id_r(SIDE)) or (hole and hole_right);
+  end process choose_write;
+
+end architecture rtl;

@@ -1,0 +1,77 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Round robin, non-preemptive: the next index after the requester that was served last, cyclically.
+-- The next task is chosen in the cycle of the last beat. The finishing requester needs no leaving out: it is the
+-- last in the round, so it is chosen only if nobody else asks, which leaves the grant where it is.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
+
+entity firm_sched_round_robin is
+  generic (
+    REQUESTERS : integer := 2);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    request : in std_logic_vector(REQUESTERS-1 downto 0);
+    beat    : in std_logic;  -- a beat of the granted requester is taken in this cycle
+    last    : in std_logic;  -- and is its task's last; read with `beat` only
+
+    grant_valid  : out std_logic;
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+end entity firm_sched_round_robin;
+
+architecture rtl of firm_sched_round_robin is
+
+  signal served  : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);  -- had the last beat
+  signal found   : std_logic;
+  signal choice  : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+  signal goes_on : std_logic;
+
+  signal grant_valid_r  : std_logic;
+  signal grant_select_r : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+  signal served_r       : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
+  signal started_r      : std_logic;  -- the granted task has had a beat and needs more
+
+begin
+
+  assert fault_of_size(REQUESTERS) = ""
+    report "firm_sched_round_robin: " & fault_of_size(REQUESTERS)
+    severity failure;
+
+  served  <= grant_select_r when beat = '1' else served_r;
+  goes_on <= (started_r or beat) and not (beat and last);
+
+  u_choice : entity firm.firm_sched_following
+    generic map (
+      REQUESTERS => REQUESTERS)
+    port map (
+      request   => request,
+      index     => served,
+      found     => found,
+      following => choice);
+
+  choose : process (clk)
+  begin
+    if rising_edge(clk) then
+      started_r <= goes_on;
+      served_r  <= served;
+      if goes_on = '0' and found = '1' then
+        grant_valid_r  <= '1';
+        grant_select_r <= choice;
+      end if;
+      if rst_n = '0' then
+        started_r      <= '0';
+        served_r       <= (others => '1');  -- so that index 0 comes first
+        grant_valid_r  <= '0';
+        grant_select_r <= (others => '0');
+      end if;
+    end if;
+  end process choose;
+
+  grant_valid  <= grant_valid_r;
+  grant_select <= grant_select_r;
+
+end architecture rtl;

@@ -1,0 +1,111 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- A priority queue of few cycles: a shift register that is kept sorted, with the ports of firm_sched_heap.
+--
+-- Each cell compares the new item with its own. Since the cells are sorted, those behind the new item's place know it
+-- from their own comparison, and the place itself from that of the cell before: nothing crosses the whole queue but the new item.
+-- An insert and a pop are done in one cycle each, both at once if need be, and the next root is there in the next cycle.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_queue_pkg.all;
+
+entity firm_sched_sorted_queue is
+  generic (
+    ITEMS    : positive;
+    KEY_BITS : positive);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- An item that is not in the queue. Keys in the queue are less than half their range apart.
+    insert_valid : in  std_logic;
+    insert_ready : out std_logic;
+    insert_id    : in  std_logic_vector(index_bits(ITEMS)-1 downto 0);
+    insert_key   : in  std_logic_vector(KEY_BITS-1 downto 0);
+
+    -- The item with the smallest key, of equal ones that of the lowest index.
+    root_valid : out std_logic;
+    root_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
+    root_key   : out std_logic_vector(KEY_BITS-1 downto 0);
+    pop        : in  std_logic;    -- takes the root; only while it is valid
+    empty      : out std_logic);   -- nothing is in the queue; while '0', a root is there or comes
+end entity firm_sched_sorted_queue;
+
+architecture rtl of firm_sched_sorted_queue is
+
+  constant ID_BITS : positive := index_bits(ITEMS);
+  subtype item_t is std_logic_vector(KEY_BITS+ID_BITS-1 downto 0);
+  -- Cell 0 is the root. Those at both ends have no neighbour, so there is one more cell at each, which is never full.
+  type items_t is array (-1 to ITEMS) of item_t;
+
+  signal valid_r : std_logic_vector(-1 to ITEMS);
+  signal item_r  : items_t;
+
+  signal new_item  : item_t;
+  signal new_first : std_logic_vector(-1 to ITEMS);  -- the new item comes before the cell's own
+
+begin
+
+  new_item <= insert_key & insert_id;
+
+  valid_r(-1)      <= '0';
+  item_r(-1)       <= (others => '0');
+  new_first(-1)    <= '0';
+  valid_r(ITEMS)   <= '0';
+  item_r(ITEMS)    <= (others => '0');
+  new_first(ITEMS) <= '1';
+
+  cells : for cell in 0 to ITEMS-1 generate
+    signal shift_back  : std_logic;  -- away from the root: takes the item of the cell before
+    signal shift_front : std_logic;  -- takes that of the cell behind
+    signal take_new    : std_logic;
+    signal from_before : std_logic;
+  begin
+    new_first(cell) <= not valid_r(cell) or is_before(new_item, item_r(cell));
+
+    -- A pop moves all to the front; a new item moves those behind its place back again, which then stay where they are.
+    root : if cell = 0 generate
+      from_before <= '0';
+      shift_back  <= '0';
+      shift_front <= pop;
+      take_new    <= insert_valid and new_first(1) when pop = '1' else insert_valid and new_first(0);
+    end generate root;
+    others_behind : if cell > 0 generate
+      from_before <= insert_valid and new_first(cell-1);
+      shift_back  <= from_before and not pop;
+      shift_front <= pop and not (insert_valid and new_first(cell));
+      take_new    <= insert_valid and new_first(cell+1) and not new_first(cell) when pop = '1' else
+                     insert_valid and new_first(cell) and not new_first(cell-1);
+    end generate others_behind;
+
+    hold_item : process (clk)
+    begin
+      if rising_edge(clk) then
+        if rst_n = '0' then
+          valid_r(cell) <= '0';
+        elsif take_new = '1' then
+          valid_r(cell) <= '1';
+        elsif shift_back = '1' then
+          valid_r(cell) <= valid_r(cell-1);
+        elsif shift_front = '1' then
+          valid_r(cell) <= valid_r(cell+1);
+        end if;
+        if take_new = '1' then
+          item_r(cell) <= new_item;
+        elsif shift_back = '1' then
+          item_r(cell) <= item_r(cell-1);
+        elsif shift_front = '1' then
+          item_r(cell) <= item_r(cell+1);
+        end if;
+      end if;
+    end process hold_item;
+  end generate cells;
+
+  insert_ready <= '1';
+  root_valid   <= valid_r(0);
+  root_id      <= item_r(0)(ID_BITS-1 downto 0);
+  root_key     <= item_r(0)(item_t'high downto ID_BITS);
+  empty        <= not valid_r(0);
+
+end architecture rtl;

@@ -1,0 +1,1 @@
+"""Schedulers: cycle-exact models of those in hardware."""

@@ -1,0 +1,103 @@
+"""What all models of schedulers share.
+
+A model does what its entity in cores/sched does, cycle by cycle, for a batch of schedulers at once: B of them, each
+with N requesters. The ports are arrays; `step` is a rising edge of the clock.
+
+    scheduler = POLICIES["lru"](Generics(periods))
+    while ...:
+        granted = scheduler.grant_select[scheduler.grant_valid]
+        scheduler.step(request, beat, last)
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Generics:
+    """The generics of the entities, of which a policy takes what it needs.
+
+    Times are in clock cycles, (B, N). `deadlines` of None are implicit (section 4.1). `time_bits` of None is a time
+    that never wraps around. Raises `ValueError` for arrays of different shape and for values that the entities refuse.
+    """
+
+    periods: Ints
+    transfer_times: Ints | None = None
+    deadlines: Ints | None = None
+    shortest_run: int = 1
+    time_bits: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("periods", "transfer_times", "deadlines"):
+            times = getattr(self, name)
+            if times is None:
+                continue
+            if times.shape != self.periods.shape or times.ndim != 2:
+                raise ValueError(f"{name} has the shape {times.shape}; legal: (batch, requesters) as the periods")
+            if times.min() < 1:
+                raise ValueError(f"a time in {name} is {times.min()}; legal: 1 and more cycles")
+        if self.shortest_run < 1:
+            raise ValueError(f"shortest_run is {self.shortest_run}; legal: 1 and more beats")
+
+    @property
+    def batch(self) -> int:
+        """B."""
+        return int(self.periods.shape[0])
+
+    @property
+    def requesters(self) -> int:
+        """N."""
+        return int(self.periods.shape[1])
+
+    @property
+    def relative_deadlines(self) -> Ints:
+        """From a request to its deadline, (B, N)."""
+        return self.periods if self.deadlines is None else self.deadlines
+
+
+class Scheduler(ABC):
+    """A batch of schedulers of one policy, just after reset.
+
+    `grant_valid` and `grant_select`, both (B,), are the registers of the same names as they are in the current cycle.
+    """
+
+    MAX_REQUESTERS = 256
+
+    def __init__(self, batch: int, requesters: int) -> None:
+        if not 1 <= requesters <= self.MAX_REQUESTERS:
+            raise ValueError(f"requesters is {requesters}; legal: 1 to {self.MAX_REQUESTERS}")
+        self.batch = batch
+        self.requesters = requesters
+        self.grant_valid: Bools = np.zeros(batch, np.bool_)
+        self.grant_select: Ints = np.zeros(batch, np.int64)
+        self._members = np.arange(batch)
+
+    @abstractmethod
+    def step(self, request: Bools, beat: Bools, last: Bools) -> None:
+        """A rising edge. `request` (B, N), `beat` and `last` (B,) are those of the cycle that ends; none is written to.
+
+        `beat` may be true only where the grant is valid and its requester requests; `last` matters with `beat` only.
+        """
+
+    def _without_granted(self, request: Bools, without: Bools) -> Bools:
+        """A copy of `request` (B, N) in which the granted requester does not ask where `without` (B,) is true."""
+        eligible = request.copy()
+        eligible[self._members, self.grant_select] &= ~without
+        return eligible
+
+    def _of_granted(self, request: Bools) -> Bools:
+        """Whether the granted requester asks, (B,)."""
+        return request[self._members, self.grant_select]
+
+    def _grant(self, choice: Ints, where: Bools) -> None:
+        """Give the grant to `choice` (B,) where `where` (B,) is true."""
+        self.grant_valid = self.grant_valid | where
+        self.grant_select = np.where(where, choice, self.grant_select)

@@ -1,0 +1,352 @@
+"""The engine of the policies that keep their tasks in a priority queue: firm_sched_engine and what it is made of.
+
+Keys and times are numbers that never wrap around. Everything that exists once a scheduler is an array (B,); what a
+cycle costs is some dozens of operations on those, and one on the requests (B, N).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
+
+_NOBODY = np.iinfo(np.int64).max
+
+
+def index_bits(requesters: int) -> int:
+    """Bits of an index, 1 at least, as the function of the same name in firm_axis_pkg."""
+    return max(1, (requesters - 1).bit_length())
+
+
+class Arrivals:
+    """firm_sched_arrivals: accepts tasks row by row. `valid` and `first` (B,) are the accepted task that leaves next."""
+
+    def __init__(self, batch: int, requesters: int) -> None:
+        bits = index_bits(requesters)
+        column_bits = max(1, bits // 2)
+        self._columns: int = 2**column_bits
+        self._rows: int = 2 ** max(1, bits - column_bits)
+        self._requesters = requesters
+        self._members = np.arange(batch)
+        # Bits of a row's columns, the lowest column lowest.
+        self._known: Ints = np.zeros((batch, self._rows), np.int64)
+        self._accepted: Ints = np.zeros(batch, np.int64)
+        self._row: Ints = np.full(batch, self._rows - 1, np.int64)
+        self._clearing = self._rows
+        self._weights = 1 << np.arange(self._columns)
+        self._lowest = np.array([(value & -value).bit_length() - 1 for value in range(2**self._columns)])
+        self._padded: Bools = np.zeros((batch, self._rows * self._columns), np.bool_)
+
+    @property
+    def valid(self) -> Bools:
+        """Whether an accepted task has not left."""
+        return self._accepted != 0
+
+    @property
+    def first(self) -> Ints:
+        """Its requester; any where there is none."""
+        first: Ints = np.where(self.valid, self._row * self._columns + self._lowest[self._accepted], 0)
+        return first
+
+    def step(self, enable: bool, request: Bools, leaves: Bools, finished: Bools, finished_id: Ints) -> None:
+        """A rising edge. A task of `finished_id` that is known is not any more where `finished` is true."""
+        finished_row = finished_id // self._columns
+        finished_bit = np.where(finished, 1 << (finished_id % self._columns), 0)
+        of_row = np.where(self._row == finished_row, finished_bit, 0)
+        accepted = np.where(leaves, self._accepted & (self._accepted - 1), self._accepted) & ~of_row
+        self._known[self._members, finished_row] &= ~finished_bit
+        if self._clearing:
+            self._clearing -= 1
+        elif enable:
+            self._accept(request, self._accepted == 0, accepted, finished_row, finished_bit)
+        self._accepted = accepted
+
+    def _accept(self, request: Bools, where: Bools, accepted: Ints, finished_row: Ints, finished_bit: Ints) -> None:
+        """Take the new requests of the next row into `accepted`, where nothing is left of the last one."""
+        self._padded[:, : self._requesters] = request
+        by_row = self._padded.reshape(-1, self._rows, self._columns)
+        asks = by_row.any(axis=2)
+        where = where & asks.any(axis=1)
+        # The rows in their order behind the last one.
+        order = (self._row[:, np.newaxis] + 1 + np.arange(self._rows)) % self._rows
+        row = order[self._members, np.take_along_axis(asks, order, axis=1).argmax(axis=1)]
+        new = by_row[self._members, row] @ self._weights
+        new &= ~self._known[self._members, row]
+        # The request of who finishes is its last beat's.
+        new &= ~np.where(row == finished_row, finished_bit, 0)
+        self._known[self._members, row] |= np.where(where, new, 0)
+        self._row = np.where(where, row, self._row)
+        accepted[where] = new[where]
+
+
+class Queue(ABC):
+    """A priority queue of items that each have an index of their own. `root_*` and `ready` are as in the current cycle.
+
+    Entries are ranks, key * size + index, so that the smallest is the smallest key and of equal ones the lowest index.
+    """
+
+    def __init__(self, batch: int, items: int) -> None:
+        self._size = items
+        self._members = np.arange(batch)
+        self._ranks: Ints = np.full((batch, items), _NOBODY)
+        self._root: Ints = np.full(batch, _NOBODY)
+        self.root_valid: Bools = np.zeros(batch, np.bool_)
+
+    @property
+    def root_id(self) -> Ints:
+        """The index of the root; any number where there is none."""
+        return self._root % self._size
+
+    @property
+    def root_key(self) -> Ints:
+        """The key of the root; any number where there is none."""
+        return self._root // self._size
+
+    @property
+    @abstractmethod
+    def empty(self) -> Bools:
+        """Whether nothing is inside, not even a root that is about to come."""
+
+    @property
+    @abstractmethod
+    def clearing(self) -> bool:
+        """Whether reset goes on, so that nothing can enter."""
+
+    @property
+    @abstractmethod
+    def ready_with_pop(self) -> bool:
+        """Whether an item can enter while another one leaves."""
+
+    @abstractmethod
+    def ready(self, pop: Bools) -> Bools:
+        """Where an item can enter in this cycle."""
+
+    @abstractmethod
+    def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
+        """A rising edge. `insert` only where it is ready, `pop` only where the root is valid."""
+
+    def _insert(self, insert: Bools, index: Ints, key: Ints) -> None:
+        rank = key * self._size + index
+        self._ranks[self._members[insert], index[insert]] = rank[insert]
+        self._root = np.where(insert, np.minimum(self._root, rank), self._root)
+
+    def _pop(self, pop: Bools) -> None:
+        self._ranks[self._members[pop], self.root_id[pop]] = _NOBODY
+
+    def _fill(self, where: Bools) -> None:
+        self._root[where] = self._ranks[where].min(axis=1)
+
+
+class Heap(Queue):
+    """firm_sched_heap: the root is filled anew in the cycle behind a pop."""
+
+    def __init__(self, batch: int, items: int) -> None:
+        super().__init__(batch, items)
+        self._filling: Bools = np.zeros(batch, np.bool_)
+        self._clearing = 2 ** (index_bits(items) - 1)
+
+    @property
+    def empty(self) -> Bools:
+        """See `Queue`."""
+        return ~(self.root_valid | self._filling)
+
+    @property
+    def clearing(self) -> bool:
+        """See `Queue`."""
+        return self._clearing > 0
+
+    @property
+    def ready_with_pop(self) -> bool:
+        """See `Queue`."""
+        return False
+
+    def ready(self, pop: Bools) -> Bools:
+        """See `Queue`."""
+        return ~(pop | self._filling | self.clearing)
+
+    def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
+        """See `Queue`."""
+        self._insert(insert, index, key)
+        if self._filling.any():
+            self._fill(self._filling)
+        self._pop(pop)
+        self.root_valid = ~pop & (self._root != _NOBODY)
+        self._filling = pop
+        self._clearing = max(0, self._clearing - 1)
+
+
+class SortedQueue(Queue):
+    """firm_sched_sorted_queue: the next root is there in the next cycle."""
+
+    @property
+    def empty(self) -> Bools:
+        """See `Queue`."""
+        return ~self.root_valid
+
+    @property
+    def clearing(self) -> bool:
+        """See `Queue`."""
+        return False
+
+    @property
+    def ready_with_pop(self) -> bool:
+        """See `Queue`."""
+        return True
+
+    def ready(self, pop: Bools) -> Bools:
+        """See `Queue`."""
+        return np.ones_like(pop)
+
+    def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
+        """See `Queue`."""
+        self._pop(pop)
+        if pop.any():
+            self._fill(pop)
+        self._insert(insert, index, key)
+        self.root_valid = self._root != _NOBODY
+
+
+class Keys(ABC):
+    """Where the keys of tasks come from."""
+
+    @property
+    @abstractmethod
+    def initialised(self) -> bool:
+        """Whether tasks may be accepted."""
+
+    @abstractmethod
+    def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
+        """The keys of tasks that leave the arrivals in this cycle, and where they are there."""
+
+    @abstractmethod
+    def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
+        """Where time goes on; `oldest` are the keys that must not grow too old, each with where it is one."""
+
+    @abstractmethod
+    def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
+        """A rising edge."""
+
+
+class Times(Keys):
+    """Keys are the time at which a task leaves the arrivals and an offset (B, N) of its requester."""
+
+    def __init__(self, offsets: Ints, time_bits: int | None) -> None:
+        self._offsets = offsets
+        self._members = np.arange(len(offsets))
+        self._time: Ints = np.zeros(len(offsets), np.int64)
+        self._eighth = None if time_bits is None else time_bits - 3
+
+    @property
+    def initialised(self) -> bool:
+        """See `Keys`."""
+        return True
+
+    def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
+        """See `Keys`."""
+        return self._time + self._offsets[self._members, index], np.ones_like(wanted)
+
+    def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
+        """See `Keys`."""
+        advance: Bools = np.full(len(self._time), not is_clearing)
+        if self._eighth is not None:
+            for where, key in oldest:
+                advance &= ~(where & is_overdue(key, self._time, self._eighth))
+        return advance
+
+    def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
+        """See `Keys`."""
+        self._time += advance
+
+
+def is_overdue(key: Ints, now: Ints, eighth: int) -> Bools:
+    """Whether keys lie two eighths of the range before `now`, each cut to whole eighths of 2**`eighth` cycles."""
+    overdue: Bools = (now >> eighth) - (key >> eighth) >= 2
+    return overdue
+
+
+class Engine(Scheduler):
+    """firm_sched_engine, with the queue and the keys of a policy.
+
+    `is_preemptive`: a task with a smaller key takes the grant. `sends_own_time`: the key of the task that sends grows by one
+    a beat.
+    """
+
+    def __init__(
+        self,
+        batch: int,
+        requesters: int,
+        queue: Queue,
+        keys: Keys,
+        *,
+        is_preemptive: bool = False,
+        sends_own_time: bool = False,
+        shortest_run: int = 1,
+    ) -> None:
+        super().__init__(batch, requesters)
+        self._arrivals = Arrivals(batch, requesters)
+        self._queue = queue
+        self._keys = keys
+        self._is_preemptive = is_preemptive
+        self._sends_own_time = sends_own_time
+        self._shortest_run = shortest_run
+        nobody: Bools = np.zeros(batch, np.bool_)
+        nothing: Ints = np.zeros(batch, np.int64)
+        self._b_valid, self._b_id, self._b_key = nobody, nothing, nothing
+        self._running, self._keyed, self._key = nobody, nobody, nothing
+        self._beats = nothing
+
+    def step(self, request: Bools, beat: Bools, last: Bools) -> None:
+        """See `Scheduler`."""
+        queue, arrivals, keys = self._queue, self._arrivals, self._keys
+        finished = beat & last
+        a_valid, a_id = arrivals.valid, arrivals.first
+        a_is_own = a_id == self.grant_select
+        a_key, key_ready = keys.read(a_valid, a_id, finished)
+        empty, root_valid, root_id, root_key = queue.empty, queue.root_valid, queue.root_id, queue.root_key
+        advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
+
+        choose = finished | ~(self._running | beat)
+        take_root = choose & root_valid
+        take_b = choose & empty & self._b_valid
+        take_a = choose & empty & ~self._b_valid & a_valid & ~(finished & a_is_own)
+        get_key = a_valid & a_is_own & ~choose
+        preempt = self._preempt(request, beat, finished, root_valid, root_key)
+
+        pop = take_root | preempt
+        insert = self._b_valid & ~take_b & queue.ready(pop)
+        b_is_free = ~self._b_valid | take_b | insert
+        a_enters_b = a_valid & b_is_free & key_ready & ~(preempt | take_a | (a_is_own & (finished | ~choose)))
+        next_key = self._key + (beat & advance) if self._sends_own_time else self._key
+
+        queue.step(insert, self._b_id, self._b_key, pop)
+        arrivals.step(keys.initialised, request, take_a | get_key | a_enters_b, finished, self.grant_select)
+        keys.step(advance, a_valid, finished, self.grant_select)
+
+        b_id, b_key = self._b_id, self._b_key
+        self._b_valid = preempt | a_enters_b | ~b_is_free
+        self._b_id = np.where(preempt, self.grant_select, np.where(a_enters_b, a_id, b_id))
+        self._b_key = np.where(preempt, next_key, np.where(a_enters_b, a_key, b_key))
+
+        given = take_root | take_b | take_a
+        self._key = np.where(take_a | get_key, a_key, next_key)
+        self._key = np.where(pop, root_key, np.where(take_b, b_key, self._key))
+        self.grant_select = np.where(take_a, a_id, self.grant_select)
+        self.grant_select = np.where(pop, root_id, np.where(take_b, b_id, self.grant_select))
+        self.grant_valid = given | preempt | (self.grant_valid & ~(choose & ~empty))
+        self._running = given | ~choose
+        self._keyed = given | (~choose & (self._keyed | get_key))
+        self._beats = np.where(choose | preempt, 0, np.minimum(self._beats + beat, self._shortest_run))
+
+    def _preempt(self, request: Bools, beat: Bools, finished: Bools, root_valid: Bools, root_key: Ints) -> Bools:
+        """Where the root takes the grant from a task that is not over."""
+        if not self._is_preemptive:
+            return np.zeros(self.batch, np.bool_)
+        preempt = self._running & self._keyed & root_valid & (root_key < self._key) & ~finished
+        if not self._queue.ready_with_pop:
+            preempt &= ~self._b_valid
+        if self._shortest_run > 1:
+            beats = np.minimum(self._beats + beat, self._shortest_run)
+            preempt &= (beats == 0) | (beats == self._shortest_run) | ~self._of_granted(request)
+        return preempt

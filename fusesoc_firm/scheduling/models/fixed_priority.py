@@ -1,0 +1,40 @@
+"""Fixed priority (section 4.2.2): the lowest index goes first."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
+from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
+
+
+class FixedPriority(ChoosingScheduler):
+    """Non-preemptive: a task that has begun is never interrupted."""
+
+    def _choose(self, eligible: Bools) -> Ints:
+        choice: Ints = eligible.argmax(axis=1)
+        return choice
+
+
+class PreemptiveFixedPriority(Scheduler):
+    """Preemptive: chooses in every cycle.
+
+    A run is the beats that a requester has in a row. Once one has begun, it lasts for `shortest_run` beats, until the
+    task's end or until its requester pauses, whichever comes first.
+    """
+
+    def __init__(self, batch: int, requesters: int, shortest_run: int = 1) -> None:
+        super().__init__(batch, requesters)
+        self._shortest_run = shortest_run
+        # Beats of the run, no further than to the shortest run.
+        self._beats: Ints = np.zeros(batch, np.int64)
+
+    def step(self, request: Bools, beat: Bools, last: Bools) -> None:
+        """See `Scheduler`."""
+        finished = beat & last
+        eligible = self._without_granted(request, finished)
+        beats = np.minimum(self._beats + beat, self._shortest_run)
+        kept = (beats > 0) & (beats < self._shortest_run) & self._of_granted(eligible)
+        granted = self.grant_select
+        self._grant(eligible.argmax(axis=1), eligible.any(axis=1) & ~kept)
+        self._beats = np.where(finished | (self.grant_select != granted), 0, beats)

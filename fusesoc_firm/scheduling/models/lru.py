@@ -1,0 +1,88 @@
+"""Least recently used (section 4.2.1): who has waited longest since it completed a task goes first."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
+from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
+from fusesoc_firm.scheduling.models.engine import Engine, Heap, Keys, index_bits
+
+_NEVER = np.iinfo(np.int64).max
+
+
+class ImmediateLru(ChoosingScheduler):
+    """Non-preemptive, for few requesters. After reset the lower index counts as less recently used."""
+
+    MAX_REQUESTERS = 16
+
+    def __init__(self, batch: int, requesters: int) -> None:
+        super().__init__(batch, requesters)
+        # When each completed its last task, counted in completed tasks.
+        self._used: Ints = np.tile(np.arange(requesters), (batch, 1))
+        self._now = requesters
+
+    def _note_completed(self, finished: Bools) -> None:
+        self._used[self._members[finished], self.grant_select[finished]] = self._now
+        self._now += 1
+
+    def _choose(self, eligible: Bools) -> Ints:
+        choice: Ints = np.where(eligible, self._used, _NEVER).argmin(axis=1)
+        return choice
+
+
+class Stamps(Keys):
+    """firm_sched_stamps: when each requester completed its last task, counted in completions."""
+
+    _QUARTER_BITS = 3  # more than those of an index
+    _STEPS = 4  # of the count for one of the sweep
+
+    def __init__(self, batch: int, requesters: int) -> None:
+        bits = index_bits(requesters)
+        self._size: int = 2**bits
+        self._quarter: int = 2 ** (bits + self._QUARTER_BITS)
+        self._members = np.arange(batch)
+        self._stamps: Ints = np.tile(np.arange(self._size), (batch, 1))
+        self._count: Ints = np.full(batch, self._size)
+        self._sweep: Ints = np.zeros(batch, np.int64)
+        self._steps: Ints = np.zeros(batch, np.int64)
+        self._initial_cycles = self._size
+
+    @property
+    def initialised(self) -> bool:
+        """See `Keys`."""
+        return self._initial_cycles == 0
+
+    def _reads(self, wanted: Bools, finished: Bools) -> Bools:
+        return wanted & ~(finished | (self._steps == self._STEPS))
+
+    def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
+        """See `Keys`."""
+        return self._stamps[self._members, index], self._reads(wanted, finished)
+
+    def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
+        """See `Keys`. Stamps know no time."""
+        return np.zeros_like(oldest[0][0])
+
+    def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
+        """See `Keys`."""
+        if self._initial_cycles:
+            self._initial_cycles -= 1
+            return
+        sweeps = ~(finished | self._reads(wanted, finished))
+        swept = self._stamps[self._members, self._sweep]
+        is_old = sweeps & (self._count - swept >= self._quarter)
+        place = np.where(finished, finished_id, self._sweep)
+        stamp = np.where(finished, self._count, np.where(is_old, self._count - self._quarter, swept))
+        self._stamps[self._members, place] = np.where(finished | sweeps, stamp, self._stamps[self._members, place])
+        counts = finished & (self._steps < self._STEPS)
+        self._count = self._count + counts
+        self._steps = np.where(sweeps, 0, self._steps + counts)
+        self._sweep = (self._sweep + sweeps) % self._size
+
+
+def lru(batch: int, requesters: int) -> Scheduler:
+    """Few requesters are compared all at once, the tasks of more of them wait in a heap."""
+    if requesters <= ImmediateLru.MAX_REQUESTERS:
+        return ImmediateLru(batch, requesters)
+    return Engine(batch, requesters, Heap(batch, requesters), Stamps(batch, requesters))

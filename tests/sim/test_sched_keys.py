@@ -1,0 +1,259 @@
+"""The schedulers of robot:sched that compare keys: what they promise beyond what all do; netlists, illegal generics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.sim.ghdl import Library
+from tests.sim.sched_trace import Trace, first_difference
+from tests.sim.schedulers import ENTITIES, analyse_bench, analysed, model_of, trace_of
+
+TIMED = [policy for policy, entity in ENTITIES.items() if entity.has_times]
+# With how many requesters each policy keeps its tasks in which queue.
+HEAP, SORTED, PARALLEL = "heap", "sorted queue", "parallel"
+QUEUES = [
+    ("edf_resources", 2, HEAP),
+    ("edf_resources", 8, HEAP),
+    ("edf_resources", 20, HEAP),
+    ("edf_latency", 3, PARALLEL),
+    ("edf_latency", 8, PARALLEL),
+    ("edf_latency", 20, SORTED),
+    ("lst", 3, PARALLEL),
+    ("lst", 20, HEAP),
+    ("lru", 20, HEAP),
+]
+SIZES = [(policy, requesters) for policy, requesters, _ in QUEUES]
+# After reset the heap is cleared and stamps are written.
+RESET_CYCLES = 300
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return analysed(tmp_path_factory.mktemp("sched"))
+
+
+@pytest.mark.parametrize("requesters", [2, 5, 32])
+@pytest.mark.parametrize("shortest_run", [2, 7])
+@pytest.mark.parametrize("policy", TIMED)
+def test_runs_are_those_of_the_model(
+    library: Library, tmp_path: Path, policy: str, requesters: int, shortest_run: int
+) -> None:
+    trace = trace_of(
+        library, tmp_path, POLICY=policy, REQUESTERS=requesters, SHORTEST_RUN=shortest_run, SEGMENTS=10, CYCLES=2000
+    )
+    assert first_difference(trace, model_of(trace, policy)) == ""
+    shortest = _shortest_broken_run(trace)
+    assert shortest >= shortest_run
+    # Of two, hardly one comes to the other's midst.
+    assert shortest == shortest_run or requesters == 2
+
+
+def _shortest_broken_run(trace: Trace) -> int:
+    """The fewest beats in a row after which the grant left a task whose requester showed its next beat."""
+    shortest = trace.cycles
+    beats = np.zeros(trace.segments, np.int64)
+    for cycle in range(trace.cycles - 1):
+        beat, select = trace.beat[:, cycle], trace.grant_select[:, cycle]
+        beats += beat
+        finished = beat & trace.last[:, cycle]
+        asks = trace.request(cycle)[np.arange(trace.segments), select]
+        left = trace.grant_select[:, cycle + 1] != select
+        broken = beats[left & asks & ~finished & (beats > 0)]
+        shortest = min(shortest, *broken.tolist(), trace.cycles)
+        beats[left | finished] = 0
+    return shortest
+
+
+@pytest.mark.parametrize(("policy", "requesters"), [case for case in SIZES if case[0] in TIMED])
+@pytest.mark.parametrize("saturated", [False, True])
+def test_time_wraps_around(library: Library, tmp_path: Path, policy: str, requesters: int, saturated: bool) -> None:
+    # Hosts stall for up to eight times what the time can count, or everybody has tasks for as long.
+    trace = trace_of(
+        library,
+        tmp_path,
+        POLICY=policy,
+        REQUESTERS=requesters,
+        TIME_BITS=8,
+        LONGEST_PERIOD=31,
+        LONGEST_STALL=0 if saturated else 2048,
+        SATURATED=saturated,
+        SEGMENTS=4,
+        CYCLES=20_000,
+    )
+    assert trace.beat.any(axis=1).all()
+    assert first_difference(trace, model_of(trace, policy)) == ""
+
+
+def test_stamps_of_the_idle_do_not_wrap_around(library: Library, tmp_path: Path) -> None:
+    # Twenty requesters' stamps wrap around after 1,024 completions; others complete some thousands meanwhile.
+    trace = trace_of(library, tmp_path, POLICY="lru", REQUESTERS=20, TASK_BEATS=1, SEGMENTS=3, CYCLES=40_000)
+    assert ((trace.beat & trace.last).sum(axis=1) > 4 * 1024).all()
+    assert first_difference(trace, model_of(trace, "lru")) == ""
+
+
+@pytest.mark.parametrize(("policy", "requesters"), [*SIZES, ("edf_resources", 256), ("edf_latency", 256), ("lru", 256)])
+def test_a_lone_request_is_granted_in_two_cycles(
+    library: Library, tmp_path: Path, policy: str, requesters: int
+) -> None:
+    trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters, SEGMENTS=20, CYCLES=3000)
+    begun = np.zeros((trace.segments, requesters), np.bool_)
+    segments = np.arange(trace.segments)
+    found = 0
+    before = np.zeros_like(begun)
+    for cycle in range(trace.cycles - 2):
+        request = trace.request(cycle)
+        # Nobody is in a task, nobody asked before, and in the next cycle still nobody but the lone one does.
+        is_lone = ~begun.any(axis=1) & ~before.any(axis=1) & (request.sum(axis=1) == 1)
+        is_lone &= (trace.request(cycle + 1) == request).all(axis=1) & ~trace.beat[:, cycle]
+        who = request.argmax(axis=1)
+        if cycle > RESET_CYCLES:
+            granted = trace.grant_valid[:, cycle + 2] & (trace.grant_select[:, cycle + 2] == who)
+            assert granted[is_lone].all(), f"cycle {cycle}"
+            found += int(is_lone.sum())
+        beat = trace.beat[:, cycle]
+        begun[segments[beat], trace.grant_select[beat, cycle]] = ~trace.last[beat, cycle]
+        before = request
+    assert found > 0
+
+
+# Share of cycles with a beat, where everybody always has a task of so many beats.
+THROUGHPUT = {
+    HEAP: {1: 0.49, 2: 0.99, 4: 1.0, 7: 1.0},
+    SORTED: {1: 0.8, 2: 1.0, 4: 1.0, 7: 1.0},
+    PARALLEL: {1: 0.6, 2: 1.0, 4: 1.0, 7: 1.0},
+}
+
+
+@pytest.mark.parametrize("beats", [1, 2, 4, 7])
+@pytest.mark.parametrize(("policy", "requesters", "queue"), QUEUES)
+def test_tasks_follow_each_other(
+    library: Library, tmp_path: Path, policy: str, requesters: int, queue: str, beats: int
+) -> None:
+    trace = trace_of(
+        library, tmp_path, POLICY=policy, REQUESTERS=requesters, SATURATED=True, TASK_BEATS=beats, CYCLES=2000
+    )
+    share = float(trace.beat[:, RESET_CYCLES:].mean())
+    print(f"{policy}, {requesters} requesters, {beats} beats: {share}")
+    assert share >= THROUGHPUT[queue][beats]
+
+
+@pytest.mark.parametrize("shortest_run", [1, 3])
+@pytest.mark.parametrize(("policy", "requesters"), SIZES)
+def test_the_netlist_does_the_same(
+    library: Library, tmp_path: Path, policy: str, requesters: int, shortest_run: int
+) -> None:
+    def run(in_library: Library) -> Trace:
+        return trace_of(in_library, tmp_path, POLICY=policy, REQUESTERS=requesters, SHORTEST_RUN=shortest_run)
+
+    source = run(library)
+    text = (tmp_path / "trace.txt").read_text()
+    netlists = analysed(tmp_path)
+    wrapper = netlists.directory / "wrapper.vhd"
+    wrapper.write_text(_wrapper("told", f"firm_sched_{policy}", requesters, _generic_map(source, policy)))
+    netlists.analyse([wrapper])
+    assert netlists.latches("told") == []
+    netlists.replace_by_netlist("told")
+    by_policy = netlists.directory / "by_policy.vhd"
+    by_policy.write_text(_wrapper("firm_sched_by_policy", "told", requesters, ""))
+    analyse_bench(netlists, by_policy)
+    run(netlists)
+    assert (tmp_path / "trace.txt").read_text() == text
+
+
+def _generic_map(trace: Trace, policy: str) -> str:
+    """The generic map of a policy's entity as it is in the trace's bench."""
+
+    def times(name: str) -> str:
+        return "(" + ", ".join(f"{place} => {time}" for place, time in enumerate(trace.head[name])) + ")"
+
+    generics = {"REQUESTERS": str(trace.requesters)}
+    if policy in TIMED:
+        generics["PERIODS"] = times("periods")
+        generics["DEADLINES"] = "IMPLICIT" if trace.head["deadlines"] == [0] else times("deadlines")
+        generics["SHORTEST_RUN"] = str(trace.head["shortest_run"][0])
+    if policy == "lst":
+        generics["TRANSFER_TIMES"] = times("transfer_times")
+    return "generic map (" + ", ".join(f"{name} => {value}" for name, value in generics.items()) + ")"
+
+
+_BY_POLICY_GENERICS = """generic (
+    POLICY : policy_t; REQUESTERS : integer; PERIODS, TRANSFER_TIMES, DEADLINES : times_t := IMPLICIT;
+    TIME_BITS, SHORTEST_RUN : integer := 1);"""
+
+
+def _wrapper(name: str, inner: str, requesters: int, generic_map: str) -> str:
+    """An entity `name` around `inner`, with the generics of firm_sched_by_policy if it is to take its place."""
+    generics = _BY_POLICY_GENERICS if name == "firm_sched_by_policy" else ""
+    return f"""
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
+entity {name} is
+  {generics}
+  port (
+    clk, rst_n : in std_logic;
+    request : in std_logic_vector({requesters}-1 downto 0);
+    beat, last : in std_logic;
+    grant_valid : out std_logic;
+    grant_select : out std_logic_vector(index_bits({requesters})-1 downto 0));
+end entity {name};
+architecture wrapper of {name} is
+begin
+  u_inner : entity firm.{inner}
+    {generic_map}
+    port map (clk => clk, rst_n => rst_n, request => request, beat => beat, last => last,
+      grant_valid => grant_valid, grant_select => grant_select);
+end architecture wrapper;
+"""
+
+
+ILLEGAL = [
+    (0, "PERIODS => (10, 20)", "REQUESTERS is 0; legal: 1 to 256"),
+    (257, "PERIODS => (10, 20)", "REQUESTERS is 257; legal: 1 to 256"),
+    (3, "PERIODS => (10, 20)", "PERIODS has 2 times; legal: one for each of 3 requesters"),
+    (2, "PERIODS => (10, 0)", "the deadline of requester 1 is 0; legal: 1 and more cycles"),
+    (2, "PERIODS => (10, 9000)", "TIME_BITS is 16; the deadline 9000 of requester 1 needs 17"),
+    (2, "PERIODS => (10, 20), TIME_BITS => 7", "TIME_BITS is 7; legal: 8 to 31"),
+    (2, "PERIODS => (10, 20), TIME_BITS => -1", "TIME_BITS is -1; legal: 8 to 31"),
+    (2, "PERIODS => (10, 20), TIME_BITS => 40", "TIME_BITS is 40; legal: 8 to 31"),
+    (20, "PERIODS => (10, 20), SHORTEST_RUN => 0", "SHORTEST_RUN is 0; legal: 1 and more beats"),
+    (2, "PERIODS => (10, 20), DEADLINES => (5, 6, 7)", "DEADLINES has 3 times; legal: one for each of 2 requesters"),
+]
+
+
+@pytest.mark.parametrize("policy", TIMED)
+@pytest.mark.parametrize(("requesters", "generics", "message"), ILLEGAL)
+def test_illegal_generics_are_named(tmp_path: Path, policy: str, requesters: int, generics: str, message: str) -> None:
+    if policy == "lst":
+        generics += ", TRANSFER_TIMES => (1, 1)"
+    entity = ENTITIES[policy].entity
+    assert f"{entity}: {message}" in _refusal(analysed(tmp_path), entity, requesters, generics)
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ("(1, 2, 3)", "TRANSFER_TIMES has 3 times; legal: one for each of 2 requesters"),
+        ("(1, 0)", "the transfer time of requester 1 is 0; legal: 1 and more cycles"),
+        ("(8192, 1)", "TIME_BITS is 16; the transfer time 8192 of requester 0 needs 17"),
+    ],
+)
+def test_illegal_transfer_times_are_named(tmp_path: Path, times: str, message: str) -> None:
+    generics = f"PERIODS => (10, 20), TRANSFER_TIMES => {times}"
+    assert f"firm_sched_lst: {message}" in _refusal(analysed(tmp_path), "firm_sched_lst", 2, generics)
+
+
+def _refusal(library: Library, entity: str, requesters: int, generics: str) -> str:
+    """What elaborating `entity` prints; it must fail."""
+    file = library.directory / "refused.vhd"
+    generic_map = f"generic map (REQUESTERS => {requesters}, {generics})"
+    file.write_text(_wrapper("refused", entity, requesters, generic_map))
+    library.analyse([file])
+    result = library.run("refused")
+    assert result.exit_code != 0
+    return result.output
