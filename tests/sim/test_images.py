@@ -186,11 +186,11 @@ def test_illegal_generics(tmp_path: Path, generics: dict[str, int], text: str) -
     assert text in result.output
 
 
-def test_one_word_lets_a_twist_interrupt_an_image(tmp_path: Path) -> None:
+def test_one_word_is_another_policy(tmp_path: Path) -> None:
     spec = copied(tmp_path, "multi_type") / "multi_type.yaml"
     text = spec.read_text(encoding="utf-8")
     for policy in ("fixed_priority_preemptive", "round_robin", "edf_latency"):
-        spec.write_text(text.replace("scheduler: fixed_priority", f"scheduler: {policy}"), encoding="utf-8")
+        spec.write_text(re.sub(r"scheduler: \w+", f"scheduler: {policy}", text), encoding="utf-8")
         faults = Diagnostics()
         libraries = {ros: MessageLibrary(ros) for ros in RosVersion}
         found = derive(read_specification(spec, spec.name, faults), spec.parent, libraries, faults).scheduling
@@ -198,6 +198,55 @@ def test_one_word_lets_a_twist_interrupt_an_image(tmp_path: Path) -> None:
         assert [times.period for times in found.times] == [1_000_000, 2_500_000, 3_333_333]
         assert [times.deadline for times in found.times] == [1_000_000, 2_500_000, 2_000_000]
         assert found.shortest_run == 32
+
+
+# Counts what ends on the system's stream to the host, by publisher.
+WATCH = """begin
+
+  watch : process
+  begin
+    wait until rising_edge(clk);
+    if {stream}_tvalid = '1' and {stream}_tready = '1' and {stream}_tlast = '1' then
+      for publisher in 0 to 2 loop
+        if {stream}_tid(1 downto 0) = IDS(publisher) then
+          report "end " & integer'image(publisher);
+        end if;
+      end loop;
+    end if;
+  end process watch;
+"""
+IDS = """
+  type ids_t is array (natural range 0 to 2) of std_logic_vector(1 downto 0);
+  constant IDS : ids_t := ("00", "01", "10");
+"""
+
+
+def test_twists_interrupt_images(tmp_path: Path) -> None:
+    """Each end on the stream to the host is that of a frame, or of a part of one that is interrupted."""
+    source = random.Random(SEED)
+    messages = [("twist_in", twist("ROS", source)) for _ in range(60)]
+    messages += [("image_in", image("ROS", source, 40, 40, 3)) for _ in range(8)]
+    messages += [("scan_in", scan("ROS", source)) for _ in range(32)]
+    source.shuffle(messages)
+    for policy, stream in (("fixed_priority", "from"), ("fixed_priority_preemptive", "burst")):
+        copy = copied(tmp_path / policy, "multi_type")
+        spec = copy / "multi_type.yaml"
+        text = re.sub(r"scheduler: \w+", f"scheduler: {policy}", spec.read_text(encoding="utf-8"))
+        spec.write_text(text, encoding="utf-8")
+        made = fed(copy, messages)
+        bench = made.folder / f"{made.entity}_tb.vhd"
+        top = bench.read_text(encoding="ascii").replace("\nbegin\n", f"{IDS}\n{WATCH.format(stream=stream)}", 1)
+        bench.write_text(top, encoding="ascii")
+        made.work.analyse([bench])
+        result = made.run(STALL_PERCENT=0)
+        assert result.exit_code == 0
+        twists, scans, images = (result.output.count(f"end {publisher}") for publisher in range(3))
+        print(f"{policy}: {twists} {scans} {images}")
+        if policy == "fixed_priority":
+            assert (twists, scans, images) == (60, 32, 8)
+        else:
+            # Twists and scans pass through, so they pause at times, and whoever pauses is interrupted as well.
+            assert twists >= 60 and scans >= 32 and images > 2 * 8
 
 
 def test_the_systems_are_those_of_the_folder() -> None:

@@ -263,29 +263,19 @@ begin
     end if;
   end process place;
 
-  -- By powers of two, the lowest first: so no two pixels meet. Those that go do not move, and are overwritten.
+  -- By powers of two, the lowest first: so no two pixels meet, and what they leave behind meets none of them either.
   compact : process (clk)
-    variable data    : std_logic_vector(WIDTH-1 downto 0);
-    variable shifts  : shifts_t;
-    variable gathers : std_logic;
+    variable data   : std_logic_vector(WIDTH-1 downto 0);
+    variable shifts : shifts_t;
   begin
     if rising_edge(clk) and advance = '1' then
       data   := placed_r;
       shifts := shifts_r;
       for stage in 0 to SHIFT_BITS-1 loop
         for lane in 0 to LANES-1-2**stage loop
-          gathers := shifts(lane + 2**stage)(stage);
-          if gathers = '1' then
+          if shifts(lane + 2**stage)(stage) = '1' then
             data(8*lane+7 downto 8*lane) := data(8*(lane + 2**stage)+7 downto 8*(lane + 2**stage));
             shifts(lane)                 := shifts(lane + 2**stage);
-          elsif shifts(lane)(stage) = '1' then
-            -- It has moved on; what stays behind must not move again.
-            shifts(lane) := (others => '0');
-          end if;
-        end loop;
-        for lane in max(0, LANES-2**stage) to LANES-1 loop
-          if shifts(lane)(stage) = '1' then
-            shifts(lane) := (others => '0');
           end if;
         end loop;
       end loop;

@@ -130,7 +130,7 @@ begin
           bytes_r <= bytes_r - wanted;
           if ends_row = '1' then
             first_r <= '1';
-            if rows_r = 1 or unsigned(padding) = 0 then
+            if unsigned(padding) = 0 then
               rows_r  <= rows_r - 1;
               bytes_r <= unsigned(row_bytes);
             end if;
