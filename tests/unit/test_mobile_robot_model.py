@@ -86,7 +86,7 @@ def test_the_controller_is_a_pid_within_its_limits() -> None:
     setpoint, counts = 0, 0
     for number in range(3000):
         if number % 40 == 0:
-            setpoint = source.randint(-10240, 10240)
+            setpoint = source.choice([-1, 1]) * source.randint(1, 10240)
         counts = max(-127, min(127, counts + source.randint(-6, 6)))
         error = setpoint / 256 - counts
         increased = integral + PARAMETERS.ki / 256 * error
@@ -96,8 +96,6 @@ def test_the_controller_is_a_pid_within_its_limits() -> None:
         limited += is_beyond
         if not (is_beyond and raw * error > 0):
             integral = increased
-        if setpoint == 0 and counts == 0:
-            integral = 0.0
         wanted = max(-PARAMETERS.pwm_cycles, min(PARAMETERS.pwm_cycles, raw))
         # Rounded down to whole cycles.
         assert -1 <= pid.duty(setpoint, counts) - wanted <= 0.01
@@ -109,8 +107,22 @@ def test_a_wheel_that_stands_and_should_is_let_go() -> None:
     for _ in range(20):
         pid.duty(256, 0)
     assert pid.integral > 0
-    pid.duty(0, 0)
-    assert pid.duty(0, 0) == 0
+    for counts in (1, 0, -1):
+        assert pid.duty(0, counts) == 0
+        assert pid.integral == 0
+    assert pid.duty(0, 2) < 0
+
+
+def test_the_default_gains_fit_the_motor_that_they_are_meant_for() -> None:
+    """Settled to 5 % in three of its time constants, reversed in five, never 5 % too fast, and at rest for good."""
+    robot = MODEL.Robot(PARAMETERS, [MODEL.Motor(PARAMETERS, 80_500) for _ in range(4)])
+    speeds = {x: [robot.period((x, 0.0))[0] for _ in range(200)] for x in (0.6, -0.6, 0.0)}
+    for x, settling in ((0.6, 30), (-0.6, 50)):
+        assert all(abs(speed - x) <= 0.03 for speed in speeds[x][settling:])
+        assert max(speeds[x], key=lambda speed: speed * x) / x <= 1.05
+        assert sum(speeds[x][100:]) / 100 == pytest.approx(x, rel=0.002)
+    assert set(speeds[0.0][60:]) == {0.0}
+    assert robot.duties == [0, 0, 0, 0]
 
 
 def test_a_motor_follows_its_voltage_with_one_time_constant() -> None:
