@@ -113,10 +113,11 @@ class Pid:
         is_beyond = (whole >= limit and error >= 0) or (whole < -limit and error < 0)
         if not is_beyond:
             self.integral = increased
-        if setpoint == 0 and counts == 0:
-            self.integral = 0
         is_standing = counts == 0 and (whole >= limit or whole < -limit)
         self.standing = min(self.standing + 1, known.stall_periods) if is_standing else 0
+        if setpoint == 0 and abs(counts) <= 1:
+            self.integral = 0
+            return 0
         return max(-limit, min(limit, whole))
 
     @property
@@ -145,7 +146,8 @@ class Motor:
         self.seen = self.angle + speed * (cycles - self.parameters.seen_after - 1)
         self.angle += speed * cycles
         change = duty * (self.full_speed // cycles) - self.speed
-        self.speed += int(math.copysign(abs(change) // self.time_constant, change))
+        # Rounded away from zero.
+        self.speed += int(math.copysign(-(-abs(change) // self.time_constant), change))
         if self.is_held:
             self.speed = 0
 

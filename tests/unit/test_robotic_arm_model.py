@@ -58,8 +58,8 @@ def reference(angles: Sequence[float]) -> list[Any]:
     for (turns, a, d), angle in zip(STEPS, [*angles, -math.pi / 4], strict=True):
         about_x, about_z = np.eye(4), np.eye(4)
         c, s = round(math.cos(turns * math.pi / 2)), round(math.sin(turns * math.pi / 2))
-        about_x[:3, 1:] = [[0, 0, a], [c, -s, 0], [s, c, 0]]
-        about_z[:2, :2] = [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+        about_x[:3, 1:] = np.array([[0, 0, a], [c, -s, 0], [s, c, 0]])
+        about_z[:2, :2] = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
         about_z[2, 3] = d
         pose = pose @ about_x @ about_z
         poses.append(pose)
@@ -75,7 +75,7 @@ def check(angles: Sequence[float], generator: random.Random) -> float:
     exact = reference(angles)
     given = [element + generator.gauss(0, 10 ** generator.uniform(-8, -1)) for element in column_major(exact[-1])]
     poses, mean_square = MODEL.chain(angles, given)
-    errors = [
+    errors: list[float] = [
         abs(element - right)
         for pose, right_pose in zip(poses, exact[:-1], strict=True)
         for element, right in zip(pose, column_major(right_pose), strict=True)

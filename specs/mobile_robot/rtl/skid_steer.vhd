@@ -87,41 +87,41 @@ architecture rtl of skid_steer is
   subtype speed_t is signed(TWIST_BITS+32-PRODUCT_FRACTION+SPEED_FRACTION downto 0);
   subtype back_t is signed(41 downto 0);
 
-  signal asked          : std_logic_vector(63 downto 0);
-  signal start_r        : std_logic;
-  signal fixed_in_valid : std_logic;
-  signal fixed_valid    : std_logic;
-  signal fixed          : std_logic_vector(TWIST_BITS-1 downto 0);
-  signal undefined      : std_logic;
+  signal asked           : std_logic_vector(63 downto 0);
+  signal start_r         : std_logic;
+  signal fixed_in_valid  : std_logic;
+  signal fixed_valid     : std_logic;
+  signal fixed           : std_logic_vector(TWIST_BITS-1 downto 0);
+  signal undefined       : std_logic;
 
   -- The number is z; its product; the sides follow.
-  signal is_z_r         : std_logic;
-  signal product_r      : product_t;
+  signal is_z_r          : std_logic;
+  signal product_r       : product_t;
   signal product_valid_r : std_logic;
-  signal product_is_z_r : std_logic;
-  signal forward_r      : product_t;
-  signal x_lost_r       : std_logic;
-  signal lost_r         : std_logic;
-  signal sides_valid_r  : std_logic;
-  signal left_r         : speed_t;
-  signal right_r        : speed_t;
-  signal done_r         : std_logic;
-  signal in_left_r      : std_logic_vector(15 downto 0);
-  signal in_right_r     : std_logic_vector(15 downto 0);
+  signal product_is_z_r  : std_logic;
+  signal forward_r       : product_t;
+  signal x_lost_r        : std_logic;
+  signal lost_r          : std_logic;
+  signal sides_valid_r   : std_logic;
+  signal left_r          : speed_t;
+  signal right_r         : speed_t;
+  signal done_r          : std_logic;
+  signal in_left_r       : std_logic_vector(15 downto 0);
+  signal in_right_r      : std_logic_vector(15 downto 0);
 
   -- Sums of counts, and the product with a constant.
-  signal back_step_r    : unsigned(2 downto 0);
-  signal sum_r          : signed(9 downto 0);
-  signal difference_r   : signed(9 downto 0);
-  signal back_r         : back_t;
-  signal float_in       : std_logic_vector(63 downto 0);
-  signal float_in_valid : std_logic;
-  signal float_valid    : std_logic;
-  signal float          : std_logic_vector(63 downto 0);
-  signal is_second_r    : std_logic;
-  signal out_done_r     : std_logic;
-  signal out_x_r        : std_logic_vector(63 downto 0);
-  signal out_z_r        : std_logic_vector(63 downto 0);
+  signal back_step_r     : unsigned(2 downto 0);
+  signal sum_r           : signed(9 downto 0);
+  signal difference_r    : signed(9 downto 0);
+  signal back_r          : back_t;
+  signal float_in        : std_logic_vector(63 downto 0);
+  signal float_in_valid  : std_logic;
+  signal float_valid     : std_logic;
+  signal float           : std_logic_vector(63 downto 0);
+  signal is_second_r     : std_logic;
+  signal out_done_r      : std_logic;
+  signal out_x_r         : std_logic_vector(63 downto 0);
+  signal out_z_r         : std_logic_vector(63 downto 0);
 
   -- A product in units of 2**-SPEED_FRACTION, rounded to nearest.
   function rounded(sum : signed(TWIST_BITS+32 downto 0)) return speed_t is

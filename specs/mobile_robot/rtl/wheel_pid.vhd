@@ -4,8 +4,9 @@
 --   e = setpoint - speed,  duty = KP e + I + KD (speed before - speed),  I = I before + KI e
 --
 -- The derivative is that of the speed, so a new setpoint gives no kick. The duty stays within LIMIT; where it would
--- not, and e would drive it further, I stays as it was, so it does not wind up. A wheel that stands and should is let go:
--- I begins at 0 again. One multiplier serves the three products.
+-- not, and e would drive it further, I stays as it was, so it does not wind up. A wheel that should stand and does, but for
+-- a count, is let go: no duty, and I begins at 0 again; else it would swing about an edge of its encoder for ever. One
+-- multiplier serves the three products.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -142,8 +143,9 @@ begin
         if not is_beyond then
           integral_r <= increased_r;
         end if;
-        if signed(setpoint) = 0 and signed(speed) = 0 then
+        if signed(setpoint) = 0 and signed(speed) >= -1 and signed(speed) <= 1 then
           integral_r <= (others => '0');
+          duty_r     <= (others => '0');
         end if;
         if signed(speed) = 0 and (whole >= LIMIT or whole < -LIMIT) then
           if standing_r /= STALL_PERIODS then

@@ -45,6 +45,7 @@ begin
     -- Cycles of this period in which the motor is driven forward, less those backward.
     variable driven     : integer := 0;
     variable speed      : integer := 0;
+    variable change     : integer := 0;
     variable angle      : integer := 0;
   begin
     if rising_edge(clk) then
@@ -68,7 +69,13 @@ begin
         end if;
         position := position + 1;
         if position = PWM_CYCLES then
-          speed    := speed + (driven * (FULL_SPEED / PWM_CYCLES) - speed) / TIME_CONSTANT;
+          change   := driven * (FULL_SPEED / PWM_CYCLES) - speed;
+          -- Rounded away from zero, or the last of a speed would stay.
+          if change > 0 then
+            speed := speed + (change + TIME_CONSTANT - 1) / TIME_CONSTANT;
+          else
+            speed := speed - (TIME_CONSTANT - 1 - change) / TIME_CONSTANT;
+          end if;
           position := 0;
           driven   := 0;
           if held = '1' then

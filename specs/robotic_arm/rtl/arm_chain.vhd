@@ -310,15 +310,17 @@ begin
   begin
     if rising_edge(clk) then
       folded_valid_r <= fixed_valid and feed_busy_r;
-      folded_r       <= signed(fixed);
-      folded_unfit_r <= fixed_overflow or fixed_undefined;
-      if feed_r = STEPS-1 then
-        folded_r       <= hand;
-        folded_unfit_r <= '0';
-      elsif signed(fixed) > three_pi then
-        folded_r <= signed(fixed) - four_pi;
-      elsif signed(fixed) < -three_pi then
-        folded_r <= signed(fixed) + four_pi;
+      if fixed_valid = '1' then
+        folded_r       <= signed(fixed);
+        folded_unfit_r <= fixed_overflow or fixed_undefined;
+        if feed_r = STEPS-1 then
+          folded_r       <= hand;
+          folded_unfit_r <= '0';
+        elsif signed(fixed) > three_pi then
+          folded_r <= signed(fixed) - four_pi;
+        elsif signed(fixed) < -three_pi then
+          folded_r <= signed(fixed) + four_pi;
+        end if;
       end if;
 
       if folded_valid_r = '1' then

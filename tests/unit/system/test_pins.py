@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ def system(folder: Path, *blocks: str, pins: str = PINS) -> DerivedSystem:
     type_ = f"  - {{name: panel, type: VHDL, sources: acc.vhd, interface: {interface}, {pins}}}\n"
     row = [*blocks, "pub"]
     text = converter("sub", "subscriber", "Point", row[0])
-    text += "".join(instance(name, "panel", target) for name, target in zip(row, row[1:], strict=False))
+    text += "".join(instance(name, "panel", target) for name, target in pairwise(row))
     return derived(folder, specification(text + converter("pub", "publisher", "Point"), type_))
 
 
