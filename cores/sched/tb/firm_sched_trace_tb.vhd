@@ -29,6 +29,8 @@ entity firm_sched_trace_tb is
     SATURATED : boolean := false;
     -- Beats of each task, 0 for a number that is drawn.
     TASK_BEATS : integer := 0;
+    -- Cycles of a stretch beside those that are drawn.
+    STRETCH : integer := 0;
     -- At the beginning of a stretch nobody takes a beat for as many cycles at most.
     LONGEST_STALL : integer := 0;
     TRACE     : string  := "trace.txt");
@@ -212,7 +214,7 @@ begin
     procedure draw_stretch(cycle : in natural) is
     begin
       draw(state, 200 + 8*REQUESTERS, number);
-      stretch_end := cycle + 50 + number;
+      stretch_end := cycle + 50 + number + STRETCH;
       draw(state, 4, number);
       lone := NOBODY;
       if number = 0 then
