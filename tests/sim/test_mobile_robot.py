@@ -272,6 +272,8 @@ def test_the_decoder_counts_every_edge_and_no_glitch(work: Library, tmp_path: Pa
             # Long enough between glitches that what was before counts, too short within one to count.
             steps += [(a, b, filter_ + source.randint(2, 9)), (1 - a, b, source.randint(1, filter_ - 1))]
             steps += [(a, b, filter_ + 2), (a, 1 - b, source.randint(1, filter_ - 1))]
+            # A glitch that is seen counts forth and back; on both lines at once it is an error.
+            steps += [(a, b, filter_ + 2), (1 - a, 1 - b, filter_ - 1)]
         steps.append((a, b, filter_ + source.randint(1, 20)))
     assert decoded(work, tmp_path, steps, filter_) == (position - start, 0)
 

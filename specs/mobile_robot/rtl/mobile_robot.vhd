@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- geometry_msgs/Twist to four motors with encoders, and the twist that is measured back: a skid-steer robot.
 --
--- Once a period of control the encoders' counts are taken, a command that waits is taken and becomes the speeds that the
--- wheels of each side should have, each wheel's controller finds its duty, and a command is answered with the twist of
--- the period that just ended. Without a command for TIMEOUT periods the robot stops. While an answer is not taken, neither
--- is a command.
+-- Once a period of control the encoders' counts are taken, a command that waits is taken and becomes the speeds that
+-- the wheels of each side should have, each wheel's controller finds its duty, and a command is answered with the
+-- twist of the period that just ended. Without a command for TIMEOUT periods the robot stops. While an answer is not
+-- taken, neither is a command.
 --
 -- A command waits for the end of a period, and the one behind it in the converter; so nothing is lost, and a host that
 -- sends more often than that waits.
@@ -26,8 +26,9 @@ entity mobile_robot is
     COUNTS_PER_TURN : positive := 204_800;
     -- Counts a period that a wheel is asked for at most: 1.23 m/s.
     SPEED_LIMIT     : positive := 40;
-    -- Cycles of duty for one count a period, in units of 2**-8. For a motor of 48 counts a period at full duty, K, and a time
-    -- constant of ten periods, T: KP = T/(K (4 + 1.5)) for a loop of 4 periods and a delay of 1.5, KI = KP/T and a tenth more.
+    -- Cycles of duty for one count a period, in units of 2**-8. For a motor of 48 counts a period at full duty, K,
+    -- and a time constant of ten periods, T: KP = T/(K (4 + 1.5)) for a loop of 4 periods and a delay of 1.5, KI =
+    -- KP/T and a tenth more.
     KP              : natural  := 50_000;
     KI              : natural  := 5_500;
     KD              : natural  := 10_000;

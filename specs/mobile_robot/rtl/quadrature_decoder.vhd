@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The counts of a quadrature encoder between two samples: every edge of A and B is one.
 --
--- Both lines are synchronised, and a change counts only when FILTER samples in a row agree: shorter glitches are not seen.
--- A leads B when the wheel turns forward. If both change at once, the direction is not known: that is an error, which is
--- counted in place of a step. A step in the very cycle of a sample belongs to the next one, so none is lost.
+-- Both lines are synchronised, and a change counts only when FILTER samples in a row agree: shorter glitches are not
+-- seen. A leads B when the wheel turns forward. If both change at once, the direction is not known: that is an error,
+-- which is counted in place of a step. A step in the very cycle of a sample belongs to the next one, so none is lost.
 
 library ieee;
 use ieee.std_logic_1164.all;

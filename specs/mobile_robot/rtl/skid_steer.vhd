@@ -1,13 +1,14 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The kinematics of a skid-steer robot: a twist to the speeds of its sides, and the counts of its wheels to a twist.
 --
---   left = x - z TRACK_WIDTH/2, right = x + z TRACK_WIDTH/2,  and back x = (left + right)/2, z = (right - left)/TRACK_WIDTH
+--   left = x - z TRACK_WIDTH/2,  right = x + z TRACK_WIDTH/2,  x = (left + right)/2,  z = (right - left)/TRACK_WIDTH
 --
--- Speeds of wheels are counts of an encoder a period. With X counts a period for 1 m/s and Z for 1 rad/s, both constants:
+-- Speeds of wheels are counts of an encoder a period. With X counts a period for 1 m/s and Z for 1 rad/s, both
+-- constants:
 --   left = X x - Z z, right = X x + Z z,   x = (sum of the four wheels' counts)/(4 X), z = (right - left ones)/(4 Z)
 --
--- A side's speed ends at SPEED_LIMIT, each for itself: a command beyond it turns less than it asks for. One that is not a
--- number stops the robot.
+-- A side's speed ends at SPEED_LIMIT, each for itself: a command beyond it turns less than it asks for. One that is
+-- not a number stops the robot.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -38,7 +39,8 @@ entity skid_steer is
     in_left       : out std_logic_vector(15 downto 0);
     in_right      : out std_logic_vector(15 downto 0);
 
-    -- Counts of the wheels: front left, front right, rear left, rear right, the first one lowest. The twist holds from out_done on, until the next one's.
+    -- Counts of the wheels: front left, front right, rear left, rear right, the first one lowest. The twist holds
+    -- from out_done on, until the next one's.
     out_start     : in  std_logic;
     out_counts    : in  std_logic_vector(31 downto 0);
     out_done      : out std_logic;

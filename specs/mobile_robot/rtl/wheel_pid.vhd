@@ -4,9 +4,9 @@
 --   e = setpoint - speed,  duty = KP e + I + KD (speed before - speed),  I = I before + KI e
 --
 -- The derivative is that of the speed, so a new setpoint gives no kick. The duty stays within LIMIT; where it would
--- not, and e would drive it further, I stays as it was, so it does not wind up. A wheel that should stand and does, but for
--- a count, is let go: no duty, and I begins at 0 again; else it would swing about an edge of its encoder for ever. One
--- multiplier serves the three products.
+-- not, and e would drive it further, I stays as it was, so it does not wind up. A wheel that should stand and does,
+-- but for a count, is let go: no duty, and I begins at 0 again; else it would swing about an edge of its encoder for
+-- ever. One multiplier serves the three products.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -78,16 +78,17 @@ begin
   stalled <= '1' when standing_r = STALL_PERIODS else '0';
 
   multiply : process (clk)
-    variable fixed : error_t;
-    variable left  : error_t;
-    variable gain  : natural;
+    variable fixed  : error_t;
+    variable slower : signed(8 downto 0);
+    variable left   : error_t;
+    variable gain   : natural;
   begin
     if rising_edge(clk) then
       if start = '1' then
         fixed     := resize(signed(speed) & to_signed(0, SPEED_FRACTION), error_t'length);
         error_r   <= resize(signed(setpoint), error_t'length) - fixed;
-        fixed     := resize((resize(before_r, 9) - resize(signed(speed), 9)) & to_signed(0, SPEED_FRACTION), error_t'length);
-        slowing_r <= fixed;
+        slower    := resize(before_r, 9) - resize(signed(speed), 9);
+        slowing_r <= slower & to_signed(0, SPEED_FRACTION);
         before_r  <= signed(speed);
       end if;
 

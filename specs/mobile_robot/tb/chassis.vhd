@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- What is at the robot's pins in the simulation of the whole system: four motors, no two quite alike, and glitches on one
--- encoder's lines, which its decoder must not see.
+-- What is at the robot's pins in the simulation of the whole system: four motors, no two quite alike, and glitches on
+-- one encoder's lines, which its decoder must not see.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -2,9 +2,9 @@
 -- The accelerator with four motors in a closed loop, a line of a file a period of control.
 --
 -- A line of SCENARIO is V x z H: whether a command waits at the period's end, the command as binary digits, and which
--- shafts are held from the period's begin on, wheel 3 first. A line of RESULTS is V x z S E: whether the command was answered
--- soon after the period's end, the answer, the wheels that report a stall, and the encoders' errors. The values are judged
--- by who reads RESULTS. The last period's line is written when it is over.
+-- shafts are held from the period's begin on, wheel 3 first. A line of RESULTS is V x z S E: whether the command was
+-- answered soon after the period's end, the answer, the wheels that report a stall, and the encoders' errors. The
+-- values are judged by who reads RESULTS. The last period's line is written when it is over.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -65,6 +65,7 @@ architecture test of mobile_robot_tb is
   signal enc_errors    : std_logic_vector(31 downto 0);
   signal stalled       : std_logic_vector(3 downto 0);
   signal held          : std_logic_vector(3 downto 0) := "0000";
+  signal commands      : natural := 0;
   signal answers       : natural := 0;
   signal answer_x      : std_logic_vector(63 downto 0) := (others => '0');
   signal answer_z      : std_logic_vector(63 downto 0) := (others => '0');
@@ -195,17 +196,30 @@ begin
     wait;
   end process play;
 
+  count : process (clk)
+  begin
+    if rising_edge(clk) and in_msg_valid = '1' and in_msg_ready = '1' then
+      commands <= commands + 1;
+    end if;
+  end process count;
+
   take : process
+    variable x, z : std_logic_vector(63 downto 0);
   begin
     wait until rising_edge(clk) and out_valid = "1";
+    x := out_x;
+    z := out_z;
     for k in 1 to ANSWER_WAITS loop
       wait until rising_edge(clk);
     end loop;
     out_msg_ready <= '1' after DELAY;
     wait until rising_edge(clk);
     out_msg_ready <= '0' after DELAY;
-    assert out_valid = "1"
-      report "mobile_robot_tb: an answer was withdrawn"
+    assert out_valid = "1" and out_x = x and out_z = z
+      report "mobile_robot_tb: an answer changed while it waited"
+      severity failure;
+    assert commands = answers + 1
+      report "mobile_robot_tb: a command was taken while an answer waited"
       severity failure;
     answers  <= answers + 1;
     answer_x <= out_x;

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A DC motor with a quadrature encoder, for simulation: what a PWM and a direction make of its shaft.
 --
--- Without inductance and load torque, J d(speed)/dt = k (voltage - k speed)/R: the speed follows the voltage's mean with one
--- time constant, and its back-EMF is what ends it. Whole numbers are counted, so that a model in another language can say
--- what each cycle brings; the mean is that of a period of the PWM. A held shaft stands still.
+-- Without inductance and load torque, J d(speed)/dt = k (voltage - k speed)/R: the speed follows the voltage's mean
+-- with one time constant, and its back-EMF is what ends it. Whole numbers are counted, so that a model in another
+-- language can say what each cycle brings; the mean is that of a period of the PWM. A held shaft stands still.
 
 library ieee;
 use ieee.std_logic_1164.all;

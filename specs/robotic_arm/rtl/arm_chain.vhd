@@ -121,7 +121,8 @@ architecture rtl of arm_chain is
   signal cordic_out_ready : std_logic;
   signal cordic_cos       : std_logic_vector(FRACTION+1 downto 0);
   signal cordic_sin       : std_logic_vector(FRACTION+1 downto 0);
-  -- Multiples of pi, and the hand's angle; signals, set bit by bit, as ghdl 2.0 translates a constant of more than 32 bits to a string.
+  -- Multiples of pi, and the hand's angle; signals, set bit by bit, as ghdl 2.0 translates a constant of more than 32
+  -- bits to a string.
   signal pi               : wide_t;
   signal two_pi           : wide_t;
   signal three_pi         : wide_t;

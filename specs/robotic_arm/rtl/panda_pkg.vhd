@@ -1,7 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The arm: Franka Emika's Panda with its hand, in Denavit and Hartenberg's parameters after Craig.
 --
--- Joint i turns by its angle about z, behind a step by A along x, a turn by ALPHA about x, and before a step by D along z:
+-- Joint i turns by its angle about z, behind a step by A along x, a turn by ALPHA about x, and before a step by D
+-- along z:
 --   T(i) = T(i-1) * Rx(ALPHA) * Tx(A) * Rz(angle) * Tz(D)
 -- The hand at the flange is an eighth joint that does not move. Another arm of seven joints needs other numbers here.
 
@@ -15,8 +16,8 @@ package panda_pkg is
   -- Joints and hand.
   constant STEPS    : positive := JOINTS + 1;
 
-  -- Lengths in m, angles in rad and matrices are two's complement of 32 bits, from -4 to 4: more would make constants that
-  -- ghdl 2.0 cannot translate to Verilog.
+  -- Lengths in m, angles in rad and matrices are two's complement of 32 bits, from -4 to 4: more would make constants
+  -- that ghdl 2.0 cannot translate to Verilog.
   constant FRACTION : positive := 29;
 
   subtype number_t is signed(FRACTION+2 downto 0);

@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- robotic_arm/ArmState, or franka_msgs/FrankaState, to robotic_arm/ArmPoses: the poses of an arm's seven joints, measured
--- and desired, and how far those of its end effector are from what the state says.
+-- robotic_arm/ArmState, or franka_msgs/FrankaState, to robotic_arm/ArmPoses: the poses of an arm's seven joints,
+-- measured and desired, and how far those of its end effector are from what the state says.
 --
--- Two chains do the same at the same time, with the measured angles and with the desired ones; the handshakes of the first
--- stand for both. A message is taken when its result is there, and the next one is begun when that has been sent.
+-- Two chains do the same at the same time, with the measured angles and with the desired ones; the handshakes of the
+-- first stand for both. A message is taken when its result is there, and the next one is begun when that has been
+-- sent.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -18,8 +18,8 @@ package firm_cordic_table is
   -- atan(2**-index) in rad, rounded to the nearest multiple of 2**-fraction; index <= fraction <= 64.
   function arctangent(index : natural; fraction : positive) return unsigned;
 
-  -- The product of 1/sqrt(1 + 4**-i) over all i, 0.60725, cut off behind `fraction` bits; fraction <= 80. Of n rotations
-  -- it is 4**-n too small at most, which is nothing beside the angle that they leave over.
+  -- The product of 1/sqrt(1 + 4**-i) over all i, 0.60725, cut off behind `fraction` bits; fraction <= 80. Of n
+  -- rotations it is 4**-n too small at most, which is nothing beside the angle that they leave over.
   function inverse_gain(fraction : positive) return unsigned;
 
 end package firm_cordic_table;
