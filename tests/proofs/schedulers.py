@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from tests.proofs.proof import Mutation, Proof, Size
 
@@ -55,6 +56,8 @@ def _fixed_priority() -> tuple[Proof, ...]:
                 file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
             ),
             Mutation(file, "if moves = '1' then", "if kept = '0' then", ("no_grant_unasked",)),
+        ),
+        "scheduler_sticky": (
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
         ),
         "scheduler_whole_tasks": (
@@ -63,8 +66,8 @@ def _fixed_priority() -> tuple[Proof, ...]:
         ),
         "scheduler_service": (
             Mutation(file, "(started_r or beat) and not finished", "started_r or beat", ("no_deadlock",)),
-            Mutation(file, "and not kept;", "and not (kept or finished);", ("no_gap_between_tasks",)),
         ),
+        "scheduler_gaps": (Mutation(file, "and not kept;", "and not (kept or finished);", ("no_gap_between_tasks",)),),
         "scheduler_priority": (
             Mutation(
                 "firm_sched_pkg.vhd",
@@ -86,12 +89,12 @@ def _fixed_priority_preemptive() -> tuple[Proof, ...]:
                 file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
             ),
             Mutation(file, "if moves = '1' then", "if kept = '0' then", ("no_grant_unasked",)),
+        ),
+        "scheduler_sticky": (
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
         ),
-        "scheduler_service": (
-            Mutation(file, "    kept <= '0';", "    kept <= not beat;", ("no_deadlock",)),
-            Mutation(file, "    kept <= '0';", "    kept <= finished;", ("no_gap_between_tasks",)),
-        ),
+        "scheduler_service": (Mutation(file, "    kept <= '0';", "    kept <= not beat;", ("no_deadlock",)),),
+        "scheduler_gaps": (Mutation(file, "    kept <= '0';", "    kept <= finished;", ("no_gap_between_tasks",)),),
         "scheduler_priority": (Mutation(file, "    kept <= '0';", "    kept <= beat;", ("lowest_index_first",)),),
     }
     sizes = tuple({**size, "PREEMPTIVE": True} for size in _SIZES)
@@ -106,10 +109,8 @@ def _fixed_priority_runs() -> tuple[Proof, ...]:
             Mutation(file, "beats < SHORTEST_RUN else", "beats < SHORTEST_RUN-1 else", ("no_short_run",)),
         ),
         "scheduler_priority": (Mutation(file, "or finished = '1' or (moves", "or (moves", ("lowest_index_first",)),),
-        "scheduler_service": (
-            Mutation(file, "offered(0) and not finished", "not finished", ("no_deadlock",)),
-            Mutation(file, "offered(0) and not finished", "offered(0)", ("no_gap_between_tasks",)),
-        ),
+        "scheduler_service": (Mutation(file, "offered(0) and not finished", "not finished", ("no_deadlock",)),),
+        "scheduler_gaps": (Mutation(file, "offered(0) and not finished", "offered(0)", ("no_gap_between_tasks",)),),
     }
     sizes = tuple({**size, "PREEMPTIVE": True, "SHORTEST_RUN": 3} for size in _SIZES)
     helpers = "firm_sched_fixed_priority_runs"
@@ -125,6 +126,8 @@ def _round_robin() -> tuple[Proof, ...]:
                 file, "grant_select_r <= choice", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
             ),
             Mutation(file, "goes_on = '0' and found = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+        ),
+        "scheduler_sticky": (
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
         ),
         "scheduler_whole_tasks": (
@@ -133,6 +136,8 @@ def _round_robin() -> tuple[Proof, ...]:
         ),
         "scheduler_service": (
             Mutation(file, "(started_r or beat) and not (beat and last)", "started_r or beat", ("no_deadlock",)),
+        ),
+        "scheduler_gaps": (
             Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
         ),
         "scheduler_fairness": (
@@ -154,6 +159,8 @@ def _lru() -> tuple[Proof, ...]:
             Mutation(file, "<= index_of(chosen)", "<= not index_of(chosen)", ("only_to_a_requester",)),
             Mutation(file, "<= index_of(chosen)", "<= (others => '1')", ("at_most_one_grant",), _THREE),
             Mutation(file, "goes_on = '0' and any_of(eligible) = '1'", "goes_on = '0'", ("no_grant_unasked",)),
+        ),
+        "scheduler_sticky": (
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
         ),
         "scheduler_whole_tasks": (
@@ -162,6 +169,8 @@ def _lru() -> tuple[Proof, ...]:
         ),
         "scheduler_service": (
             Mutation(file, "(started_r or beat) and not (beat and last)", "started_r or beat", ("no_deadlock",)),
+        ),
+        "scheduler_gaps": (
             Mutation(file, "if goes_on = '0' and", "if (goes_on or beat) = '0' and", ("no_gap_between_tasks",)),
         ),
         "scheduler_fairness": (
@@ -178,7 +187,9 @@ _EDF_RESOURCES, _EDF_LATENCY, _LST = 4, 5, 6
 _TIMED_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources", "edf_latency", "lst")
 
 
-def _timed(policy: int, name: str, helpers: str, mutations: Mutations, requesters: tuple[int, ...]) -> tuple[Proof, ...]:
+def _timed(
+    policy: int, name: str, helpers: str, mutations: Mutations, requesters: tuple[int, ...]
+) -> tuple[Proof, ...]:
     """A policy with deadlines, in a wrapper that gives it some."""
     return _proofs(
         "by_policy",
@@ -199,19 +210,109 @@ def _parallel(policy: int, name: str) -> tuple[Proof, ...]:
     mutations = {
         "scheduler_grants": (
             Mutation(file, "grant_select_r <= id(1)", "grant_select_r <= not id(1)", ("only_to_a_requester",)),
-            Mutation(file, "grant_select_r <= id(1)", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE),
+            Mutation(
+                file, "grant_select_r <= id(1)", "grant_select_r <= (others => '1')", ("at_most_one_grant",), _THREE
+            ),
             Mutation(file, "elsif valid(1) = '1' and kept = '0' then", "elsif kept = '0' then", ("no_grant_unasked",)),
+        ),
+        "scheduler_sticky": (
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
         ),
         "scheduler_preemption": (
             Mutation(file, "beats < SHORTEST_RUN else '0'", "beats < SHORTEST_RUN-1 else '0'", ("no_short_run",)),
         ),
         "scheduler_service": (
-            Mutation(file, "and not (current(leaf) and finished);\n          end if", ";\n          end if", ("no_deadlock",)),
+            Mutation(
+                file, "and not (current(leaf) and finished);\n          end if", ";\n          end if", ("no_deadlock",)
+            ),
+        ),
+        "scheduler_gaps": (
             Mutation(file, "and not finished when beats > 0", "when beats > 0", ("no_gap_between_tasks",)),
         ),
     }
     return _timed(policy, name, f"timed_scheduler_{name}", mutations, (2, 3, 4))
+
+
+def _edf_resources() -> tuple[Proof, ...]:
+    """The engine: tasks that wait lie in memories, of which no short invariant says enough for an induction."""
+    file = "firm_sched_engine.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(
+                file,
+                "grant_select_r <= root_id",
+                "grant_select_r <= not root_id",
+                ("only_to_a_requester",),
+            ),
+            Mutation(
+                file,
+                "grant_select_r <= a_id",
+                "grant_select_r <= (others => '1')",
+                ("at_most_one_grant",),
+                _THREE,
+            ),
+            Mutation(
+                file, "if pop = '1' or take_b = '1' or take_a = '1' then", "if choose = '1' then", ("no_grant_unasked",)
+            ),
+        ),
+        "scheduler_preemption": (
+            Mutation(
+                file,
+                "beats = 0 or beats = SHORTEST_RUN",
+                "beats = 0 or beats >= SHORTEST_RUN-1",
+                ("no_short_run",),
+            ),
+        ),
+        "scheduler_service": (
+            Mutation(
+                file,
+                "choose    <= finished or not (running_r or beat)",
+                "choose    <= not (running_r or beat)",
+                ("no_deadlock",),
+            ),
+        ),
+    }
+    proofs = _timed(_EDF_RESOURCES, "edf_resources", "unknown", mutations, (2, 3, 4))
+    return tuple(
+        replace(proof, is_bounded=True, depth=12, trace=14, defines={**proof.defines, "LATENCY": 6}) for proof in proofs
+    )
+
+
+def _combined() -> tuple[Proof, ...]:
+    """Round robin among two groups, least recently used in the one and fixed priority in the other."""
+    file = "firm_sched_combined.vhd"
+    mutations = {
+        "scheduler_grants": (
+            Mutation(file, ", SELECT_BITS) + FIRST", ", SELECT_BITS) + FIRST + 1", ("at_most_one_grant",), _THREE),
+            Mutation(file, ", SELECT_BITS) + FIRST", ", SELECT_BITS) + FIRST + 1", ("only_to_a_requester",)),
+            Mutation(file, "<= group_valid(group_index) and offered(0)", "<= '1'", ("no_grant_unasked",)),
+        ),
+        "scheduler_whole_tasks": (
+            Mutation(
+                file,
+                "<= decode(top_select, beat, GROUPS)",
+                "<= (others => '0')",
+                ("whole_tasks", "only_to_who_has_not_begun"),
+                _THREE,
+            ),
+            Mutation(file, ", SELECT_BITS) + FIRST", ", SELECT_BITS) + FIRST + 1", ("request_is_still_there",)),
+        ),
+        "scheduler_service": (
+            Mutation(
+                file, "group_valid(group_index) and offered(0)", "offered(0) and not offered(0)", ("no_deadlock",)
+            ),
+        ),
+    }
+    proofs = _proofs(
+        "combined",
+        mutations,
+        entity="combined_scheduler",
+        cores=tuple(f"sched/{core}" for core in (*_TIMED_CORES, "by_policy")),
+        sources=("combined_scheduler.vhd",),
+        helpers="unknown",
+        LATENCY=2,
+    )
+    return tuple(replace(proof, is_bounded=True, depth=12) for proof in proofs)
 
 
 PROOFS = (
@@ -222,4 +323,6 @@ PROOFS = (
     *_lru(),
     *_parallel(_EDF_LATENCY, "edf_latency"),
     *_parallel(_LST, "lst"),
+    *_edf_resources(),
+    *_combined(),
 )

@@ -10,9 +10,8 @@ always @* if (running) begin
     // The grant is one index, so there is at most one; it is the index of a requester.
     if (grant_valid) at_most_one_grant: assert (grant_select < N);
 
-    // Nothing is granted before somebody asks, and then something is.
+    // Nothing is granted before somebody asks.
     if (!grant_valid_before && request_before == 0) no_grant_unasked: assert (!grant_valid || asked != 0);
-    if (grant_valid_before) grant_stays_valid: assert (grant_valid);
 
     // It moves only to a requester that has asked and was not served since.
     if (moved) only_to_a_requester: assert (asked[grant_select]);

@@ -13,15 +13,7 @@ always @(posedge clk) begin
     else if (idle != 15) idle <= idle + 1;
 end
 
-// When a task ended, another requester was waiting: since that cycle or, of a scheduler that takes its time, longer.
-reg [N-1:0] eligible_earlier;
-always @(posedge clk) eligible_earlier <= running ? eligible_before : 0;
-wire was_awaited = finished_before && (eligible_before & (`LATENCY > 1 ? eligible_earlier : {N{1'b1}})) != 0;
-
-always @* if (running) begin
-    no_deadlock: assert (idle <= `LATENCY);
-    if (was_awaited && ready && !pausing) no_gap_between_tasks: assert (beat);
-end
+always @* if (running) no_deadlock: assert (idle <= `LATENCY);
 
 `include "helpers.svh"
 
