@@ -20,7 +20,7 @@ end entity chassis;
 
 architecture behaviour of chassis is
 
-  -- 48 counts a period of control and somewhat less, as model.py has them.
+  -- 45 to 51 counts a period of control at full duty, as model.py has them.
   type speeds_t is array (0 to 3) of positive;
   constant FULL_SPEEDS : speeds_t := (80_000, 75_000, 85_000, 80_000);
 
