@@ -87,8 +87,8 @@ def test_time_wraps_around(library: Library, tmp_path: Path, policy: str, reques
 
 
 def test_stamps_of_the_idle_do_not_wrap_around(library: Library, tmp_path: Path) -> None:
-    # Twenty requesters' stamps wrap around after 1,024 completions. Where a lone one has tasks for thousands of cycles, it
-    # completes more than that, and the others come back with stamps as old.
+    # Twenty requesters' stamps wrap around after 1,024 completions. Where a lone one has tasks for thousands of
+    # cycles, it completes more than that, and the others come back with stamps as old.
     trace = trace_of(
         library, tmp_path, POLICY="lru", REQUESTERS=20, TASK_BEATS=1, STRETCH=4000, SEGMENTS=3, CYCLES=60_000
     )
@@ -228,6 +228,7 @@ end architecture wrapper;
 
 
 ILLEGAL = [
+    (-1, "PERIODS => (10, 20)", "REQUESTERS is -1; legal: 1 to 256"),
     (0, "PERIODS => (10, 20)", "REQUESTERS is 0; legal: 1 to 256"),
     (257, "PERIODS => (10, 20)", "REQUESTERS is 257; legal: 1 to 256"),
     (3, "PERIODS => (10, 20)", "PERIODS has 2 times; legal: one for each of 3 requesters"),
