@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A level of firm_sched_heap below the root: 2**LEVEL nodes, and the operation that is at this level in this cycle.
 --
--- A node is a pair's left or right one; the pairs lie under the address of their common node above, so that a pair is
--- read at once. That address is the highest LEVEL-1 bits of the operation's index.
--- INSERT compares its item with the node on the item's path: the one that comes first is the node's from now on, the
--- other goes on to the level below. FILL finds the smaller one of a pair, which the level above takes in the same cycle,
--- and goes on to the level below to fill the hole that this leaves. CLEAR empties the pair.
+-- A node is a pair's left or right one; the pairs lie under the address of their common node above, so that a pair
+-- is read at once. That address is the highest LEVEL-1 bits of the operation's index.
+-- INSERT compares its item with the node on the item's path: the one that comes first is the node's from now on,
+-- the other goes on to the level below. FILL finds the smaller one of a pair, which the level above takes in the
+-- same cycle, and goes on to the level below to fill the hole that this leaves. CLEAR empties the pair.
 --
 -- In the cycle behind a FILL no operation may come, since then the level below writes to the pair. Its address is
 -- still here, for the index changes with an operation only.
@@ -219,7 +219,8 @@ begin
     end loop;
   end process hand_down;
 
-  choose_write : process (item, insert_r, clear_r, id_r, takes_second, hole, hole_right, filler_valid, filler_id, filler_key)
+  choose_write : process (item, insert_r, clear_r, id_r, takes_second, hole, hole_right,
+                          filler_valid, filler_id, filler_key)
     variable keep_item : std_logic;
   begin
     write_node <= item;

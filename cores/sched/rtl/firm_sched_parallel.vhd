@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The scheduler of a policy with deadlines for few requesters: all tasks' keys in registers, compared with each other in
--- every cycle by a tree. The keys are those of firm_sched_engine.
+-- The scheduler of a policy with deadlines for few requesters: all tasks' keys in registers, compared with each
+-- other in every cycle by a tree. The keys are those of firm_sched_engine.
 --
--- A task is accepted in the cycle in which it is first seen, whoever else asks, and takes part in the choice in the next. The
--- smallest key has the grant; of equal keys the one of the task that has it, else that of the lowest index.
--- Nobody accepted: the grant stays.
+-- A task is accepted in the cycle in which it is first seen, whoever else asks, and takes part in the choice in the
+-- next. The smallest key has the grant; of equal keys the one of the task that has it, else that of the lowest
+-- index. Nobody accepted: the grant stays.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -138,7 +138,8 @@ begin
     signal beats   : natural range 0 to SHORTEST_RUN;  -- with that of this cycle
   begin
     beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
-    kept  <= any_of(request and current(REQUESTERS-1 downto 0)) and not finished when beats > 0 and beats < SHORTEST_RUN else '0';
+    kept  <= any_of(request and current(REQUESTERS-1 downto 0)) and not finished
+             when beats > 0 and beats < SHORTEST_RUN else '0';
 
     count_beats : process (clk)
     begin
