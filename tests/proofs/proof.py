@@ -45,10 +45,10 @@ class Mutation:
 class Proof:
     """All assertions of `harness` for an entity of `cores`, at each of `sizes`, its generics.
 
-    It is done by induction over `depth` cycles or, `is_bounded`, for all traces of so many cycles from reset; `trace` is the
-    length of those that are searched for what a mutation violates. The harness gets
-    the generics and `defines` as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `sources` are
-    VHDL files beside the harness, such as a wrapper; `helpers` is the entity's own part of a harness that is for several.
+    It is done by induction over `depth` cycles or, `is_bounded`, for all traces of so many cycles from reset; `trace`
+    is the length of those that are searched for what a mutation violates. The harness gets the generics and `defines`
+    as macros, and `PUBLISHERS_4`, for `ifdef`, where PUBLISHERS is 4. `sources` are VHDL files beside the harness, such
+    as a wrapper; `helpers` is the entity's own part of a harness that is for several.
     """
 
     harness: str

@@ -5,7 +5,7 @@
     assert outcome.is_proved, outcome.log
 
 The harness is SystemVerilog around the Verilog that `ghdl --synth` makes. Its assertions are named by labels. What it
-declares as `(* hierconn *) wire \\dut.name ;` is the signal of that name in the netlist; if there is none, it is an error.
+declares as `(* hierconn *) wire \\dut.name ;` is the signal of that name in the netlist, and must be there.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Task:
         return self._run(folder, "bmc", depth, ("check -assert",))
 
     def search(self, folder: Path, depth: int, label: str) -> Outcome:
-        """Look for a trace of `depth` cycles from reset that violates the assertion of this label; `folder` is empty."""
+        """Look for a trace of `depth` cycles from reset that violates one assertion; `folder` is empty."""
         assertion = f"{self._top}/{label}"
         only = (f"select -assert-count 1 {assertion}", f"chformal -assert -remove {self._top}/* {assertion} %d")
         return self._run(folder, "bmc", depth, only)
