@@ -1,23 +1,19 @@
-"""The schedulers that are measured: each policy's entity with constant times."""
+"""The schedulers that are measured: each policy's entity, with times spread as in the large data set of section 4.3."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-from fusesoc_firm.render import render
 from fusesoc_firm.system.specification import SCHEDULERS
-from fusesoc_firm.system.timing import PREEMPTIVE, WITH_DEADLINES, WITH_TRANSFER_TIMES
+from fusesoc_firm.system.timing import WITH_TRANSFER_TIMES
 from tests.sim.ghdl import Library, core_files
-from tests.sim.schedulers import POLICY_CORES
+from tests.sim.schedulers import ENTITIES, POLICY_CORES, wrapper
 
 POLICIES = SCHEDULERS
 TIME_BITS = 16
+SHORTEST_TIME, LONGEST_TIME = 50, 150
 
 _ENTITY = "measured_scheduler"
-# Times that have nothing in common, so that no table of them folds to a formula.
-_LONGEST_PERIOD, _LONGEST_TRANSFER_TIME = 8000, 200
 
 
 def analysed(folder: Path, policy: str, requesters: int) -> tuple[Library, str]:
@@ -25,39 +21,24 @@ def analysed(folder: Path, policy: str, requesters: int) -> tuple[Library, str]:
     firm, work = Library("firm", folder), Library("work", folder)
     firm.analyse(core_files("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES)))
     file = folder / f"{_ENTITY}.vhd"
-    file.write_text(render("scheduler.vhd", _configuration(policy, requesters), Path(__file__).parent), "ascii")
+    entity = ENTITIES[policy]
+    file.write_text(wrapper(_ENTITY, entity.entity, requesters, _generics(policy, requesters)), encoding="ascii")
     work.analyse([file])
     return work, _ENTITY
 
 
-def _configuration(policy: str, requesters: int) -> dict[str, Any]:
-    generics = {"REQUESTERS": str(requesters)}
-    constants = []
-    if policy.startswith("fixed_priority"):
-        generics["PREEMPTIVE"] = str(policy in PREEMPTIVE).lower()
-    if policy in WITH_DEADLINES:
-        generics["TIME_BITS"] = str(TIME_BITS)
-        constants.append(_times("PERIODS", [_LONGEST_PERIOD - 29 * number for number in range(requesters)]))
+def _generics(policy: str, requesters: int) -> dict[str, str]:
+    entity = ENTITIES[policy]
+    generics = {"REQUESTERS": str(requesters), **{name: str(value).lower() for name, value in entity.generics.items()}}
+    if entity.has_times:
+        generics |= {"TIME_BITS": str(TIME_BITS), "PERIODS": _times(37, requesters)}
     if policy in WITH_TRANSFER_TIMES:
-        times = [1 + 7 * number % _LONGEST_TRANSFER_TIME for number in range(requesters)]
-        constants.append(_times("TRANSFER_TIMES", times))
-    generics |= {item["name"]: item["name"] for item in constants}
-    return {
-        "entity": _ENTITY,
-        "scheduler": f"firm_sched_{policy.removesuffix('_preemptive')}",
-        "request_high": requesters - 1,
-        "select_high": max(1, (requesters - 1).bit_length()) - 1,
-        "constants": constants,
-        "generics": [
-            {"formal": name, "actual": actual, "comma": "," if number < len(generics) else ""}
-            for number, (name, actual) in enumerate(generics.items(), start=1)
-        ],
-    }
+        generics["TRANSFER_TIMES"] = _times(61, requesters)
+    return generics
 
 
-def _times(name: str, cycles: Sequence[int]) -> dict[str, Any]:
-    values = [
-        {"id": number, "cycles": value, "comma": "," if number < len(cycles) - 1 else ""}
-        for number, value in enumerate(cycles)
-    ]
-    return {"name": name, "high": len(cycles) - 1, "values": values}
+def _times(step: int, requesters: int) -> str:
+    """A time for each requester, which have nothing in common."""
+    range_of_times = LONGEST_TIME - SHORTEST_TIME + 1
+    times = (SHORTEST_TIME + step * requester % range_of_times for requester in range(requesters))
+    return f"({', '.join(f'{requester} => {time}' for requester, time in enumerate(times))})"
