@@ -19,7 +19,7 @@ TOOLS :=
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
-# Parts of the bench, all if empty: BENCH='area timing cycles fuzz'.
+# Parts of the bench, all if empty: BENCH='area timing cycles fuzz images'.
 BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
@@ -39,7 +39,7 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIO
 	  $(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)") 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator
+test: TOOLS = iverilog verilator dot:graphviz
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -57,7 +57,7 @@ else
 endif
 
 bench: TOOLS = verilator
-bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area timing cycles fuzz'
+bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area timing cycles fuzz images'
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import fnmatch
+import json
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -13,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from fusesoc_firm import __version__
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.library_path import library_root
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.derived import Interface
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.message.model import MessageDefinition, MessageName
+    from fusesoc_firm.system.generator import LoadedSystem
 
 STAGES = ("tree", "message", "frame", "config", "vhdl")
 
@@ -58,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_message(commands)
     _add_system(commands)
+    _add_scheduler(commands)
     return parser
 
 
@@ -130,15 +133,97 @@ def _positive(text: str) -> int:
 def _add_system(commands: Any) -> None:
     system = _command(commands, "system", "look at system specifications", "firm system check robot.yaml")
     actions = system.add_subparsers(title="actions", metavar="ACTION", required=True)
+    new = _command(
+        actions,
+        "new",
+        "ask for a specification and write it, or extend one that is there",
+        "firm system new robot.yaml",
+        _new_system,
+    )
     check = _command(
         actions, "check", "report all faults of a specification", "firm system check robot.yaml", _check_system
     )
     show = _command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
     )
-    for parser in (check, show):
+    skeletons = _command(
+        actions,
+        "skeleton",
+        "write a first version of each accelerator that has no source",
+        "firm system skeleton robot.yaml",
+        _write_skeletons,
+    )
+    draw = _command(
+        actions,
+        "diagram",
+        "draw a system: blocks, messages, widths and ids",
+        "firm system diagram robot.yaml -o robot.svg",
+        _draw_system,
+    )
+    draw.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where to write it (default: print it)")
+    draw.add_argument("--format", choices=("svg", "dot"), default="svg", help="of the picture (default: svg)")
+    report = _command(
+        actions,
+        "report",
+        "count the lines that are written and those that are generated of them",
+        "firm system report robot.yaml",
+        _report_system,
+    )
+    for parser in (new, check, show, skeletons, draw, report):
         parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
         _add_sources(parser)
+    _command(
+        actions,
+        "schema",
+        "print the grammar of specifications as a JSON Schema, for editors",
+        "firm system schema > specification.schema.json",
+        _print_schema,
+    )
+
+
+def _add_scheduler(commands: Any) -> None:
+    scheduler = _command(commands, "scheduler", "evaluate and choose schedulers", "firm scheduler choose robot.yaml")
+    actions = scheduler.add_subparsers(title="actions", metavar="ACTION", required=True)
+    bench = _command(
+        actions,
+        "bench",
+        "evaluate the schedulers by cycle-exact models, as the dissertation's section 4.3 does",
+        "firm scheduler bench --dataset all --output evaluation",
+        _bench_schedulers,
+    )
+    lists = "names with commas between (default: %(default)s)"
+    bench.add_argument("--dataset", default="large", metavar="NAMES", help=f"large, cc1 to cc4, or all; {lists}")
+    bench.add_argument("--policies", default="all", metavar="NAMES", help=f"schedulers; {lists}")
+    bench.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
+    bench.add_argument("--sets", type=_positive, metavar="N", help="sets of each data set (default: its own)")
+    bench.add_argument("--cycles", type=_positive, metavar="N", help="cycles of each simulation (default: its own)")
+    bench.add_argument("--seed", type=int, default=1, metavar="N", help="all randomness follows from it (default: 1)")
+    bench.add_argument(
+        "--distribution", choices=("normal", "uniform"), default="normal", help="how times spread (default: normal)"
+    )
+    bench.add_argument("--jobs", type=_positive, metavar="N", help="simulations at once (default: one a core)")
+    bench.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
+    bench.add_argument(
+        "--output", type=Path, metavar="DIR", help="write a report, every table and figure into a folder"
+    )
+    bench.add_argument("--csv", type=Path, metavar="F.csv", help="write all metrics of all simulations into one table")
+    choose = _command(
+        actions,
+        "choose",
+        "find the best scheduler for a specification, and the buffers it needs",
+        "firm scheduler choose robot.yaml --criterion lateness",
+        _choose_scheduler,
+    )
+    choose.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    choose.add_argument(
+        "--criterion",
+        choices=("luts", "lateness", "finish"),
+        default="luts",
+        help="fewest LUTs with all deadlines held, smallest worst lateness, or fewest LUTs with nobody starving "
+        "(default: luts)",
+    )
+    choose.add_argument("--format", choices=("text", "yaml", "json"), default="text", help="default: text")
+    _add_sources(choose)
 
 
 def _add_definitions(parser: argparse.ArgumentParser) -> None:
@@ -255,7 +340,7 @@ def _converters(stage: str, frame: Any, definitions: dict[MessageName, MessageDe
 
 
 def _check_system(arguments: argparse.Namespace) -> None:
-    system = _load(arguments)
+    system = _load(arguments).system
     counts = [
         (len(system.subscribers), "subscriber"),
         (len(system.accelerators), "accelerator"),
@@ -268,14 +353,100 @@ def _check_system(arguments: argparse.Namespace) -> None:
 def _show_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.show import derived_description
 
-    print(_yaml(derived_description(_load(arguments))), end="")
+    print(_yaml(derived_description(_load(arguments).system)), end="")
 
 
-def _load(arguments: argparse.Namespace) -> Any:
+def _new_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.prompts import asker
+    from fusesoc_firm.system.wizard import extend_specification
+
+    if arguments.spec.exists():
+        _check_system(arguments)
+    extend_specification(arguments.spec, asker(), lambda: _message_names(arguments))
+    _check_system(arguments)
+
+
+def _message_names(arguments: argparse.Namespace) -> list[str]:
+    return sorted({str(name) for ros in (1, 2) for name in _library(arguments, ros).names()})
+
+
+def _write_skeletons(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.skeleton import missing_sources
+
+    loaded = _load(arguments, needs_sources=False)
+    texts = missing_sources(loaded.system, loaded.folder)
+    for path, text in texts.items():
+        _write(path, text)
+        print(path)
+    if not texts:
+        print("every accelerator has a source")
+
+
+def _draw_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.diagram import diagram
+
+    picture = diagram(_load(arguments).system, arguments.format)
+    if arguments.output:
+        _write(arguments.output, picture)
+    else:
+        print(picture, end="")
+
+
+def _report_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.report import report
+
+    print(report(arguments.spec, _load(arguments)), end="")
+
+
+def _print_schema(_: argparse.Namespace) -> None:
+    from fusesoc_firm.system.specification import Specification
+    from fusesoc_firm.yaml_schema import json_schema
+
+    print(json.dumps(json_schema(Specification, "System specification of fusesoc_firm"), indent=2))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
+
+
+def _bench_schedulers(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.scheduling.bench import Places, Selection, bench, names_of, numbers_of
+    from fusesoc_firm.scheduling.evaluation import Settings
+    from fusesoc_firm.scheduling.models import POLICIES
+    from fusesoc_firm.scheduling.workloads import DATA_SETS, REQUESTERS, Distribution
+
+    def names(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
+        return tuple(legal) if text == "all" else names_of(text, legal, what)
+
+    selection = Selection(
+        names(arguments.dataset, list(DATA_SETS), "data set"),
+        names(arguments.policies, list(POLICIES), "policy"),
+        numbers_of(arguments.requesters) if arguments.requesters else REQUESTERS,
+        Settings(arguments.seed, arguments.sets, arguments.cycles, Distribution(arguments.distribution)),
+    )
+    bench(selection, Places(arguments.jobs, arguments.cluster, arguments.output, arguments.csv))
+
+
+def _choose_scheduler(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.scheduling.analysis import Criterion, choose
+    from fusesoc_firm.scheduling.choice import show
+    from fusesoc_firm.system.timing import channel_of, tasks_of
+
+    system = _load(arguments).system
+    choice = choose(tasks_of(system), Criterion(arguments.criterion), channel_of(system))
+    print(show(choice, arguments.format), end="")
+
+
+def _load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
     from fusesoc_firm.message.library import libraries
     from fusesoc_firm.system.generator import load_system
 
-    return load_system(arguments.spec, libraries(arguments.path, os.environ, arguments.distro)).system
+    known = libraries(arguments.path, os.environ, arguments.distro)
+    return load_system(arguments.spec, known, needs_sources=needs_sources)
 
 
 def _yaml(data: dict[str, Any]) -> str:

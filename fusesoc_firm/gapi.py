@@ -106,6 +106,9 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation")),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
             Parameter("model", "str", "a Python file with the function that says what the system answers"),
+            Parameter(
+                "environment", "list", "VHDL files that play what is at the pins; the last is called as its entity"
+            ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
             _PATHS,

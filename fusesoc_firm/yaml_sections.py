@@ -33,6 +33,7 @@ class Key:
 
     `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list), the last two of type
     `section`. `aliases` are other spellings of the key. `choices` are all legal values, if they can be listed.
+    `only_of` is the kind of thing that may have the key, where its section tells of several kinds.
     """
 
     meaning: str
@@ -42,6 +43,7 @@ class Key:
     is_required: bool = False
     choices: tuple[str | int, ...] = ()
     section: type[Section] | None = None
+    only_of: str = ""
 
 
 def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
@@ -59,6 +61,11 @@ def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
         for field in dataclasses.fields(section)
         if "key" in field.metadata
     }
+
+
+def keys_only_of(section: type[Section], kind: str) -> list[str]:
+    """The names of the keys that only this kind of thing may have."""
+    return [name for name, (_, entry) in keys_of(section).items() if entry.only_of == kind]
 
 
 def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics, what: str) -> S:

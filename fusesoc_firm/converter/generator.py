@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import (
     CONSTANTS_TEMPLATE,
     constants_configuration,
@@ -56,13 +56,20 @@ def generate(request: Request) -> GeneratedCore:
 
 def constants_files(messages: Sequence[tuple[MessageName, Definitions]]) -> dict[str, GeneratedFile]:
     """The package of each message, of which none comes twice; the definitions are of it and all within it."""
+    return {
+        path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
+        for path, configuration in constants_configurations(messages)
+    }
+
+
+def constants_configurations(
+    messages: Sequence[tuple[MessageName, Definitions]],
+) -> Iterator[tuple[str, Configuration]]:
+    """The file of each message's package, and what it is rendered from."""
     counts = Counter(name for name, _ in messages)
-    files = {}
     for name, definitions in messages:
         package = constants_package(name, definitions[name].ros if counts[name] > 1 else None)
-        text = render(CONSTANTS_TEMPLATE, constants_configuration(name, definitions, package))
-        files[f"{package}.vhd"] = GeneratedFile(text, VHDL)
-    return files
+        yield f"{package}.vhd", constants_configuration(name, definitions, package)
 
 
 def subscriber_files(frames: Iterable[Frame], width: int, suffix: str = "") -> dict[str, GeneratedFile]:

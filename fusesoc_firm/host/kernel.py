@@ -11,7 +11,14 @@ from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.render import render
 from fusesoc_firm.system.derived import AcceleratorType
-from fusesoc_firm.system.hls import KERNEL_TEMPLATE, SHIM_TEMPLATE, function_name, kernel_configuration, library_name
+from fusesoc_firm.system.hls import (
+    KERNEL_TEMPLATE,
+    SHIM_TEMPLATE,
+    function_name,
+    kernel_configuration,
+    library_name,
+    prototype,
+)
 
 _COMPILER = "g++"
 # Results must not depend on the processor (no contraction to fused operations), nor the file on its build (no
@@ -66,7 +73,7 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
             fail(
                 f"the C++ of '{name}' does not compile:\n{result.stderr.rstrip()}",
                 first.source,
-                f"expected: {_prototype(accelerator)}",
+                f"expected: {prototype(accelerator)}",
             )
         _check_included(accelerator, folder, place)
         return (place / "kernel.so").read_bytes()
@@ -87,11 +94,3 @@ def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> 
             accelerator.accelerator.sources[0].source,
             "list it under 'sources', too, so that a change of it is noticed",
         )
-
-
-def _prototype(accelerator: AcceleratorType) -> str:
-    """The function as it must be declared."""
-    configuration = kernel_configuration(accelerator)
-    inputs = [f"{item['cpp_type']} {item['name']}" for item in configuration["inputs"]]
-    outputs = [f"{item['cpp_type']} *{item['name']}" for item in configuration["outputs"]]
-    return f"void {function_name(accelerator)}({', '.join(inputs + outputs)})"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.diagnostics import SourceRef, fail
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
+from fusesoc_firm.host.environment import environment_files
 from fusesoc_firm.host.frames import expected_text, stimulus_text
 from fusesoc_firm.host.kernel import kernel_files
 from fusesoc_firm.host.reference import responses
@@ -16,8 +17,9 @@ from fusesoc_firm.system.configuration import TEST_BENCH_TEMPLATE, test_bench_co
 
 
 def inputs(request: Request) -> list[Path]:
-    """What the system depends on, and the stimuli and the model."""
-    return [*generator.inputs(request), *_bag_files(_path(request, "stimuli")), _path(request, "model")]
+    """What the system depends on, the stimuli, the model, and the environment."""
+    stimuli, model = _path(request, "stimuli"), _path(request, "model")
+    return [*generator.inputs(request), *_bag_files(stimuli), model, *_environment(request)]
 
 
 def generate(request: Request) -> GeneratedCore:
@@ -33,7 +35,10 @@ def generate(request: Request) -> GeneratedCore:
     seed, stall_percent = request.parameters["seed"], request.parameters["stall_percent"]
     assert isinstance(seed, int)
     assert isinstance(stall_percent, int)
-    bench = render(TEST_BENCH_TEMPLATE, test_bench_configuration(system, seed, stall_percent))
+    environment = environment_files(_environment(request), system)
+    entity = [*environment][-1].stem if environment else None
+    bench = render(TEST_BENCH_TEMPLATE, test_bench_configuration(system, seed, stall_percent, entity))
+    files |= {str(path): file for path, file in environment.items()}
     files |= {
         f"{system.entity}_tb.vhd": GeneratedFile(bench, "vhdlSource-93"),
         "stimulus.txt": GeneratedFile(stimulus_text(stimuli), "user", copyto="stimulus.txt"),
@@ -47,6 +52,11 @@ def _path(request: Request, parameter: str) -> Path:
     if value is None:
         fail(f"{request.name}: product 'simulation' needs the parameter '{parameter}'")
     return request.files_root / str(value)
+
+
+def _environment(request: Request) -> dict[Path, SourceRef | None]:
+    """The files of the environment, each with its place in the requesting core."""
+    return {request.files_root / file: source for file, source in request.listed("environment").items()}
 
 
 def _bag_files(path: Path) -> list[Path]:

@@ -31,7 +31,11 @@ from fusesoc_firm.system.derived import (
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
+from fusesoc_firm.system.pins import check_pins
+from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.specification import (
+    CONVERTER,
+    PUBLISHER,
     SOURCE_SUFFIXES,
     Accelerator,
     Block,
@@ -40,18 +44,26 @@ from fusesoc_firm.system.specification import (
     Specification,
 )
 from fusesoc_firm.system.timing import scheduling_of
+from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text
 
 Libraries = Mapping[RosVersion, MessageLibrary]
 _MOST_CONVERTERS = 256
 
 
-def derive(specification: Specification, folder: Path, libraries: Libraries, faults: Diagnostics) -> DerivedSystem:
-    """The system that a specification in `folder` describes.
+def derive(
+    specification: Specification,
+    folder: Path,
+    libraries: Libraries,
+    faults: Diagnostics,
+    *,
+    needs_sources: bool = True,
+) -> DerivedSystem:
+    """The system that a specification in `folder` describes; unless it `needs_sources`, those may be missing.
 
     Raises `InputError` with the faults found here and those already in `faults`.
     """
-    analysis = _Analysis(specification, folder, libraries, faults)
+    analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
     analysis.check_names()
     analysis.resolve_accelerators()
     analysis.resolve_blocks()
@@ -101,6 +113,7 @@ class _Analysis:
     folder: Path
     libraries: Libraries
     faults: Diagnostics
+    needs_sources: bool
     types: dict[str, AcceleratorType] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
     inputs: dict[str, tuple[MessageSide, ...]] = field(default_factory=dict)
@@ -135,16 +148,18 @@ class _Analysis:
             outputs = self._sides("out", accelerator.interface.output)
             if inputs is None or outputs is None or not accelerator.interface.is_sound or not accelerator.name:
                 continue
-            found = AcceleratorType(accelerator, inputs, outputs)
+            sources = [self.folder / source for source in accelerator.sources]
+            found = AcceleratorType(accelerator, inputs, outputs, declares_width(accelerator, sources))
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
                 check_kernel(found, self.faults)
+            check_pins(found, self.specification.project.width, self.faults)
 
     def _check_sources(self, accelerator: Accelerator) -> None:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())
         for source in accelerator.sources:
-            if not (self.folder / source).is_file():
-                hint = "paths are relative to the specification"
+            if self.needs_sources and not (self.folder / source).is_file():
+                hint = "paths are relative to the specification; 'firm system skeleton' writes a first version"
                 self.faults.error(f"there is no source file '{source}'", source.source, hint)
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
                 hint = f"legal here: {', '.join(legal)}"
@@ -198,7 +213,7 @@ class _Analysis:
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
             self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, nearest(block.type, names))
-        for key in ("middleware", "mode", "message", "include", "exclude"):
+        for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
                 self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", source)
@@ -226,7 +241,7 @@ class _Analysis:
             self.outputs[block.name] = (MessageSide("", frame),) if is_subscriber else ()
 
     def _check_no_publisher_keys(self, block: Block) -> None:
-        for key in ("buffer", "period", "wcet", "deadline"):
+        for key in keys_only_of(Block, PUBLISHER):
             if getattr(block, key) is not None:
                 message = f"'{key}' belongs to a publisher, but '{block.name}' is none"
                 self.faults.error(message, block.name.source)

@@ -34,6 +34,7 @@ from fusesoc_firm.system.sides import (
     handshakes,
     side_ports,
 )
+from fusesoc_firm.system.specification import DIRECTIONS
 from fusesoc_firm.system.timing import WITH_DEADLINES, WITH_TRANSFER_TIMES
 
 Configuration = dict[str, Any]
@@ -41,11 +42,15 @@ Configuration = dict[str, Any]
 SYSTEM_TEMPLATE = "vhdl/system.vhd"
 TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
 
-# Signals and ports of the top level's own: no block's signal may be called so.
+# Names of the top level's own, and of its test bench: no block's signal or pin may be called so.
 _TAKEN = """
     clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
     s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tid m_axis_tvalid m_axis_tlast m_axis_tready
+    to_tdata to_tkeep to_tvalid to_tlast to_tready
+    from_tdata from_tkeep from_tid from_tvalid from_tlast from_tready
+    burst_tdata burst_tkeep burst_tid burst_tvalid burst_tlast burst_tready
+    u_host u_system u_join u_environment
     sub_axis_tdata sub_axis_tkeep sub_axis_tlast sub_axis_tvalid sub_axis_tready
     pub_axis_tdata pub_axis_tkeep pub_axis_tvalid pub_axis_tlast pub_axis_tready
     sched_request sched_beat sched_last sched_grant_valid sched_grant_select
@@ -79,19 +84,63 @@ def system_configuration(system: DerivedSystem) -> Configuration:
         "subscribers": [_subscriber(names, converter, system) for converter in system.subscribers],
         "publishers": [_publisher(names, converter, system) for converter in system.publishers],
         "accelerators": [_accelerator(names, block, system.width) for block in system.accelerators],
+        "pins": _pins(names, system),
         "connections": _connections(names, system),
     }
 
 
-def test_bench_configuration(system: DerivedSystem, seed: int, stall_percent: int) -> Configuration:
-    """The configuration of the test bench: the simulated host beside the system."""
+def test_bench_configuration(
+    system: DerivedSystem, seed: int, stall_percent: int, environment: str | None
+) -> Configuration:
+    """The configuration of the test bench: the simulated host beside the system, and at its pins the `environment`.
+
+    That is an entity with `clk`, `rst_n` and the pins, each in the other direction.
+    """
+    pins = _pins(_Names(system), system)
+    formals = ["clk", "rst_n", *(str(port["formal"]) for group in pins for port in group["ports"])]
     return {
+        "pins": pins,
+        "environment": {"entity": environment, "ports": port_map((name, name) for name in formals)}
+        if environment
+        else None,
         **_dimensions(system),
         "seed": seed,
         "stall_percent": stall_percent,
         "is_preemptive": system.scheduling.is_preemptive,
         "from": "burst" if system.scheduling.is_preemptive else "from",
     }
+
+
+def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
+    """What the pins of blocks are called at the top level, by block and name."""
+    names = _Names(system)
+    return {
+        (block.block, pin.name): names.port(block.block, pin.name)
+        for block in system.accelerators
+        for pin in block.type.accelerator.pins
+    }
+
+
+def _pins(names: _Names, system: DerivedSystem) -> list[Configuration]:
+    """The pins of each block that has some, as ports of the top level."""
+    groups = []
+    for block in system.accelerators:
+        pins = block.type.accelerator.pins
+        formals = [names.port(block.block, pin.name) for pin in pins]
+        column = max(map(len, formals), default=0)
+        ports = [
+            {
+                "formal": formal,
+                "name": formal.ljust(column),
+                "direction": str(pin.direction).ljust(max(map(len, DIRECTIONS))),
+                "type": vhdl_type(pin.bits),
+                "low": "'0'" if pin.bits is None else "(others => '0')",
+            }
+            for pin, formal in zip(pins, formals, strict=True)
+        ]
+        if ports:
+            groups.append({"block": block.block, "ports": ports})
+    return groups
 
 
 def _dimensions(system: DerivedSystem) -> Configuration:
@@ -227,7 +276,9 @@ class _Names:
         signals = [_fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)]
         signals += [(block, "", word) for block in buffered for word in _FRAME_SIGNALS]
         signals += [_length_key(item.source) for item in system.connections if _is_found_out(item)]
-        keys: list[tuple[str, ...]] = [*ports, *signals]
+        # Pins first: who connects them should find them under the names they ask for.
+        pins = [(block.block, pin.name) for block in system.accelerators for pin in block.type.accelerator.pins]
+        keys: list[tuple[str, ...]] = [*pins, *ports, *signals]
         self._signals: Mapping[tuple[str, ...], str] = dict(
             zip(keys, distinct_identifiers(keys, reserved), strict=True)
         )
@@ -385,8 +436,11 @@ def _buffer(names: _Names, converter: Converter, system: DerivedSystem) -> Confi
 
 def _accelerator(names: _Names, block: AcceleratorBlock, width: int) -> Configuration:
     formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type, width)]
+    formals += [str(pin.name) for pin in block.type.accelerator.pins]
     return {
         **_instance(names, block.block, accelerator_entity(block.type)),
+        "has_width": block.type.has_width,
+        "width": width,
         "ports": port_map(
             [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names.port(block.block, formal)) for formal in formals)]
         ),

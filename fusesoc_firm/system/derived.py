@@ -67,11 +67,12 @@ class MessageSide:
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with its messages resolved."""
+    """An accelerator with its messages resolved; `has_width` if its entity is to be told the streams' width."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
     outputs: tuple[MessageSide, ...]
+    has_width: bool = False
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,8 @@ class PublisherTimes:
 class Scheduling:
     """Who may send to the host next: a policy, with the times of the publishers in the order of their ids.
 
-    A preemptive policy interrupts a frame after `shortest_run` beats at the soonest. Its times have `time_bits`.
+    A preemptive policy interrupts a frame after `shortest_run` beats at the soonest. Its times have `time_bits`. If the
+    policy was not given but chosen, `reasons` say why so.
     """
 
     policy: str
@@ -133,6 +135,7 @@ class Scheduling:
     is_preemptive: bool
     shortest_run: int
     time_bits: int
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

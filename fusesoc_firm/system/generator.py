@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.generator import (
-    VHDL,
-    constants_files,
-    library_sources,
-    publisher_files,
-    subscriber_files,
-)
+from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
+from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
+from fusesoc_firm.converter.generator import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
+from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
@@ -23,7 +23,7 @@ from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
 from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
-from fusesoc_firm.system.hls import wrapper_file
+from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, wrapper_configuration
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
 
 
@@ -53,11 +53,14 @@ class LoadedSystem:
         return list(dict.fromkeys(found))
 
 
-def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary]) -> LoadedSystem:
-    """Read and derive the system of a specification. Raises `InputError` with all its faults."""
+def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary], *, needs_sources: bool = True) -> LoadedSystem:
+    """Read and derive the system of a specification. Raises `InputError` with all its faults.
+
+    Unless it `needs_sources`, those of accelerators may be missing.
+    """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
-    system = derive(specification, path.parent, libraries, faults)
+    system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system)
 
 
@@ -76,39 +79,76 @@ def inputs(request: Request) -> list[Path]:
     return [specification_path(request), *load_requested(request).inputs()]
 
 
+class Part(Enum):
+    """What a generated file is for, as the dissertation's table 6.2 tells them apart."""
+
+    CONVERTERS = "converters"
+    WRAPPERS = "wrappers"
+    COMPONENTS = "components"
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A generated file: what it is called, what it is for, and what it is rendered from."""
+
+    path: str
+    part: Part
+    template: str
+    configuration: Configuration
+
+    @cached_property
+    def text(self) -> str:
+        """Its content."""
+        return render(self.template, self.configuration)
+
+
+def artifacts(loaded: LoadedSystem) -> list[Artifact]:
+    """Every file that is generated for a system, once, in the order in which a tool reads them, the top level last."""
+    return list({item.path: item for item in _artifacts(loaded)}.values())
+
+
+def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
+    system = loaded.system
+    for path, configuration in constants_configurations(loaded.messages()):
+        yield Artifact(path, Part.CONVERTERS, CONSTANTS_TEMPLATE, configuration)
+    for item in system.subscribers:
+        source = subscriber_source(item.frame, system.width, item.suffix)
+        yield Artifact(f"{subscriber_entity(item.frame, item.suffix)}.vhd", Part.CONVERTERS, *source)
+    for item in system.publishers:
+        source = publisher_source(item.frame, system.width, item.suffix)
+        yield Artifact(f"{publisher_entity(item.frame, item.suffix)}.vhd", Part.CONVERTERS, *source)
+    for frame, suffix in system.computed_lengths.items():
+        configuration = payload_length_configuration(frame, suffix)
+        yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
+    for type_ in system.accelerator_types:
+        if type_.accelerator.type == "HLS":
+            configuration = wrapper_configuration(type_, system.width)
+            yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
+    yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
+
+
 def generate(request: Request) -> GeneratedCore:
     """The system as a core, its files in the order in which a tool reads them. Raises `InputError`."""
     loaded = load_requested(request)
     system = loaded.system
-    files = constants_files(loaded.messages())
-    for converter in system.subscribers:
-        files |= subscriber_files([converter.frame], system.width, converter.suffix)
-    for converter in system.publishers:
-        files |= publisher_files([converter.frame], system.width, converter.suffix)
-    for frame, suffix in system.computed_lengths.items():
-        text = render(LENGTH_TEMPLATE, payload_length_configuration(frame, suffix))
-        files[f"{length_entity(frame, suffix)}.vhd"] = GeneratedFile(text, VHDL)
-    sources: set[Path] = set()
-    for accelerator in system.accelerator_types:
-        files |= _accelerator_files(accelerator, system.width, loaded.folder, sources)
-    files[f"{system.entity}.vhd"] = GeneratedFile(render(SYSTEM_TEMPLATE, system_configuration(system)), VHDL)
-    return GeneratedCore(f"System {system.name}", files)
+    made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
+    top = f"{system.entity}.vhd"
+    files = {path: file for path, file in made.items() if path != top}
+    files |= _sources(system.accelerator_types, loaded.folder)
+    return GeneratedCore(f"System {system.name}", files | {top: made[top]})
 
 
-def _accelerator_files(type_: AcceleratorType, width: int, folder: Path, taken: set[Path]) -> dict[str, GeneratedFile]:
-    """The user's VHDL, or the wrapper around the user's C++.
-
-    `taken` are the sources that the core has already: a package of two accelerators must not be analysed twice.
-    """
-    accelerator = type_.accelerator
-    if accelerator.type == "HLS":
-        return wrapper_file(type_, width)
+def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:
+    """The user's VHDL; a package of two accelerators is there once, as it must not be analysed twice."""
     files: dict[str, GeneratedFile] = {}
-    for source in accelerator.sources:
-        path = (folder / source).resolve()
-        if path not in taken:
-            files[source_name(accelerator, source)] = GeneratedFile(path.read_bytes(), VHDL)
-            taken.add(path)
+    taken: set[Path] = set()
+    for type_ in types:
+        accelerator = type_.accelerator
+        for source in accelerator.sources if accelerator.type == "VHDL" else ():
+            path = (folder / source).resolve()
+            if path not in taken:
+                files[source_name(accelerator, source)] = GeneratedFile(path.read_bytes(), VHDL)
+                taken.add(path)
     return files
 
 

@@ -15,14 +15,11 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Any
 
-from fusesoc_firm.converter.generator import VHDL
 from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
 from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.naming import distinct_identifiers, identifier
-from fusesoc_firm.render import render
 from fusesoc_firm.system.configuration import accelerator_entity, port_map
 from fusesoc_firm.system.derived import AcceleratorType, MessageSide
 from fusesoc_firm.system.sides import accelerator_ports
@@ -76,12 +73,6 @@ def library_name(accelerator: AcceleratorType) -> str:
     return f"lib{function_name(accelerator)}.so"
 
 
-def wrapper_file(accelerator: AcceleratorType, width: int) -> dict[str, GeneratedFile]:
-    """The wrapper's VHDL, for simulation and synthesis alike."""
-    entity = accelerator_entity(accelerator)
-    return {f"{entity}.vhd": GeneratedFile(render(WRAPPER_TEMPLATE, wrapper_configuration(accelerator, width)), VHDL)}
-
-
 def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:
     """The function's inputs and outputs, of an accelerator that `check_kernel` has no fault to note in."""
     inputs = [(side, field) for side in accelerator.inputs for field in field_ports(side.frame)]
@@ -97,6 +88,14 @@ def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[
         word = found[-1].word + found[-1].words if found else 0
         found.append(Argument(name, f"{side.prefix}{field.name}", field, word))
     return found
+
+
+def prototype(accelerator: AcceleratorType) -> str:
+    """The function as it must be declared."""
+    inputs, outputs = arguments(accelerator)
+    parameters = [f"{_cpp_type(item)} {item.port}" for item in inputs]
+    parameters += [f"{_cpp_type(item)} *{item.port}" for item in outputs]
+    return f"void {function_name(accelerator)}({', '.join(parameters)})"
 
 
 def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.system.configuration import accelerator_entity
+from fusesoc_firm.system.configuration import accelerator_entity, top_level_pins
 from fusesoc_firm.system.derived import (
+    AcceleratorBlock,
     Connection,
     Converter,
     DerivedSystem,
@@ -47,11 +48,26 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
                 "entity": accelerator_entity(block.type),
                 "type": str(block.type.accelerator.type),
                 "sources": [str(source) for source in block.type.accelerator.sources],
+                **_pins(block, top_level_pins(system)),
             }
             for block in system.accelerators
         ],
         "Connections": list(_connections(system.connections, system.width)),
     }
+
+
+def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict[str, Any]:
+    """The pins of a block, with the ports of the top level that they are."""
+    pins = [
+        {
+            "name": str(pin.name),
+            "direction": str(pin.direction),
+            "bits": pin.bits or 1,
+            "port": names[block.block, pin.name],
+        }
+        for pin in block.type.accelerator.pins
+    ]
+    return {"pins": pins} if pins else {}
 
 
 def _converter(converter: Converter, entity: str) -> dict[str, Any]:
@@ -82,6 +98,8 @@ def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any
 
 def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
     shown: dict[str, Any] = {"scheduler": scheduling.policy}
+    if scheduling.reasons:
+        shown["because"] = [*scheduling.reasons]
     return shown | ({"shortestRun": scheduling.shortest_run} if scheduling.is_preemptive else {})
 
 

@@ -18,7 +18,9 @@ from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 # The types of accelerators, each with the endings of its sources' names.
 SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
-MODES = ("subscriber", "publisher")
+SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
+# A block that is no accelerator.
+CONVERTER = "converter"
 # Cores of robot:sched, each with the policy it is called after.
 SCHEDULERS = (
     "fixed_priority",
@@ -29,7 +31,10 @@ SCHEDULERS = (
     "edf_latency",
     "lst",
 )
+# The smallest of these that holds all deadlines.
+AUTO_SCHEDULER = "auto"
 LENGTHS = ("computed", "given", "buffered")
+DIRECTIONS = ("in", "out")
 
 _INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
 _EXCLUDE = {"form": "texts", "meaning": "none of these fields"}
@@ -44,7 +49,9 @@ class Project(Section):
     # The dissertation's listings 6.1, 6.6 and 5.1 spell it in three ways.
     fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
     width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
-    scheduler: Text = key("who may send to the host next", choices=SCHEDULERS, default=Text(SCHEDULERS[0]))
+    scheduler: Text = key(
+        "who may send to the host next", choices=(*SCHEDULERS, AUTO_SCHEDULER), default=Text(SCHEDULERS[0])
+    )
     shortest_run: int = key(
         "beats that a publisher sends at least before a preemptive scheduler interrupts it",
         name="shortestRun",
@@ -80,6 +87,15 @@ class Interface(Section):
 
 
 @dataclass(frozen=True)
+class Pin(Section):
+    """A port of an accelerator that is none of a message: it leads out of the system."""
+
+    name: Text = key("the port's name; at the top level it is <block>_<name>", is_required=True)
+    direction: Text = key("which way it leads, as the accelerator sees it", is_required=True, choices=DIRECTIONS)
+    bits: int | None = key("bits of a std_logic_vector; without it the port is a std_logic", form="integer")
+
+
+@dataclass(frozen=True)
 class Accelerator(Section):
     """A type of accelerator; blocks are its instances."""
 
@@ -87,6 +103,7 @@ class Accelerator(Section):
     type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
     sources: tuple[Text, ...] = key("its source files, relative to the specification", form="texts", is_required=True)
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
+    pins: tuple[Pin, ...] = key("its ports that lead out of the system", form="sections", section=Pin)
 
 
 @dataclass(frozen=True)
@@ -104,15 +121,23 @@ class Block(Section):
 
     name: Text = key("the block's name", is_required=True)
     type: Text | None = key("the accelerator it is an instance of; empty for a converter")
-    middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES))
-    mode: Text | None = key("which way a converter works", choices=MODES)
-    message: Text | None = key("a converter's message")
-    include: tuple[Text, ...] = key(**_INCLUDE)
-    exclude: tuple[Text, ...] = key(**_EXCLUDE)
-    buffer: int | None = key("bytes of the longest payload of a publisher that stores frames whole", form="integer")
-    period: Text | None = key("time between two messages of a publisher: cycles, 10 ms, or a rate such as 100 Hz")
-    wcet: Text | None = key("longest time that a publisher's frame takes to be sent; known where the size is")
-    deadline: Text | None = key("time from a publisher's request to the end of its frame; its period unless given")
+    middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES), only_of=CONVERTER)
+    mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
+    message: Text | None = key("a converter's message", only_of=CONVERTER)
+    include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
+    buffer: int | None = key(
+        "bytes of the longest payload of a publisher that stores frames whole", form="integer", only_of=PUBLISHER
+    )
+    period: Text | None = key(
+        "time between two messages of a publisher: cycles, 10 ms, or a rate such as 100 Hz", only_of=PUBLISHER
+    )
+    wcet: Text | None = key(
+        "longest time that a publisher's frame takes to be sent; known where the size is", only_of=PUBLISHER
+    )
+    deadline: Text | None = key(
+        "time from a publisher's request to the end of its frame; its period unless given", only_of=PUBLISHER
+    )
     outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
 
 

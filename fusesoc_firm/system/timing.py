@@ -12,12 +12,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, floor
+from typing import TYPE_CHECKING
 
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.length import length_of
-from fusesoc_firm.system.derived import Converter, PublisherTimes, Scheduling
-from fusesoc_firm.system.specification import Block, Project
+from fusesoc_firm.scheduling.tasks import Task
+from fusesoc_firm.system.derived import Converter, DerivedSystem, PublisherTimes, Scheduling
+from fusesoc_firm.system.specification import AUTO_SCHEDULER, SCHEDULERS, Block, Project
 from fusesoc_firm.yaml_text import Text
+
+if TYPE_CHECKING:
+    from fusesoc_firm.scheduling.analysis import Channel
 
 # Policies that may interrupt a frame, that compare deadlines, and that compare what is left of them.
 PREEMPTIVE = ("fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
@@ -44,10 +49,56 @@ def scheduling_of(
     """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted."""
     reader = _Reader(project.clock is not None, _clock(project, faults), faults)
     times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
-    policy = str(project.scheduler)
+    policy, reasons = str(project.scheduler), tuple[str, ...]()
     _check_shortest_run(project, faults)
     _check_complete(policy, [blocks[item.block] for item in publishers], times, faults)
-    return Scheduling(policy, times, policy in PREEMPTIVE, project.shortest_run, _time_bits(times))
+    if policy == AUTO_SCHEDULER:
+        policy, reasons = _chosen(project, publishers, times)
+    return Scheduling(policy, times, policy in PREEMPTIVE, project.shortest_run, _time_bits(times), reasons)
+
+
+def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
+    """The publishers' tasks, in the order of their ids. Raises `InputError` for every time that is not known."""
+    faults = Diagnostics()
+    for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
+        if times.period is None:
+            faults.error(f"the 'period' of publisher '{publisher.block}' is not given")
+        if times.transfer_time is None:
+            faults.error(f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound")
+    faults.raise_if_any()
+    return _tasks(system.publishers, system.scheduling.times)
+
+
+def channel_of(system: DerivedSystem) -> Channel:
+    """What the publishers share."""
+    from fusesoc_firm.scheduling.analysis import Channel
+
+    return Channel(system.width // 8, system.scheduling.shortest_run)
+
+
+def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> tuple[Task, ...]:
+    """The tasks of those publishers of which all times are known."""
+    return tuple(
+        Task(publisher.block, item.period, item.transfer_time, item.deadline or item.period)
+        for publisher, item in zip(publishers, times, strict=True)
+        if item.period and item.transfer_time
+    )
+
+
+def _chosen(
+    project: Project, publishers: Sequence[Converter], times: Sequence[PublisherTimes]
+) -> tuple[str, tuple[str, ...]]:
+    """The smallest scheduler that holds all deadlines, as far as times are known, and why it is this one."""
+    # With NumPy it takes longer to load than most systems take to be generated.
+    from fusesoc_firm.scheduling.analysis import Channel, Criterion, choose
+
+    tasks = _tasks(publishers, times)
+    if len(tasks) < len(publishers) or project.shortest_run < 1:
+        return SCHEDULERS[0], ()
+    channel = Channel(project.width // 8, project.shortest_run)
+    # Publishers have their priorities by their ids, which the host knows: these stay as they are.
+    choice = choose(tasks, Criterion.LUTS, channel, is_ordered=True)
+    return choice.best.policy, choice.reasons
 
 
 def frame_beats(payload_bytes: int, width: int) -> int:
@@ -83,9 +134,11 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
     """Note what a policy must know of a publisher and is not said."""
     for block, item in zip(blocks, times, strict=True):
         # What cannot be read is noted already.
+        if policy == AUTO_SCHEDULER and item.period is None and block.period is None:
+            faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source)
         if policy in WITH_DEADLINES and item.deadline is None and block.period is None and block.deadline is None:
             faults.error(f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'", block.name.source)
-        if policy in WITH_TRANSFER_TIMES and item.transfer_time is None and block.wcet is None:
+        if policy in (*WITH_TRANSFER_TIMES, AUTO_SCHEDULER) and item.transfer_time is None and block.wcet is None:
             faults.error(
                 f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound", block.name.source
             )

@@ -14,7 +14,7 @@ from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_full_name
 from fusesoc_firm.verify.complexity import Statistics, statistics
 from fusesoc_firm.verify.task import Result, Task, Verdict, verify
-from fusesoc_firm.verify.workers import Workers
+from fusesoc_firm.workers import Workers
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from fusesoc_firm.verify.campaign import Entry, Settings, run, select
 from fusesoc_firm.verify.report import Report, make_report, write_report
 from fusesoc_firm.verify.simulation import ghdl
 from fusesoc_firm.verify.task import Verdict
-from fusesoc_firm.verify.workers import Workers, cluster_workers, local_workers
+from fusesoc_firm.workers import Workers, cluster_workers, local_workers
 
 _SHOWN = 20
 

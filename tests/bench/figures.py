@@ -9,13 +9,13 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, nextpnr, timing, yosys
+from tests.bench import area, cycles, fuzz, images, nextpnr, timing, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
 FIGURES = REPOSITORY / "docs" / "figures.md"
 
-_HEADINGS = {"area": "Area", "timing": "Timing", "cycles": "Cycles", "fuzz": "Fuzzing"}
+_HEADINGS = {"area": "Area", "timing": "Timing", "cycles": "Cycles", "fuzz": "Fuzzing", "images": "Images"}
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
         to LUT6, and inverters but for those of resets, which a slice has; FF are FDRE, FDSE, FDCE and FDPE. A design
@@ -26,9 +26,11 @@ _METHODS = {
     "cycles": "Counted in a simulation of the netlist that `ghdl --synth` makes, by Verilator.",
     "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
+    "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
 }
 _INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `timing`, `cycles`, `fuzz`). 'not
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `timing`, `cycles`, `fuzz`,
+    `images`). 'not
     converted' is a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand:
     `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
@@ -41,7 +43,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    return area.keys() | timing.keys() | cycles.keys() | fuzz.keys()
+    return area.keys() | timing.keys() | cycles.keys() | fuzz.keys() | images.keys()
 
 
 def section(part: str, tables: Sequence[Table]) -> str:
@@ -65,7 +67,9 @@ def _section_of(text: str, heading: str) -> str:
 
 def _versions(part: str) -> str:
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
-    if part in ("area", "timing"):
+    if part == "images":
+        tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
+    elif part in ("area", "timing"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
         tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
     else:

@@ -10,6 +10,7 @@ from fusesoc_firm.render import render
 from fusesoc_firm.system.specification import SCHEDULERS
 from fusesoc_firm.system.timing import PREEMPTIVE, WITH_DEADLINES, WITH_TRANSFER_TIMES
 from tests.sim.ghdl import Library, core_files
+from tests.sim.schedulers import POLICY_CORES
 
 POLICIES = SCHEDULERS
 TIME_BITS = 16
@@ -21,17 +22,12 @@ _LONGEST_PERIOD, _LONGEST_TRANSFER_TIME = 8000, 200
 
 def analysed(folder: Path, policy: str, requesters: int) -> tuple[Library, str]:
     """A policy's entity for so many requesters in a library of its own, and what it is called there."""
-    core = policy.removesuffix("_preemptive")
     firm, work = Library("firm", folder), Library("work", folder)
-    firm.analyse(core_files("axis/axis", "sched/package", *_PARTS.get(core, ()), f"sched/{core}"))
+    firm.analyse(core_files("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES)))
     file = folder / f"{_ENTITY}.vhd"
     file.write_text(render("scheduler.vhd", _configuration(policy, requesters), Path(__file__).parent), "ascii")
     work.analyse([file])
     return work, _ENTITY
-
-
-# What a policy's core is built on.
-_PARTS: dict[str, tuple[str, ...]] = {}
 
 
 def _configuration(policy: str, requesters: int) -> dict[str, Any]:
@@ -64,4 +60,4 @@ def _times(name: str, cycles: Sequence[int]) -> dict[str, Any]:
         {"id": number, "cycles": value, "comma": "," if number < len(cycles) - 1 else ""}
         for number, value in enumerate(cycles)
     ]
-    return {"name": name, "values": values}
+    return {"name": name, "high": len(cycles) - 1, "values": values}

@@ -56,6 +56,14 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
     return done.returncode == 0 and "PASS 100/100" in done.stdout.splitlines()
 
 
+@pytest.mark.parametrize(("name", "messages"), [("image_pipeline", 7), ("sobel", 7), ("multi_type", 19)])
+def test_every_other_application_passes(tmp_path: Path, name: str, messages: int) -> None:
+    done = run(name, tmp_path / "build")
+    print(done.stdout)
+    assert done.returncode == 0
+    assert f"PASS {messages}/{messages}" in done.stdout.splitlines()
+
+
 def work_folder(build_root: Path, core: str) -> Path:
     return build_root / f"robot_sys_{core}_0.1.0" / "sim"
 

@@ -20,12 +20,21 @@ _OF_POLICIES = ("sched/by_policy", "sched/combined")
 
 @dataclass(frozen=True)
 class PolicyEntity:
-    """The entity of a policy, what makes it so, and how many requesters it can have."""
+    """The entity of a policy, what makes it so, how many requesters it can have, and with how many it is immediate.
+
+    An immediate one chooses in the cycle of a request or of a task's last beat. Those with keys take a cycle more, and
+    have times among their generics.
+    """
 
     entity: str
     generics: Mapping[str, Generic] = field(default_factory=dict)
     most_requesters: int = 256
+    most_immediate: int = 256
     is_preemptive: bool = False
+
+    @property
+    def has_times(self) -> bool:
+        return not self.most_immediate
 
 
 # By their names in policy_t, and in its order.
@@ -33,10 +42,10 @@ ENTITIES: Mapping[str, PolicyEntity] = {
     "fixed_priority": PolicyEntity("firm_sched_fixed_priority"),
     "fixed_priority_preemptive": PolicyEntity("firm_sched_fixed_priority", {"PREEMPTIVE": True}, is_preemptive=True),
     "round_robin": PolicyEntity("firm_sched_round_robin"),
-    "lru": PolicyEntity("firm_sched_lru"),
-    "edf_resources": PolicyEntity("firm_sched_edf_resources", is_preemptive=True),
-    "edf_latency": PolicyEntity("firm_sched_edf_latency", is_preemptive=True),
-    "lst": PolicyEntity("firm_sched_lst", is_preemptive=True),
+    "lru": PolicyEntity("firm_sched_lru", most_immediate=16),
+    "edf_resources": PolicyEntity("firm_sched_edf_resources", most_immediate=0, is_preemptive=True),
+    "edf_latency": PolicyEntity("firm_sched_edf_latency", most_immediate=0, is_preemptive=True),
+    "lst": PolicyEntity("firm_sched_lst", most_immediate=0, is_preemptive=True),
 }
 NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is_preemptive]
 
@@ -44,6 +53,11 @@ NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is
 def cases(policies: list[str], sizes: tuple[int, ...]) -> list[tuple[str, int]]:
     """Each policy with each number of requesters that it can have."""
     return [(policy, size) for policy in policies for size in sizes if size <= ENTITIES[policy].most_requesters]
+
+
+def immediate_cases(sizes: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Each policy with each number of requesters with which it is immediate."""
+    return [(policy, size) for policy, size in cases(list(ENTITIES), sizes) if size <= ENTITIES[policy].most_immediate]
 
 
 def analysed(folder: Path) -> Library:
@@ -54,9 +68,12 @@ def analysed(folder: Path) -> Library:
     return library
 
 
-def analyse_bench(library: Library) -> None:
-    """What stands above the policies, again if one of them was replaced."""
+def analyse_bench(library: Library, by_policy: Path | None = None) -> None:
+    """What stands above the policies, again if one was replaced; `by_policy` is a firm_sched_by_policy to use."""
     library.analyse(core_files(*_OF_POLICIES))
+    if by_policy is not None:
+        library.analyse([by_policy])
+        library.analyse(core_files("sched/combined"))
     library.analyse(core_files("sched/combined", fileset="tb"))
 
 
@@ -90,3 +107,37 @@ def part_of(generics: Generics, part: slice) -> Generics:
         generics.shortest_run,
         generics.time_bits,
     )
+
+
+_BY_POLICY_GENERICS = """generic (
+    POLICY : policy_t; REQUESTERS : integer; PERIODS, TRANSFER_TIMES, DEADLINES : times_t := IMPLICIT;
+    TIME_BITS, SHORTEST_RUN : integer := 1);"""
+
+
+def wrapper(name: str, entity: str, requesters: int, generics: Mapping[str, str]) -> str:
+    """An entity around a scheduler with its generics; one named firm_sched_by_policy can take that one's place."""
+    own_generics = _BY_POLICY_GENERICS if name == "firm_sched_by_policy" else ""
+    generic_map = ", ".join(f"{generic} => {value}" for generic, value in generics.items())
+    return f"""
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
+entity {name} is
+  {own_generics}
+  port (
+    clk, rst_n : in std_logic;
+    request : in std_logic_vector({requesters}-1 downto 0);
+    beat, last : in std_logic;
+    grant_valid : out std_logic;
+    grant_select : out std_logic_vector(index_bits({requesters})-1 downto 0));
+end entity {name};
+architecture wrapper of {name} is
+begin
+  u_scheduler : entity firm.{entity}
+    {f"generic map ({generic_map})" if generic_map else ""}
+    port map (clk => clk, rst_n => rst_n, request => request, beat => beat, last => last,
+      grant_valid => grant_valid, grant_select => grant_select);
+end architecture wrapper;
+"""

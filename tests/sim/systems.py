@@ -9,9 +9,10 @@ from fusesoc_firm.generation import GeneratedCore, Plain, Request
 from fusesoc_firm.host import simulation
 from fusesoc_firm.system import generator
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
+from tests.sim.schedulers import POLICY_CORES
 
 DATA = Path(__file__).parent / "data"
-RUNTIME = ("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host")
+RUNTIME = ("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES), "manager/manager", "sim/host")
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,14 @@ class GeneratedSystem:
 
 def call(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request:
     """A generator call for the specification `spec`."""
-    known: dict[str, Plain] = {"seed": 1, "stall_percent": 25, "paths": None, "distro": None, **parameters}
+    known: dict[str, Plain] = {
+        "seed": 1,
+        "stall_percent": 25,
+        "environment": None,
+        "paths": None,
+        "distro": None,
+        **parameters,
+    }
     known |= {"spec": spec.name, "stimuli": str(stimuli), "model": str(model), "product": "simulation"}
     return Request("far", "test:sys:system-simulation:0", spec.parent, known)
 

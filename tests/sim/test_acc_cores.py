@@ -99,6 +99,57 @@ def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Libr
         assert first[1] + second[1] == 4 * round(PI / 4 * 2**60)
 
 
+@pytest.mark.parametrize(("fraction", "iterations"), [(29, 29), (8, 8), (58, 58), (40, 20), (20, 2)])
+def test_sine_and_cosine(library: Library, tmp_path: Path, fraction: int, iterations: int) -> None:
+    print(f"seed {SEED}")
+    generator = random.Random(SEED)
+    unit = 2**fraction
+    angles = [0, 1, -1, 4 * unit - 1, -4 * unit]
+    for eighths in range(-8, 9):
+        angles += [round(PI / 8 * eighths * unit) + beside for beside in (-1, 0, 1)]
+    angles += [generator.randint(-4 * unit, 4 * unit - 1) for _ in range(100)]
+    (tmp_path / "vectors.txt").write_text("".join(f"{binary(angle, fraction + 3)}\n" for angle in angles))
+    generics = {"FRACTION": fraction, "ITERATIONS": iterations}
+    run(library, "firm_cordic_sincos_tb", {**generics, **files(tmp_path, "vectors", "results")})
+    results = [tuple(map(signed, line.split())) for line in (tmp_path / "results.txt").read_text().splitlines()]
+    assert len(results) == len(angles)
+    # The last rotation is left over; the gain of those that are left out, and the rounding of all, come on top.
+    bound = 2.0 ** (1 - iterations) + 4.0**-iterations + 2 / unit + 1e-15
+    for angle, (cosine, sine) in zip(angles, results, strict=True):
+        assert abs(cosine / unit - math.cos(angle / unit)) <= bound
+        assert abs(sine / unit - math.sin(angle / unit)) <= bound
+
+
+def fixed_of(number: float, width: int, fraction: int) -> tuple[int, bool, bool]:
+    """What firm_float64_to_fixed makes of a number, by exact arithmetic: the result, overflow, undefined."""
+    limit = 2 ** (width - 1) - 1
+    if math.isnan(number):
+        return 0, False, True
+    magnitude = limit + 1 if math.isinf(number) else math.floor(abs(Fraction(number)) * 2**fraction + Fraction(1, 2))
+    result = min(magnitude, limit)
+    return -result if math.copysign(1, number) < 0 else result, magnitude > limit, False
+
+
+@pytest.mark.parametrize(("width", "fraction"), [(32, 29), (64, 60), (64, 0), (2, 0), (12, 10), (54, 512), (30, 20)])
+def test_float64_to_fixed(library: Library, tmp_path: Path, width: int, fraction: int) -> None:
+    print(f"seed {SEED}")
+    generator = random.Random(SEED)
+    limit = Fraction(2) ** (width - 1 - fraction)
+    numbers = [0.0, -0.0, 2.0**-1074, -(2.0**-1022), 1.7e308, -1.7e308, math.inf, -math.inf, math.nan, -math.nan]
+    # The unit, its half and what rounds up to it; the limit and what lies beside it.
+    unit = 2.0**-fraction
+    numbers += [unit, unit / 2, math.nextafter(unit / 2, 0), 1.5 * unit, -1.5 * unit, -unit / 2]
+    top = float(limit)
+    numbers += [top, -top, math.nextafter(top, 0), float(limit - Fraction(unit)), float(limit - Fraction(unit) / 2)]
+    numbers += [math.ldexp(generator.uniform(-1, 1), width - fraction - generator.randint(-2, 70)) for _ in range(300)]
+    (tmp_path / "vectors.txt").write_text("".join(f"{float_bits(number)}\n" for number in numbers))
+    generics = {"WIDTH": width, "FRACTION": fraction}
+    run(library, "firm_float64_to_fixed_tb", {**generics, **files(tmp_path, "vectors", "results")})
+    lines = [line.split() for line in (tmp_path / "results.txt").read_text().splitlines()]
+    results = [(signed(digits), overflow == "1", undefined == "1") for digits, overflow, undefined in lines]
+    assert results == [fixed_of(number, width, fraction) for number in numbers]
+
+
 def block_of(numbers: list[float], fraction: int) -> tuple[list[int], int, bool, bool]:
     """What firm_float64_to_block makes of them, by exact arithmetic."""
     exponents = [int(float_bits(number)[1:12], 2) for number in numbers]

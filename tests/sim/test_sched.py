@@ -8,7 +8,16 @@ import pytest
 
 from tests.sim.ghdl import Generic, Library
 from tests.sim.sched_trace import idle_grants, interruptions, most_overtaken
-from tests.sim.schedulers import ENTITIES, NON_PREEMPTIVE, PolicyEntity, analyse_bench, analysed, cases, trace_of
+from tests.sim.schedulers import (
+    ENTITIES,
+    NON_PREEMPTIVE,
+    PolicyEntity,
+    analyse_bench,
+    analysed,
+    cases,
+    immediate_cases,
+    trace_of,
+)
 
 REQUESTERS = (1, 2, 3, 5, 16, 256)
 FEW_REQUESTERS = (2, 5, 16)
@@ -22,7 +31,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     return analysed(tmp_path_factory.mktemp("sched"))
 
 
-@pytest.mark.parametrize(("policy", "requesters"), cases(list(ENTITIES), REQUESTERS))
+@pytest.mark.parametrize(("policy", "requesters"), immediate_cases(REQUESTERS))
 def test_no_cycle_is_lost_where_everybody_is_ready(
     library: Library, tmp_path: Path, policy: str, requesters: int
 ) -> None:
@@ -32,7 +41,7 @@ def test_no_cycle_is_lost_where_everybody_is_ready(
     assert trace.beat[:, 1:].all()
 
 
-@pytest.mark.parametrize(("policy", "requesters"), cases(list(ENTITIES), FEW_REQUESTERS))
+@pytest.mark.parametrize(("policy", "requesters"), immediate_cases(FEW_REQUESTERS))
 def test_who_asks_does_not_wait_for_who_is_idle(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
     assert idle_grants(trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters)) == 0
 
@@ -62,7 +71,7 @@ def test_fair_groups_below_a_fair_top_starve_nobody(library: Library, tmp_path: 
     assert 0 < most_overtaken(trace) <= largest * len(groups) - 1
 
 
-@pytest.mark.parametrize(("policy", "requesters"), cases(list(ENTITIES), (1, *FEW_REQUESTERS)))
+@pytest.mark.parametrize(("policy", "requesters"), immediate_cases((1, *FEW_REQUESTERS)))
 @pytest.mark.parametrize("shortest_run", [1, 3])
 def test_the_netlist_does_the_same(
     library: Library, tmp_path: Path, policy: str, requesters: int, shortest_run: int
@@ -77,7 +86,7 @@ def test_the_netlist_does_the_same(
     assert (tmp_path / "trace.txt").read_text() == source
 
 
-@pytest.mark.parametrize(("policy", "requesters"), cases(list(ENTITIES), REQUESTERS))
+@pytest.mark.parametrize(("policy", "requesters"), immediate_cases(REQUESTERS))
 @pytest.mark.parametrize("shortest_run", [1, 3])
 def test_it_is_latch_free(library: Library, policy: str, requesters: int, shortest_run: int) -> None:
     assert library.latches(ENTITIES[policy].entity, generics_of(policy, requesters, shortest_run)) == []
@@ -90,7 +99,7 @@ def generics_of(policy: str, requesters: int, shortest_run: int) -> dict[str, Ge
     return {"REQUESTERS": requesters, **entity.generics, **own}
 
 
-@pytest.mark.parametrize("entity", ENTITIES.values(), ids=ENTITIES)
+@pytest.mark.parametrize("entity", [entity for entity in ENTITIES.values() if not entity.has_times])
 def test_illegal_numbers_of_requesters_are_named(library: Library, entity: PolicyEntity) -> None:
     for requesters in (-1, 0, entity.most_requesters + 1):
         result = library.run(entity.entity, {"REQUESTERS": requesters, **entity.generics})

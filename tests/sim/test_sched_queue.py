@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.sim.ghdl import Library, core_files
+from tests.sim.ghdl import Generic, Library, core_files
 
 ITEMS = [1, 2, 3, 5, 8, 32, 100, 256]
 KEY_BITS = 10
@@ -78,7 +78,7 @@ def _cycles(
     library: Library, trace: Path, is_sorted: bool, items: int, rates: tuple[int, int]
 ) -> Iterator[list[Cycle]]:
     """The cycles of a run, a list for each time between two resets."""
-    generics = {
+    generics: dict[str, Generic] = {
         "SORTED": is_sorted,
         "ITEMS": items,
         "KEY_BITS": KEY_BITS,

@@ -24,7 +24,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 
 def bursts_of(frame: Frame, width: int, source: random.Random) -> list[bytes]:
-    """A frame as a preempted publisher sends it: cut between beats; each burst but the first begins with a beat more."""
+    """A frame as a preempted publisher sends it: cut between beats, and every later burst begins with a beat more."""
     lanes = width // 8
     data = frame.to_bytes()
     beats = [data[start : start + lanes] for start in range(0, len(data), lanes)]
@@ -34,7 +34,7 @@ def bursts_of(frame: Frame, width: int, source: random.Random) -> list[bytes]:
 
 
 def mixed(frames: list[Frame], width: int, seed: int) -> tuple[list[bytes], list[tuple[int, bytes]]]:
-    """Bursts, those of one id in their order, and the frames as they become whole, each with its last burst's number."""
+    """Bursts, those of an id in their order, and the frames as they become whole, with their last bursts' numbers."""
     source = random.Random(seed)
     waiting: dict[int, list[tuple[bytes, bytes | None]]] = defaultdict(list)
     for frame in frames:

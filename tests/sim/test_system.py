@@ -372,7 +372,22 @@ def test_every_vhdl_file_of_the_house_is_vhdl_93(tmp_path: Path) -> None:
     # Benches that are in no .core file, accelerators, and those of these tests, in folders' order: rtl before tb.
     others = {path for folder in (CORES, REPOSITORY / "specs", DATA) for path in folder.rglob("*.vhd")} - analysed
     assert REPOSITORY / "specs" / "quat2euler" / "rtl" / "quat2euler.vhd" in others
-    Library("work", tmp_path).analyse(sorted(others))
+    in_order = [*dict.fromkeys(application_files())]
+    assert others.issuperset(in_order)
+    Library("work", tmp_path).analyse([*in_order, *sorted(others.difference(in_order))])
+
+
+def application_files() -> Iterator[Path]:
+    """The VHDL that the applications' cores name: accelerators in the order of the specifications, environments."""
+    for core in sorted((REPOSITORY / "specs").rglob("*.core")):
+        calls = yaml.safe_load(core.read_text(encoding="utf-8"))["generate"].values()
+        for parameters in (item["parameters"] for item in calls):
+            specification = yaml.safe_load((core.parent / parameters["spec"]).read_text(encoding="utf-8"))
+            for accelerator in specification["accelerators"]:
+                sources = accelerator["sources"]
+                names = [sources] if isinstance(sources, str) else sources
+                yield from (core.parent / name for name in names if name.endswith(".vhd"))
+            yield from (core.parent / name for name in parameters.get("environment", []))
 
 
 def test_a_fault_in_generated_vhdl_is_found(tmp_path: Path) -> None:

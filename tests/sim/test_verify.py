@@ -16,13 +16,14 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm import workers
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Fixed, Frame
 from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify import simulation, task, workers
+from fusesoc_firm.verify import simulation, task
 from fusesoc_firm.verify.judge import Judgement, judge
 from fusesoc_firm.verify.task import Result, Task, Verdict, verify
 from tests.sim.ghdl import CORES, REPOSITORY, Library
@@ -264,7 +265,7 @@ def test_a_failure_is_kept_and_can_be_repeated(
     from contextlib import contextmanager
 
     from fusesoc_firm.verify import command
-    from fusesoc_firm.verify.workers import Workers
+    from fusesoc_firm.workers import Workers
 
     @contextmanager
     def threads(_: int | None = None) -> Iterator[Workers]:

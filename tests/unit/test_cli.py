@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import json
 import os
 import subprocess
 import sys
@@ -49,7 +51,16 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["message", "show"],
         ["message", "verify"],
         ["system"],
+        ["system", "new"],
         ["system", "check"],
+        ["system", "show"],
+        ["system", "skeleton"],
+        ["system", "diagram"],
+        ["system", "report"],
+        ["system", "schema"],
+        ["scheduler"],
+        ["scheduler", "bench"],
+        ["scheduler", "choose"],
     ],
     ids=" ".join,
 )
@@ -269,3 +280,22 @@ def test_a_reader_that_leaves_early_is_no_fault() -> None:
         process.stdout.readline()
         process.stdout.close()
         assert process.stderr.read() == b""
+
+
+def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec, picture = tmp_path / "robot.yaml", tmp_path / "robot.dot"
+    point = "geometry_msgs/Point"
+    answers = ["robot", *[""] * 5, "no", "sub", "", "ROS", "subscriber", point, "", "", "yes", "pub", "", "", "no"]
+    answers += ["yes", "pub", "", "ROS", "publisher", point, *[""] * 6, "no", "no"]
+    monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
+    assert f"{spec}: robot is right: 1 subscriber" in out(capsys, "system", "new", str(spec))
+    assert out(capsys, "system", "diagram", str(spec), "--format", "dot", "-o", str(picture)) == ""
+    assert '"block sub" -> "block pub"' in picture.read_text(encoding="utf-8")
+    assert "generated for each line written" in out(capsys, "system", "report", str(spec))
+    nowhere = spec / "robot.svg"
+    message = error(capsys, "system", "diagram", str(spec), "--format", "dot", "-o", str(nowhere))
+    assert message.startswith(f"error: cannot write {nowhere}: ")
+
+
+def test_the_schema_is_json(capsys: Captured) -> None:
+    assert json.loads(out(capsys, "system", "schema"))["title"] == "System specification of fusesoc_firm"

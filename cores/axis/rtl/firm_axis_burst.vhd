@@ -6,6 +6,8 @@
 -- whose; a frame's last one waits for nobody. A held beat therefore never blocks another source, and a run has no gap.
 -- In which sources a frame has begun is kept in a memory, a bit a source. It is cleared in the 2**n cycles after reset,
 -- n bits being the index; nothing is taken meanwhile.
+-- The paths from input to output are combinational, and what is offered may change with the source until it is taken, as
+-- behind the multiplexer: put a register slice behind it, which shows it to nobody.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -28,10 +30,8 @@ entity firm_axis_burst is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- All are registers.
     m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
-    m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic);
@@ -61,20 +61,19 @@ architecture rtl of firm_axis_burst is
   signal ready : std_logic;
   signal taken : std_logic;
 
-  signal sent_tdata  : std_logic_vector(WIDTH-1 downto 0);
-  signal sent_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
-  signal sent_tvalid : std_logic;
-  signal sent_tlast  : std_logic;
-  signal sent_tready : std_logic;
+  signal m_axis_tvalid_out : std_logic;
 
 begin
 
+  assert is_stream_width(WIDTH)
+    report "firm_axis_burst: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
+    severity failure;
   assert SOURCES >= 1 and SOURCES <= 256
     report "firm_axis_burst: SOURCES is " & integer'image(SOURCES) & "; legal: 1 to 256"
     severity failure;
 
   moved <= '0' when source = held_source_r else '1';
-  ready <= not clearing_r and (not held_r or (sent_tready and not resume_r));
+  ready <= not clearing_r and (not held_r or (m_axis_tready and not resume_r));
   taken <= s_axis_tvalid and ready;
 
   address       <= std_logic_vector(cleared_r) when clearing_r = '1' else source;
@@ -97,7 +96,7 @@ begin
       if rst_n = '0' then
         clearing_r <= '1';
         cleared_r  <= (others => '0');
-      else
+      elsif clearing_r = '1' then
         cleared_r <= cleared_r + 1;
         if cleared_r = 2**INDEX_BITS_USED-1 then
           clearing_r <= '0';
@@ -116,7 +115,7 @@ begin
         held_r <= '1';
         -- Between two beats of a frame the source's own beat is the one held, unless another one came.
         resume_r <= begun(0) and moved;
-      elsif sent_tvalid = '1' and sent_tready = '1' then
+      elsif m_axis_tvalid_out = '1' and m_axis_tready = '1' then
         -- Without a beat after it only a frame's last one leaves.
         held_r   <= resume_r;
         resume_r <= '0';
@@ -130,39 +129,20 @@ begin
     end if;
   end process hold_beat;
 
-  sent_tvalid <= held_r and (resume_r or held_tlast_r or s_axis_tvalid);
-  sent_tlast  <= not resume_r and (held_tlast_r or moved);
+  m_axis_tvalid_out <= held_r and (resume_r or held_tlast_r or s_axis_tvalid);
 
   send : process (held_tdata_r, held_tkeep_r, held_source_r, resume_r)
   begin
-    sent_tdata <= held_tdata_r;
-    sent_tkeep <= held_tkeep_r;
+    m_axis_tdata <= held_tdata_r;
+    m_axis_tkeep <= held_tkeep_r;
     if resume_r = '1' then
-      sent_tdata(7 downto 0)                 <= (others => '0');
-      sent_tdata(INDEX_BITS_USED-1 downto 0) <= held_source_r;
-      sent_tkeep                             <= (others => '1');
+      m_axis_tdata(7 downto 0) <= std_logic_vector(resize(unsigned(held_source_r), 8));
+      m_axis_tkeep             <= (others => '1');
     end if;
   end process send;
 
-  -- What is sent may change with the source until it is taken; behind the slice nothing does.
-  u_slice : entity firm.firm_axis_register_slice
-    generic map (
-      WIDTH => WIDTH)
-    port map (
-      clk           => clk,
-      rst_n         => rst_n,
-      s_axis_tdata  => sent_tdata,
-      s_axis_tkeep  => sent_tkeep,
-      s_axis_tvalid => sent_tvalid,
-      s_axis_tlast  => sent_tlast,
-      s_axis_tready => sent_tready,
-      m_axis_tdata  => m_axis_tdata,
-      m_axis_tkeep  => m_axis_tkeep,
-      m_axis_tid    => m_axis_tid,
-      m_axis_tvalid => m_axis_tvalid,
-      m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
-
   s_axis_tready <= ready;
+  m_axis_tvalid <= m_axis_tvalid_out;
+  m_axis_tlast  <= not resume_r and (held_tlast_r or moved);
 
 end architecture rtl;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- One word out of many: a tree of multiplexers, two levels of which fit a 6-input LUT a bit. A dynamic array index costs
--- about twice of it through `ghdl --synth`. An index beyond the last word reads any of them.
+-- about twice of it through `ghdl --synth`. An index beyond the last word reads any of them, or zeros.
 -- If DECODED, the tree is written as ANDs of words and decoded pairs of index bits, and ORs. Yosys maps that as it stands,
 -- at the 4-to-1 multiplexers that fit a LUT, and takes nested multiplexers apart. That saves a third of the LUTs for many
 -- words that share nothing, and costs more for words with constants, which nested multiplexers absorb.

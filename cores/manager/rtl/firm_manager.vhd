@@ -73,7 +73,13 @@ architecture rtl of firm_manager is
   signal granted_tlast  : std_logic;
   signal granted_tready : std_logic;
 
-  signal sent_tid : std_logic_vector(7 downto 0);
+  signal sent_tdata  : std_logic_vector(WIDTH-1 downto 0);
+  signal sent_tkeep  : std_logic_vector(WIDTH/8-1 downto 0);
+  signal sent_tvalid : std_logic;
+  signal sent_tlast  : std_logic;
+  signal sent_tready : std_logic;
+
+  signal out_tid : std_logic_vector(7 downto 0);
 
 begin
 
@@ -140,23 +146,11 @@ begin
       m_axis_tready => granted_tready);
 
   whole_frames : if not PREEMPTIVE generate
-    u_slice_out : entity firm.firm_axis_register_slice
-      generic map (
-        WIDTH => WIDTH)
-      port map (
-        clk           => clk,
-        rst_n         => rst_n,
-        s_axis_tdata  => granted_tdata,
-        s_axis_tkeep  => granted_tkeep,
-        s_axis_tvalid => granted_tvalid,
-        s_axis_tlast  => granted_tlast,
-        s_axis_tready => granted_tready,
-        m_axis_tdata  => m_axis_tdata,
-        m_axis_tkeep  => m_axis_tkeep,
-        m_axis_tid    => sent_tid,
-        m_axis_tvalid => m_axis_tvalid,
-        m_axis_tlast  => m_axis_tlast,
-        m_axis_tready => m_axis_tready);
+    sent_tdata     <= granted_tdata;
+    sent_tkeep     <= granted_tkeep;
+    sent_tvalid    <= granted_tvalid;
+    sent_tlast     <= granted_tlast;
+    granted_tready <= sent_tready;
   end generate whole_frames;
 
   parts_of_frames : if PREEMPTIVE generate
@@ -173,18 +167,35 @@ begin
         s_axis_tvalid => granted_tvalid,
         s_axis_tlast  => granted_tlast,
         s_axis_tready => granted_tready,
-        m_axis_tdata  => m_axis_tdata,
-        m_axis_tkeep  => m_axis_tkeep,
-        m_axis_tid    => sent_tid,
-        m_axis_tvalid => m_axis_tvalid,
-        m_axis_tlast  => m_axis_tlast,
-        m_axis_tready => m_axis_tready);
+        m_axis_tdata  => sent_tdata,
+        m_axis_tkeep  => sent_tkeep,
+        m_axis_tvalid => sent_tvalid,
+        m_axis_tlast  => sent_tlast,
+        m_axis_tready => sent_tready);
   end generate parts_of_frames;
+
+  u_slice_out : entity firm.firm_axis_register_slice
+    generic map (
+      WIDTH => WIDTH)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      s_axis_tdata  => sent_tdata,
+      s_axis_tkeep  => sent_tkeep,
+      s_axis_tvalid => sent_tvalid,
+      s_axis_tlast  => sent_tlast,
+      s_axis_tready => sent_tready,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tid    => out_tid,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready);
 
   -- No publisher has an id of more bits.
   name_publisher : for place in 0 to 7 generate
     of_index : if place < index_bits(PUBLISHERS) generate
-      m_axis_tid(place) <= sent_tid(place);
+      m_axis_tid(place) <= out_tid(place);
     end generate of_index;
     above : if place >= index_bits(PUBLISHERS) generate
       m_axis_tid(place) <= '0';

@@ -5,8 +5,8 @@
 -- all of its new requests are accepted at once; they leave lowest index first. Rows take turns, so nobody waits for
 -- ever behind lower indices that come again and again, and a lone request is accepted in the cycle in which it comes.
 --
--- What is known lies in distributed RAM, a row a word: a requester is known where its bits in `accepted` and `finished` differ.
--- So the row that is accepted and the task that finishes write to memories of their own.
+-- What is known lies in distributed RAM, a row a word: a requester is known where its bits in `accepted` and
+-- `finished` differ. So the row that is accepted and the task that finishes write to memories of their own.
 -- The RAM keeps what was there before a reset: after it the rows are made equal, one a cycle.
 library ieee;
 use ieee.std_logic_1164.all;
@@ -33,7 +33,7 @@ entity firm_sched_arrivals is
 
     -- A requester finishes a task, which may be known or not. If it has not left, it is forgotten.
     finished       : in std_logic;
-    finished_known : in std_logic;  -- it has left; read with `finished` only
+    finished_known : in std_logic;  -- it is known and has left; read with `finished` only
     finished_id    : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
 end entity firm_sched_arrivals;
 

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Earliest deadline first, preemptive, with few cycles: up to 8 requesters are compared all at once, more of them wait in a
--- sorted queue, which hands over a task every cycle.
+-- Earliest deadline first, preemptive, with few cycles: up to 8 requesters are compared all at once, more of them
+-- wait in a sorted queue, which hands over a task every cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -38,7 +38,7 @@ begin
     report "firm_sched_edf_latency: " & FAULT
     severity failure;
 
-  of_few : if REQUESTERS <= FEW generate
+  of_few : if REQUESTERS >= 1 and REQUESTERS <= FEW generate
     u_parallel : entity firm.firm_sched_parallel
       generic map (
         REQUESTERS     => REQUESTERS,

@@ -3,13 +3,13 @@
 --
 --   request -> arrivals -> B, a task with its key -> queue -> current, the task that has the grant
 --
--- A task's key is its deadline (EDF), its deadline less its transfer time, which is its latest start (LST), or the stamp of
--- its requester's last completion (LRU). All tasks' slack shrinks by one a cycle but that of the one that sends: its
--- key grows by one a beat instead, so that no other key ever changes.
+-- A task's key is its deadline (EDF), its deadline less its transfer time, which is its latest start (LST), or the
+-- stamp of its requester's last completion (LRU). All tasks' slack shrinks by one a cycle but that of the one that
+-- sends: its key grows by one a beat instead, so that no other key ever changes.
 --
--- When a task finishes, the next is the queue's root; if the queue is empty B, else who arrives. If there is nobody, the
--- grant stays where it is, parked: its requester may begin a task before that is accepted, which then has no key yet
--- and keeps the grant until it has. While the queue fills its root, nobody is granted.
+-- When a task finishes, the next is the queue's root; if the queue is empty B, else who arrives. If there is
+-- nobody, the grant stays where it is, parked: its requester may begin a task before that is accepted, which then
+-- has no key yet and keeps the grant until it has. While the queue fills its root, nobody is granted.
 -- A task with a smaller key (EDF, LST) takes the grant; the one that had it goes back into the queue through B.
 --
 -- Keys are compared as numbers that wrap around. So that they stay less than half their range apart whatever the
@@ -280,7 +280,8 @@ begin
   end generate longer_runs;
 
   a_leaves   <= take_a or get_key or a_enters_b;
-  a_enters_b <= a_valid and b_is_free and key_ready and not (preempt or take_a or (a_is_own and (finished or not choose)));
+  a_enters_b <= a_valid and b_is_free and key_ready and
+                not (preempt or take_a or (a_is_own and (finished or not choose)));
   b_inserts  <= insert_valid and insert_ready;
   b_is_free  <= not b_valid_r or take_b or b_inserts;
 

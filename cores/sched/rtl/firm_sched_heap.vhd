@@ -1,11 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A priority queue of few LUTs: a heap in distributed RAM, of items that each have an index of their own.
 --
--- Item i lies somewhere on the path from the root to leaf i, so a node holds only the bits of the index that are not
--- its own address, and there is always room. INSERT goes down the item's path: at each node the one that comes
--- first stays, the other goes on along its own path. After a pop the hole is filled with the smaller of the two nodes below,
--- whose hole is filled in turn. Each operation is at one level a cycle, and several follow each other down.
--- The root is a register: it is always the item that comes first, but for the cycle after a pop, when it is filled anew.
+-- Item i lies somewhere on the path from the root to leaf i, so a node holds only the bits of the index that are
+-- not its own address, and there is always room. INSERT goes down the item's path: at each node the one that comes
+-- first stays, the other goes on along its own path. After a pop the hole is filled with the smaller of the two
+-- nodes below, whose hole is filled in turn. Each operation is at one level a cycle, and several follow each other
+-- down. The root is a register: it is always the item that comes first, but for the cycle after a pop, when it is
+-- filled anew.
 --
 -- The RAM keeps what was there before a reset. So the nodes are cleared after it, a path to a pair of leaves a cycle.
 library ieee;

@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A level of firm_sched_heap below the root: 2**LEVEL nodes, and the operation that is at this level in this cycle.
 --
--- A node is a pair's left or right one; the pairs lie under the address of their common node above, so that a pair is
--- read at once. That address is the highest LEVEL-1 bits of the operation's index.
--- INSERT compares its item with the node on the item's path: the one that comes first is the node's from now on, the
--- other goes on to the level below. FILL finds the smaller one of a pair, which the level above takes in the same cycle,
--- and goes on to the level below to fill the hole that this leaves. CLEAR empties the pair.
+-- A node is a pair's left or right one; the pairs lie under the address of their common node above, so that a pair
+-- is read at once. That address is the highest LEVEL-1 bits of the operation's index.
+-- INSERT compares its item with the node on the item's path: the one that comes first is the node's from now on,
+-- the other goes on to the level below. FILL finds the smaller one of a pair, which the level above takes in the
+-- same cycle, and goes on to the level below to fill the hole that this leaves. CLEAR empties the pair.
 --
 -- In the cycle behind a FILL no operation may come, since then the level below writes to the pair. Its address is
 -- still here, for the index changes with an operation only.
@@ -56,7 +56,6 @@ architecture rtl of firm_sched_heap_level is
   -- Of an item's index the highest LEVEL bits are the node's address; the node keeps the others only.
   constant LOW_BITS     : natural  := ID_BITS - LEVEL;
   constant SIDE         : natural  := LOW_BITS;  -- the bit of the index that tells left from right
-  constant ADDRESS_BITS : positive := max(1, LEVEL-1);
   -- A node: valid, key, the low bits of its item's index.
   constant NODE_BITS    : positive := 1 + KEY_BITS + LOW_BITS;
   subtype node_t is std_logic_vector(NODE_BITS-1 downto 0);
@@ -69,7 +68,6 @@ architecture rtl of firm_sched_heap_level is
   signal id_r     : std_logic_vector(ID_BITS-1 downto 0);
   signal key_r    : std_logic_vector(KEY_BITS-1 downto 0);
 
-  signal address     : std_logic_vector(ADDRESS_BITS-1 downto 0);
   signal left        : node_t;
   signal right       : node_t;
   signal item        : node_t;
@@ -119,33 +117,47 @@ begin
   end process hold_operation;
 
   only_pair : if LEVEL = 1 generate
-    address <= "0";
+    hold_pair : process (clk)
+    begin
+      if rising_edge(clk) then
+        if write_left = '1' then
+          left <= write_node;
+        end if;
+        if write_right = '1' then
+          right <= write_node;
+        end if;
+      end if;
+    end process hold_pair;
   end generate only_pair;
+
   pairs : if LEVEL > 1 generate
+    constant ADDRESS_BITS : positive := LEVEL - 1;
+    signal address : std_logic_vector(ADDRESS_BITS-1 downto 0);
+  begin
     address <= id_r(ID_BITS-1 downto LOW_BITS+1);
+
+    u_left : entity firm.firm_sched_ram
+      generic map (
+        ADDRESS_BITS => ADDRESS_BITS,
+        WORD_BITS    => NODE_BITS)
+      port map (
+        clk          => clk,
+        address      => address,
+        read_word    => left,
+        write_enable => write_left,
+        write_word   => write_node);
+
+    u_right : entity firm.firm_sched_ram
+      generic map (
+        ADDRESS_BITS => ADDRESS_BITS,
+        WORD_BITS    => NODE_BITS)
+      port map (
+        clk          => clk,
+        address      => address,
+        read_word    => right,
+        write_enable => write_right,
+        write_word   => write_node);
   end generate pairs;
-
-  u_left : entity firm.firm_sched_ram
-    generic map (
-      ADDRESS_BITS => ADDRESS_BITS,
-      WORD_BITS    => NODE_BITS)
-    port map (
-      clk          => clk,
-      address      => address,
-      read_word    => left,
-      write_enable => write_left,
-      write_word   => write_node);
-
-  u_right : entity firm.firm_sched_ram
-    generic map (
-      ADDRESS_BITS => ADDRESS_BITS,
-      WORD_BITS    => NODE_BITS)
-    port map (
-      clk          => clk,
-      address      => address,
-      read_word    => right,
-      write_enable => write_right,
-      write_word   => write_node);
 
   item(NODE_BITS-1)                 <= insert_r;
   item(NODE_BITS-2 downto LOW_BITS) <= key_r;
@@ -207,7 +219,8 @@ begin
     end loop;
   end process hand_down;
 
-  choose_write : process (item, insert_r, clear_r, id_r, takes_second, hole, hole_right, filler_valid, filler_id, filler_key)
+  choose_write : process (item, insert_r, clear_r, id_r, takes_second, hole, hole_right,
+                          filler_valid, filler_id, filler_key)
     variable keep_item : std_logic;
   begin
     write_node <= item;

@@ -32,7 +32,7 @@ begin
     report "firm_sched_lru: " & fault_of_size(REQUESTERS)
     severity failure;
 
-  of_few : if REQUESTERS <= FEW generate
+  of_few : if REQUESTERS >= 1 and REQUESTERS <= FEW generate
     u_matrix : entity firm.firm_sched_age_matrix
       generic map (
         REQUESTERS => REQUESTERS)

@@ -49,7 +49,7 @@ begin
     report "firm_sched_lst: " & FAULT_OF_TRANSFER
     severity failure;
 
-  of_few : if REQUESTERS <= FEW generate
+  of_few : if REQUESTERS >= 1 and REQUESTERS <= FEW generate
     u_parallel : entity firm.firm_sched_parallel
       generic map (
         REQUESTERS     => REQUESTERS,

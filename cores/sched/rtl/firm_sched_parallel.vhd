@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The scheduler of a policy with deadlines for few requesters: all tasks' keys in registers, compared with each other in
--- every cycle by a tree. The keys are those of firm_sched_engine.
+-- The scheduler of a policy with deadlines for few requesters: all tasks' keys in registers, compared with each
+-- other in every cycle by a tree. The keys are those of firm_sched_engine.
 --
--- A task is accepted in the cycle in which it is first seen, whoever else asks, and takes part in the choice in the next. The
--- smallest key has the grant; of equal keys the one of the task that has it, else that of the lowest index.
--- Nobody accepted: the grant stays.
+-- A task is accepted in the cycle in which it is first seen, whoever else asks, and takes part in the choice in the
+-- next. The smallest key has the grant; of equal keys the one of the task that has it, else that of the lowest
+-- index. Nobody accepted: the grant stays.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -49,10 +49,9 @@ architecture rtl of firm_sched_parallel is
   signal id    : ids_t;
 
   signal time_r  : key_t;
-  signal overdue : std_logic_vector(LEAVES-1 downto 0);
   signal advance : std_logic;
 
-  signal known_r  : std_logic_vector(LEAVES-1 downto 0);
+  signal idle_r   : std_logic_vector(LEAVES-1 downto 0);  -- no task is accepted
   signal current  : std_logic_vector(LEAVES-1 downto 0);
   signal finished : std_logic;
   signal kept     : std_logic;
@@ -64,7 +63,7 @@ begin
 
   finished <= beat and last;
   current  <= decode(grant_select_r, '1', LEAVES);
-  advance  <= not any_of(overdue);
+  advance  <= not (valid(1) and is_overdue(rank(1)(KEY_BITS downto 1), time_r));
 
   count_time : process (clk)
   begin
@@ -85,12 +84,12 @@ begin
       begin
         if rising_edge(clk) then
           if rst_n = '0' then
-            known_r(leaf) <= '0';
+            idle_r(leaf) <= '1';
           else
-            known_r(leaf) <= (known_r(leaf) or request(leaf)) and not (current(leaf) and finished);
+            idle_r(leaf) <= (idle_r(leaf) and not request(leaf)) or (current(leaf) and finished);
           end if;
           -- Until a task comes its key is that of one that comes now.
-          if known_r(leaf) = '0' then
+          if idle_r(leaf) = '1' then
             key_r <= std_logic_vector(unsigned(time_r) + unsigned(to_signed(time_of(leaf, OFFSETS), KEY_BITS)));
           elsif SENDS_OWN_TIME and current(leaf) = '1' and beat = '1' and advance = '1' then
             key_r <= std_logic_vector(unsigned(key_r) + 1);
@@ -98,14 +97,12 @@ begin
         end if;
       end process hold_task;
 
-      overdue(leaf)      <= is_overdue(key_r, time_r);
-      valid(LEAVES+leaf) <= known_r(leaf) and not (current(leaf) and finished);
+      valid(LEAVES+leaf) <= not idle_r(leaf) and not (current(leaf) and finished);
       rank(LEAVES+leaf)  <= key_r & not current(leaf);
     end generate used;
 
     unused : if leaf >= REQUESTERS generate
-      known_r(leaf)      <= '0';
-      overdue(leaf)      <= '0';
+      idle_r(leaf)       <= '1';
       valid(LEAVES+leaf) <= '0';
       rank(LEAVES+leaf)  <= (others => '0');
     end generate unused;
@@ -141,7 +138,8 @@ begin
     signal beats   : natural range 0 to SHORTEST_RUN;  -- with that of this cycle
   begin
     beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
-    kept  <= any_of(request and current(REQUESTERS-1 downto 0)) and not finished when beats > 0 and beats < SHORTEST_RUN else '0';
+    kept  <= any_of(request and current(REQUESTERS-1 downto 0)) and not finished
+             when beats > 0 and beats < SHORTEST_RUN else '0';
 
     count_beats : process (clk)
     begin

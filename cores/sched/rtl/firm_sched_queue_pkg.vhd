@@ -10,8 +10,8 @@ package firm_sched_queue_pkg is
   -- behind it, a key has an order without ties: the keys decide, and the index where they are equal.
   function is_before(left, right : std_logic_vector) return std_logic;
 
-  -- '1' if `key` lies two or three eighths of the range before `now`, each cut to whole eighths. If time stands still then, and
-  -- no new key is an eighth or more before or behind it, keys are never half the range apart.
+  -- '1' if `key` lies two or three eighths of the range before `now`, each cut to whole eighths. If time stands
+  -- still then, and no new key is an eighth or more before or behind it, keys are never half the range apart.
   function is_overdue(key, now : std_logic_vector) return std_logic;
 
 end package firm_sched_queue_pkg;

@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A priority queue of few cycles: a shift register that is kept sorted, with the ports of firm_sched_heap.
 --
--- Each cell compares the new item with its own. Since the cells are sorted, those behind the new item's place know it
--- from their own comparison, and the place itself from that of the cell before: nothing crosses the whole queue but the new item.
--- An insert and a pop are done in one cycle each, both at once if need be, and the next root is there in the next cycle.
+-- Each cell compares the new item with its own. Since the cells are sorted, those behind the new item's place know
+-- it from their own comparison, and the place itself from that of the cell before: nothing crosses the whole queue
+-- but the new item. An insert and a pop are done in one cycle each, both at once if need be, and the next root is
+-- there in the next cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

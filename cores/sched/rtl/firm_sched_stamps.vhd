@@ -1,11 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- When each requester completed its last task, counted in completions: the keys of "least recently used".
 --
--- The count wraps around, so stamps must not grow too old. A sweep goes round and renews those that are older than a quarter
--- of the range; the count moves on at most four times a step of the sweep. Those that were idle for so long keep no
--- order among each other, but come before all that were not. The memory has one port: a completion goes first, then a
--- sweep that is due, then whoever reads.
--- After reset the sweep goes round once and writes each requester's index: the lower ones count as less recently used.
+-- The count wraps around, so stamps must not grow too old. A sweep goes round and renews those that are older than
+-- a quarter of the range; the count moves on at most four times a step of the sweep. Those that were idle for so
+-- long keep no order among each other, but come before all that were not. The memory has one port: a completion
+-- goes first, then a sweep that is due, then whoever reads.
+-- After reset the sweep goes round once and writes each requester's index: the lower ones count as less recently
+-- used.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

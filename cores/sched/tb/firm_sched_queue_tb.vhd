@@ -116,7 +116,8 @@ begin
         write(trace_line, string'("reset"));
       else
         if insert_valid = '1' then
-          write(trace_line, "insert " & integer'image(number_of(insert_id)) & " " & integer'image(number_of(insert_key)));
+          write(trace_line, "insert " & integer'image(number_of(insert_id)) & " " &
+            integer'image(number_of(insert_key)));
         else
           write(trace_line, string'("-"));
         end if;

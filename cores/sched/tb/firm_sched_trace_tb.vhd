@@ -27,6 +27,12 @@ entity firm_sched_trace_tb is
     CYCLES   : integer := 1000;  -- of a segment
     -- Nobody pauses, nobody stalls, and everybody always has a task.
     SATURATED : boolean := false;
+    -- Beats of each task, 0 for a number that is drawn.
+    TASK_BEATS : integer := 0;
+    -- Cycles of a stretch beside those that are drawn.
+    STRETCH : integer := 0;
+    -- At the beginning of a stretch nobody takes a beat for as many cycles at most.
+    LONGEST_STALL : integer := 0;
     TRACE     : string  := "trace.txt");
 end entity firm_sched_trace_tb;
 
@@ -182,6 +188,7 @@ begin
     variable pause_percent : natural;  -- of beats within a task after which there is a pause
     variable longest_pause : natural;
     variable stall_percent : natural;
+    variable stall_end     : natural;
 
     type numbers_t is array (0 to REQUESTERS-1) of natural;
     variable wakes      : numbers_t;  -- when one that shows no request does something
@@ -207,7 +214,7 @@ begin
     procedure draw_stretch(cycle : in natural) is
     begin
       draw(state, 200 + 8*REQUESTERS, number);
-      stretch_end := cycle + 50 + number;
+      stretch_end := cycle + 50 + number + STRETCH;
       draw(state, 4, number);
       lone := NOBODY;
       if number = 0 then
@@ -226,6 +233,12 @@ begin
       longest_pause := one_of(number, 3, 30, 0);
       draw(state, 3, number);
       stall_percent := one_of(number, 0, 30, 80);
+      stall_end := 0;
+      if LONGEST_STALL > 0 then
+        draw(state, LONGEST_STALL+1, number);
+        stall_end   := cycle + number;
+        stretch_end := stretch_end + number;
+      end if;
       if SATURATED then
         lone          := NOBODY;
         longest_gap   := 0;
@@ -252,6 +265,9 @@ begin
       if beats_left(requester) = 0 then
         draw(state, longest_task, number);
         beats_left(requester) := 1 + number;
+        if TASK_BEATS > 0 then
+          beats_left(requester) := TASK_BEATS;
+        end if;
       end if;
     end procedure wake;
 
@@ -299,7 +315,7 @@ begin
     end procedure reset;
 
     -- The grant is there; who answers it?
-    procedure answer is
+    procedure answer(cycle : in natural) is
     begin
       granted     := NOBODY;
       has_beat    := false;
@@ -308,7 +324,7 @@ begin
       if grant_valid = '1' then
         granted := to_integer(unsigned(grant_select));
         assert granted < REQUESTERS report "grant to a requester that does not exist" severity failure;
-        has_beat    := asks(granted) = '1' and number >= stall_percent;
+        has_beat    := asks(granted) = '1' and number >= stall_percent and cycle >= stall_end;
         is_its_last := beats_left(granted) = 1;
       end if;
     end procedure answer;
@@ -396,7 +412,7 @@ begin
         end loop;
         request <= asks;
         wait for 1 ns;
-        answer;
+        answer(cycle);
         beat <= bit_of(has_beat);
         last <= bit_of(is_its_last);
         write_cycle;

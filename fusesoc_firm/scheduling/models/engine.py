@@ -7,12 +7,14 @@ cycle costs is some dozens of operations on those, and one on the requests (B, N
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
 
 from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
 _NOBODY = np.iinfo(np.int64).max
+_SHORTEST_TIME, _LONGEST_TIME = 8, 31  # bits
 
 
 def index_bits(requesters: int) -> int:
@@ -21,7 +23,7 @@ def index_bits(requesters: int) -> int:
 
 
 class Arrivals:
-    """firm_sched_arrivals: accepts tasks row by row. `valid` and `first` (B,) are the accepted task that leaves next."""
+    """firm_sched_arrivals: accepts tasks row by row. `valid` and `first` (B,) are the one that leaves next."""
 
     def __init__(self, batch: int, requesters: int) -> None:
         bits = index_bits(requesters)
@@ -42,7 +44,8 @@ class Arrivals:
     @property
     def valid(self) -> Bools:
         """Whether an accepted task has not left."""
-        return self._accepted != 0
+        valid: Bools = self._accepted != 0
+        return valid
 
     @property
     def first(self) -> Ints:
@@ -55,7 +58,8 @@ class Arrivals:
         finished_row = finished_id // self._columns
         finished_bit = np.where(finished, 1 << (finished_id % self._columns), 0)
         of_row = np.where(self._row == finished_row, finished_bit, 0)
-        accepted = np.where(leaves, self._accepted & (self._accepted - 1), self._accepted) & ~of_row
+        staying: Ints = np.where(leaves, self._accepted & (self._accepted - 1), self._accepted)
+        accepted: Ints = np.bitwise_and(staying, np.invert(of_row))
         self._known[self._members, finished_row] &= ~finished_bit
         if self._clearing:
             self._clearing -= 1
@@ -66,8 +70,8 @@ class Arrivals:
     def _accept(self, request: Bools, where: Bools, accepted: Ints, finished_row: Ints, finished_bit: Ints) -> None:
         """Take the new requests of the next row into `accepted`, where nothing is left of the last one."""
         self._padded[:, : self._requesters] = request
-        by_row = self._padded.reshape(-1, self._rows, self._columns)
-        asks = by_row.any(axis=2)
+        by_row: Bools = self._padded.reshape((len(request), self._rows, self._columns))
+        asks: Bools = np.logical_or.reduce(by_row, axis=2)
         where = where & asks.any(axis=1)
         # The rows in their order behind the last one.
         order = (self._row[:, np.newaxis] + 1 + np.arange(self._rows)) % self._rows
@@ -145,7 +149,7 @@ class Heap(Queue):
     def __init__(self, batch: int, items: int) -> None:
         super().__init__(batch, items)
         self._filling: Bools = np.zeros(batch, np.bool_)
-        self._clearing = 2 ** (index_bits(items) - 1)
+        self._clearing: int = 2 ** (index_bits(items) - 1)
 
     @property
     def empty(self) -> Bools:
@@ -229,6 +233,18 @@ class Keys(ABC):
         """A rising edge."""
 
 
+def check_times(name: str, times: Ints, time_bits: int | None) -> None:
+    """Raises `ValueError` if a time of many bits does not fit; `name` is what `times` are, as "deadline"."""
+    if time_bits is None:
+        return
+    if not _SHORTEST_TIME <= time_bits <= _LONGEST_TIME:
+        raise ValueError(f"time_bits is {time_bits}; legal: {_SHORTEST_TIME} to {_LONGEST_TIME}")
+    longest = int(times.max())
+    if longest >= 2 ** (time_bits - 3):
+        needed = longest.bit_length() + 3
+        raise ValueError(f"time_bits is {time_bits}; legal: {needed} and more for a {name} of {longest} cycles")
+
+
 class Times(Keys):
     """Keys are the time at which a task leaves the arrivals and an offset (B, N) of its requester."""
 
@@ -266,31 +282,26 @@ def is_overdue(key: Ints, now: Ints, eighth: int) -> Bools:
     return overdue
 
 
-class Engine(Scheduler):
-    """firm_sched_engine, with the queue and the keys of a policy.
+@dataclass(frozen=True)
+class Preemption:
+    """How a task with a smaller key takes the grant, and whether the key of the task that sends grows by one a beat."""
 
-    `is_preemptive`: a task with a smaller key takes the grant. `sends_own_time`: the key of the task that sends grows by one
-    a beat.
-    """
+    shortest_run: int = 1
+    sends_own_time: bool = False
+
+
+class Engine(Scheduler):
+    """firm_sched_engine, with the queue and the keys of a policy; non-preemptive if `preemption` is None."""
 
     def __init__(
-        self,
-        batch: int,
-        requesters: int,
-        queue: Queue,
-        keys: Keys,
-        *,
-        is_preemptive: bool = False,
-        sends_own_time: bool = False,
-        shortest_run: int = 1,
+        self, batch: int, requesters: int, queue: Queue, keys: Keys, preemption: Preemption | None = None
     ) -> None:
         super().__init__(batch, requesters)
         self._arrivals = Arrivals(batch, requesters)
         self._queue = queue
         self._keys = keys
-        self._is_preemptive = is_preemptive
-        self._sends_own_time = sends_own_time
-        self._shortest_run = shortest_run
+        self._is_preemptive = preemption is not None
+        self._rules = preemption or Preemption()
         nobody: Bools = np.zeros(batch, np.bool_)
         nothing: Ints = np.zeros(batch, np.int64)
         self._b_valid, self._b_id, self._b_key = nobody, nothing, nothing
@@ -318,7 +329,7 @@ class Engine(Scheduler):
         insert = self._b_valid & ~take_b & queue.ready(pop)
         b_is_free = ~self._b_valid | take_b | insert
         a_enters_b = a_valid & b_is_free & key_ready & ~(preempt | take_a | (a_is_own & (finished | ~choose)))
-        next_key = self._key + (beat & advance) if self._sends_own_time else self._key
+        next_key = self._key + (beat & advance) if self._rules.sends_own_time else self._key
 
         queue.step(insert, self._b_id, self._b_key, pop)
         arrivals.step(keys.initialised, request, take_a | get_key | a_enters_b, finished, self.grant_select)
@@ -337,7 +348,7 @@ class Engine(Scheduler):
         self.grant_valid = given | preempt | (self.grant_valid & ~(choose & ~empty))
         self._running = given | ~choose
         self._keyed = given | (~choose & (self._keyed | get_key))
-        self._beats = np.where(choose | preempt, 0, np.minimum(self._beats + beat, self._shortest_run))
+        self._beats = np.where(choose | preempt, 0, np.minimum(self._beats + beat, self._rules.shortest_run))
 
     def _preempt(self, request: Bools, beat: Bools, finished: Bools, root_valid: Bools, root_key: Ints) -> Bools:
         """Where the root takes the grant from a task that is not over."""
@@ -346,7 +357,7 @@ class Engine(Scheduler):
         preempt = self._running & self._keyed & root_valid & (root_key < self._key) & ~finished
         if not self._queue.ready_with_pop:
             preempt &= ~self._b_valid
-        if self._shortest_run > 1:
-            beats = np.minimum(self._beats + beat, self._shortest_run)
-            preempt &= (beats == 0) | (beats == self._shortest_run) | ~self._of_granted(request)
+        if self._rules.shortest_run > 1:
+            beats = np.minimum(self._beats + beat, self._rules.shortest_run)
+            preempt &= (beats == 0) | (beats == self._rules.shortest_run) | ~self._of_granted(request)
         return preempt

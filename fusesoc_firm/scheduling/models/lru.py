@@ -46,7 +46,7 @@ class Stamps(Keys):
         self._count: Ints = np.full(batch, self._size)
         self._sweep: Ints = np.zeros(batch, np.int64)
         self._steps: Ints = np.zeros(batch, np.int64)
-        self._initial_cycles = self._size
+        self._initial_cycles: int = self._size
 
     @property
     def initialised(self) -> bool:
@@ -54,7 +54,8 @@ class Stamps(Keys):
         return self._initial_cycles == 0
 
     def _reads(self, wanted: Bools, finished: Bools) -> Bools:
-        return wanted & ~(finished | (self._steps == self._STEPS))
+        is_due: Bools = self._steps == self._STEPS
+        return wanted & ~(finished | is_due)
 
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
         """See `Keys`."""

@@ -35,16 +35,17 @@ class Parallel(Scheduler):
         eligible = self._without_granted(self._known, finished)
         beats = np.minimum(self._beats + beat, self._shortest_run)
         kept = (beats > 0) & (beats < self._shortest_run) & self._of_granted(request) & ~finished
-        advance: Bools = np.ones(self.batch, np.bool_)
-        if self._eighth is not None:
-            advance = ~is_overdue(self._keys, self._time[:, np.newaxis], self._eighth).any(axis=1)
-
         # Twice the key, so that the task that has the grant fits in front of equal ones.
         ranks = np.where(eligible, 2 * self._keys + 1, _NOBODY)
         ranks[self._members, granted] -= eligible[self._members, granted]
-        self._grant(ranks.argmin(axis=1), eligible.any(axis=1) & ~kept)
+        first: Ints = ranks.argmin(axis=1)
+        is_any = eligible.any(axis=1)
+        self._grant(first, is_any & ~kept)
         self._beats = np.where(finished | (self.grant_select != granted), 0, beats)
 
+        advance: Bools = np.ones(self.batch, np.bool_)
+        if self._eighth is not None:
+            advance = ~(is_any & is_overdue(self._keys[self._members, first], self._time, self._eighth))
         if self._sends_own_time:
             self._keys[self._members, granted] += beat & advance
         self._keys = np.where(self._known, self._keys, self._time[:, np.newaxis] + self._offsets)

@@ -111,3 +111,19 @@ def test_a_scheduler_without_times_shows_none(tmp_path: Path) -> None:
     found = system(tmp_path, "width: 8", "wcet: 7")
     assert found.scheduling == Scheduling("fixed_priority", (PublisherTimes(None, 7, None),), False, 16, 8)
     assert "shortestRun" not in derived_description(found)["System"]
+
+
+def test_auto_takes_the_smallest_that_holds_all_deadlines(tmp_path: Path) -> None:
+    relaxed = system(tmp_path, "scheduler: auto", "period: 500", "period: 700").scheduling
+    assert relaxed.policy == "fixed_priority"
+    # The second one's deadline is shorter than the first one's frame, and it has the lower priority.
+    urgent = system(
+        tmp_path, "scheduler: auto", "message: geometry_msgs/Pose, period: 2000", "period: 100, deadline: 60"
+    )
+    assert urgent.scheduling.policy == "edf_latency"
+    assert urgent.scheduling.is_preemptive
+    assert derived_description(urgent)["System"]["because"] == [*urgent.scheduling.reasons]
+    first = system(
+        tmp_path, "scheduler: auto", "period: 100, deadline: 60", "message: geometry_msgs/Pose, period: 2000"
+    )
+    assert first.scheduling.policy == "fixed_priority_preemptive"

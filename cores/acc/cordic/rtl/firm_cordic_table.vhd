@@ -4,7 +4,7 @@
 -- ieee.math_real has 53 bits, too few for a fraction of 60, and does not synthesise everywhere: so the
 -- angles stand here as literals. Each is round(atan(2**-i) * 2**96), from the series
 -- x - x**3/3 + x**5/5 - ... summed in exact fractions; i = 0 by Machin's 4*atan(1/5) - atan(1/239).
--- tests/sim/test_quat2euler.py computes them again.
+-- tests/sim/test_quat2euler.py computes them again. Beside them stands what undoes the gain of all rotations.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -17,6 +17,10 @@ package firm_cordic_table is
 
   -- atan(2**-index) in rad, rounded to the nearest multiple of 2**-fraction; index <= fraction <= 64.
   function arctangent(index : natural; fraction : positive) return unsigned;
+
+  -- The product of 1/sqrt(1 + 4**-i) over all i, 0.60725, cut off behind `fraction` bits; fraction <= 80. Of n
+  -- rotations it is 4**-n too small at most, which is nothing beside the angle that they leave over.
+  function inverse_gain(fraction : positive) return unsigned;
 
 end package firm_cordic_table;
 
@@ -92,6 +96,8 @@ package body firm_cordic_table is
     X"000000000000000200000000"
   );
 
+  constant EXACT_INVERSE_GAIN : unsigned(79 downto 0) := X"9B74EDA8435E5A67F5F9";
+
   function arctangent(index : natural; fraction : positive) return unsigned is
     constant EXACT : angle_t := ARCTANGENTS(index);
     variable result : unsigned(fraction-1 downto 0);
@@ -102,5 +108,10 @@ package body firm_cordic_table is
     end if;
     return result;
   end function arctangent;
+
+  function inverse_gain(fraction : positive) return unsigned is
+  begin
+    return EXACT_INVERSE_GAIN(79 downto 80-fraction);
+  end function inverse_gain;
 
 end package body firm_cordic_table;

@@ -1,0 +1,323 @@
+"""What each policy means for a set of tasks: bounds on response and lateness, buffers, and which policy is best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from math import floor, inf
+
+from fusesoc_firm.scheduling import area, response
+from fusesoc_firm.scheduling.dissertation import dissertation
+from fusesoc_firm.scheduling.policies import POLICIES
+from fusesoc_firm.scheduling.response import Overheads
+from fusesoc_firm.scheduling.tasks import Task
+
+# Above this LRU takes its requests in one after the other, and so do those that compare deadlines above the other one.
+_MOST_AT_ONCE = {"lru": 16, "edf_latency": 8, "lst": 8, "edf_resources": 0}
+
+
+class Criterion(StrEnum):
+    """What the best policy is best at."""
+
+    LUTS = "luts"
+    LATENESS = "lateness"
+    FINISH = "finish"
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What is certain of a task, in cycles; None is no bound: it may never be served.
+
+    `buffer` are the bytes that the accelerator may have to keep (section 6.3.2): what comes while the task is late.
+    """
+
+    task: Task
+    response: int | None
+    buffer: int | None
+
+    @property
+    def lateness(self) -> int | None:
+        """The most cycles between deadline and end; negative if the task is always early (equation 4.5)."""
+        return None if self.response is None else self.response - self.task.deadline
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What a policy does with the tasks; `bounds` are in the order of the tasks.
+
+    `priorities` are the tasks' names, the highest first, if the policy has fixed ones. `lut` is None if not known.
+    """
+
+    policy: str
+    bounds: tuple[Bound, ...]
+    priorities: tuple[str, ...] = ()
+    lut: int | None = None
+
+    @property
+    def all_finish(self) -> bool:
+        """Whether nobody can starve."""
+        return all(bound.response is not None for bound in self.bounds)
+
+    @property
+    def is_schedulable(self) -> bool:
+        """Whether no deadline can be missed."""
+        return self.worst_lateness <= 0
+
+    @property
+    def worst_lateness(self) -> float:
+        """The greatest bound on a lateness; infinite if somebody may starve."""
+        return max(inf if bound.lateness is None else bound.lateness for bound in self.bounds)
+
+    @property
+    def latest(self) -> Bound:
+        """The task that this is the bound of."""
+        return max(self.bounds, key=lambda bound: inf if bound.lateness is None else bound.lateness)
+
+    @property
+    def buffer(self) -> int | None:
+        """Bytes of all buffers; None if one has no bound."""
+        sizes = [bound.buffer for bound in self.bounds]
+        return None if None in sizes else sum(size for size in sizes if size is not None)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What the tasks share: bytes of a beat, and the least beats of a run that may be interrupted."""
+
+    beat_bytes: int = 1
+    shortest_run: int = 1
+
+
+def utilisation(tasks: Sequence[Task]) -> float:
+    """The part of the channel that the tasks ask for (equation 4.1)."""
+    return sum(task.transfer_time / task.period for task in tasks)
+
+
+def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overheads:
+    """What the cores of a policy cost (cores/sched).
+
+    A scheduler that chooses among all requests at once needs a cycle, or two if it compares times. One with a queue
+    takes in a request a cycle; each may lead to three operations of the queue (it goes in, who is interrupted goes in,
+    the next comes out), of two cycles each in a heap.
+    """
+    run, resume = (shortest_run, 1) if POLICIES[policy].is_preemptive else (0, 0)
+    if requesters <= _MOST_AT_ONCE.get(policy, requesters):
+        return Overheads(1 if policy not in _MOST_AT_ONCE or policy == "lru" else 2, 0, run, resume)
+    operation = 1 if policy == "edf_latency" else 2
+    return Overheads(2, 3 * operation * requesters + 8, run, resume, shortest_service=4)
+
+
+def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *, is_ordered: bool = False) -> Analysis:
+    """Bounds under a policy; with fixed priorities, under the best assignment that is found.
+
+    If the tasks are `is_ordered`, they stand in the order of their priorities, the highest first.
+
+    The bounds hold for the cores' cycle-exact models with a sink that takes every beat; tests hold them against
+    simulation.
+    """
+    overheads = overheads_of(policy, len(tasks), channel.shortest_run)
+    order: Sequence[Task] = ()
+    if POLICIES[policy].is_fixed:
+        order = tasks if is_ordered else assign_priorities(policy, tasks, overheads)
+        by_name = {
+            task.name: _fixed(policy, task, order[:place], order[place + 1 :], overheads)
+            for place, task in enumerate(order)
+        }
+        responses = [by_name[task.name] for task in tasks]
+    else:
+        responses = _RESPONSES[policy](tasks, overheads)
+    bounds = tuple(
+        Bound(task, found, _buffer(task, found, channel)) for task, found in zip(tasks, responses, strict=True)
+    )
+    return Analysis(policy, bounds, tuple(task.name for task in order), luts(policy, len(tasks)))
+
+
+def luts(policy: str, requesters: int) -> int | None:
+    """LUTs of a scheduler: what was measured of ours, or else the dissertation's table 4.1; None if neither has it."""
+    if measured := area.measured():
+        found = area.at(measured, policy, requesters)
+        return found.lut if found else None
+    known = {number: lut for number, (lut, _) in dissertation().area.get(policy, {}).items() if number >= requesters}
+    return int(known[min(known)]) if known else None
+
+
+def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
+    """Bytes that come while a task is late: those of the requests after it, a beat a cycle at most.
+
+    That is never more than section 6.3.2's rule, a byte for each cycle of the greatest lateness.
+    """
+    if response is None:
+        return None
+    late = max(0, response - task.deadline)
+    whole, rest = divmod(late, task.period)
+    return (whole * task.transfer_time + min(rest, task.transfer_time)) * channel.beat_bytes
+
+
+# --- Priorities --------------------------------------------------------------------------------------------------
+
+
+def assign_priorities(policy: str, tasks: Sequence[Task], overheads: Overheads) -> tuple[Task, ...]:
+    """The tasks, the highest priority first.
+
+    Deadline monotonic is optimal with preemption if no deadline is longer than its period (J. Leung and J. Whitehead,
+    1982). Otherwise from the lowest priority up, each goes to a task that meets its deadline there (N. Audsley, 1991),
+    to the one with the longest deadline if several do, or if none does.
+    """
+    by_deadline = sorted(tasks, key=lambda task: task.deadline)
+    if POLICIES[policy].is_preemptive and all(task.deadline <= task.period for task in tasks):
+        return tuple(by_deadline)
+    left = by_deadline
+    assigned: list[Task] = []
+    while left:
+        lowest = next((task for task in reversed(left) if _meets(policy, task, left, assigned, overheads)), left[-1])
+        left = [task for task in left if task is not lowest]
+        assigned.append(lowest)
+    return tuple(reversed(assigned))
+
+
+def _meets(policy: str, task: Task, left: Sequence[Task], lower: Sequence[Task], overheads: Overheads) -> bool:
+    higher = [other for other in left if other is not task]
+    found = _fixed(policy, task, higher, lower, overheads)
+    return found is not None and found <= task.deadline
+
+
+def _fixed(policy: str, task: Task, higher: Sequence[Task], lower: Sequence[Task], overheads: Overheads) -> int | None:
+    if POLICIES[policy].is_preemptive:
+        return response.fixed_priority_preemptive(task, higher, overheads)
+    return response.fixed_priority(task, higher, lower, overheads)
+
+
+# --- Dynamic priorities ------------------------------------------------------------------------------------------
+
+
+def _others(task: Task, tasks: Sequence[Task]) -> list[Task]:
+    return [other for other in tasks if other is not task]
+
+
+def _turns(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
+    return [response.taking_turns(task, _others(task, tasks), overheads) for task in tasks]
+
+
+def _edf(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
+    lateness = response.edf_by_demand(tasks, overheads)
+    counted = (response.edf_by_counting(task, _others(task, tasks), overheads) for task in tasks)
+    return [_least(task, lateness, bound) for task, bound in zip(tasks, counted, strict=True)]
+
+
+def _lst(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
+    lateness = response.lst_by_demand(tasks, overheads)
+    counted = (response.lst_by_counting(task, _others(task, tasks), overheads) for task in tasks)
+    return [_least(task, lateness, bound) for task, bound in zip(tasks, counted, strict=True)]
+
+
+def _least(task: Task, lateness: float, counted: int) -> int:
+    """The lesser of two bounds, of which the first is on the lateness of any task."""
+    return counted if lateness == inf else min(task.deadline + floor(lateness), counted)
+
+
+_RESPONSES: Mapping[str, Callable[[Sequence[Task], Overheads], list[int | None]]] = {
+    "lru": _turns,
+    "round_robin": _turns,
+    "edf_resources": _edf,
+    "edf_latency": _edf,
+    "lst": _lst,
+}
+
+
+# --- The choice --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Choice:
+    """All policies, the best one first, and why it is."""
+
+    criterion: Criterion
+    utilisation: float
+    analyses: tuple[Analysis, ...]
+    reasons: tuple[str, ...]
+
+    @property
+    def best(self) -> Analysis:
+        """The chosen one."""
+        return self.analyses[0]
+
+
+def choose(
+    tasks: Sequence[Task],
+    criterion: Criterion = Criterion.LUTS,
+    channel: Channel = Channel(),
+    *,
+    is_ordered: bool = False,
+) -> Choice:
+    """The best policy; `is_ordered` as in `analyse`. Raises `ValueError` for no tasks, or two of one name."""
+    if not tasks:
+        raise ValueError("there are no tasks")
+    if len({task.name for task in tasks}) < len(tasks):
+        raise ValueError("two tasks have the same name")
+    analyses = sorted(
+        (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in POLICIES), key=_RANKS[criterion]
+    )
+    load = utilisation(tasks)
+    return Choice(criterion, load, tuple(analyses), tuple(_reasons(analyses, criterion, load)))
+
+
+def _luts_rank(analysis: Analysis) -> float:
+    return inf if analysis.lut is None else analysis.lut
+
+
+# Who keeps all deadlines goes before who does not, who lets all finish before who does not; then what is asked for.
+_RANKS: Mapping[Criterion, Callable[[Analysis], tuple[float, ...]]] = {
+    Criterion.LUTS: lambda each: (
+        not each.is_schedulable,
+        not each.all_finish,
+        _luts_rank(each),
+        each.worst_lateness,
+    ),
+    Criterion.LATENESS: lambda each: (not each.all_finish, each.worst_lateness, _luts_rank(each)),
+    Criterion.FINISH: lambda each: (not each.all_finish, _luts_rank(each), each.worst_lateness),
+}
+
+
+def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float) -> list[str]:
+    best = analyses[0]
+    found = [f"The publishers ask for {100 * load:.1f} % of the channel."]
+    if load > 1:
+        found[0] += " That is more than there is: each sends less often than its period says."
+    holding = [each for each in analyses if each.is_schedulable]
+    finishing = [each for each in analyses if each.all_finish]
+    if criterion is Criterion.FINISH:
+        found.append(f"Everybody finishes under {len(finishing)} of {len(analyses)} policies.")
+    elif holding:
+        found.append(f"All deadlines hold under {len(holding)} of {len(analyses)} policies.")
+    else:
+        found.append("No policy is certain to hold all deadlines.")
+    found.append(f"{best.policy} {_MERITS[criterion](best)}")
+    if best.priorities:
+        found.append(f"Its priorities, the highest first: {', '.join(best.priorities)}. So must the publishers stand.")
+    return found
+
+
+def _lut_words(analysis: Analysis) -> str:
+    if analysis.lut is None:
+        return "takes a number of LUTs that is not known"
+    source = "measured" if area.measured() else "by the dissertation's table 4.1"
+    return f"takes the fewest LUTs of these, {analysis.lut} ({source})"
+
+
+_MERITS: Mapping[Criterion, Callable[[Analysis], str]] = {
+    Criterion.LUTS: lambda best: f"{_lut_words(best)}; {end_of(best)}",
+    Criterion.LATENESS: lambda best: f"has the smallest worst lateness: {end_of(best)}",
+    Criterion.FINISH: lambda best: f"{_lut_words(best)}; {end_of(best)}",
+}
+
+
+def end_of(analysis: Analysis) -> str:
+    """How the worst end stands to its deadline, in words."""
+    latest = analysis.latest
+    name, lateness = latest.task.name, latest.lateness
+    if lateness is None:
+        return f"'{name}' may never be served."
+    if lateness <= 0:
+        return f"the closest end, that of '{name}', is {-lateness} cycles before its deadline."
+    return f"'{name}' may end {lateness} cycles after its deadline."

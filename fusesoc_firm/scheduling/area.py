@@ -1,0 +1,57 @@
+"""LUTs and flip-flops of the schedulers: what `make bench` measured, where it has.
+
+The file is `area.csv` beside this module, with the columns policy, requesters, lut, ff. Of a policy or a number that it
+has not, nothing is known here.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+
+COLUMNS = ("policy", "requesters", "lut", "ff")
+FILE = "area.csv"
+
+
+@dataclass(frozen=True)
+class Area:
+    """What a scheduler takes."""
+
+    lut: int
+    ff: int
+
+    def __str__(self) -> str:
+        return f"{self.lut}/{self.ff}"
+
+
+Areas = Mapping[tuple[str, int], Area]
+
+
+@cache
+def measured() -> Areas:
+    """By policy and number of requesters; empty if nothing was measured."""
+    file = resources.files(__package__) / FILE
+    return read(file.read_text(encoding="utf-8")) if file.is_file() else {}
+
+
+def read(text: str) -> dict[tuple[str, int], Area]:
+    """The areas in the text of a file."""
+    rows = csv.DictReader(text.splitlines())
+    return {(row["policy"], int(row["requesters"])): Area(int(row["lut"]), int(row["ff"])) for row in rows}
+
+
+def write(path: Path, areas: Areas) -> None:
+    """Write what was measured, in the order of names and numbers."""
+    lines: Iterable[tuple[object, ...]] = ((*key, area.lut, area.ff) for key, area in sorted(areas.items()))
+    text = "\n".join(",".join(map(str, line)) for line in (COLUMNS, *lines))
+    path.write_text(f"{text}\n", encoding="utf-8")
+
+
+def at(areas: Areas, policy: str, requesters: int) -> Area | None:
+    """The area for a number of requesters, or for the next larger one that is known; None if there is none."""
+    known = [number for name, number in areas if name == policy and number >= requesters]
+    return areas[policy, min(known)] if known else None

@@ -1,0 +1,30 @@
+"""The values of the dissertation's tables 4.1 to 4.6, from the file of facts beside this module."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+import yaml
+
+Row = list[float]
+
+
+@dataclass(frozen=True)
+class Dissertation:
+    """Tables by policy and number of accelerators; the rows are described in the file."""
+
+    area: dict[str, dict[int, Row]]
+    edf_ratio: dict[int, Row]
+    response_time: dict[str, dict[int, Row]]
+    lateness: dict[str, dict[int, Row]]
+    combined_area: dict[str, Row]
+    comparison: dict[int, dict[str, list[str]]]
+
+
+@cache
+def dissertation() -> Dissertation:
+    """All tables."""
+    file = resources.files(__package__) / "dissertation.yaml"
+    return Dissertation(**yaml.safe_load(file.read_text(encoding="utf-8")))

@@ -1,0 +1,125 @@
+"""Tables and figures as plain values, and their Markdown and CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+UNKNOWN = "-"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the dissertation again: its number there (`4.3`), a title, rows of cells, and what must be said."""
+
+    number: str
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+    @property
+    def file_name(self) -> str:
+        """Without a suffix, such as `table_4_3`."""
+        return f"table_{self.number.replace('.', '_')}"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A diagram: values by the name of the scheduler, one for each number of accelerators; NaN is no value.
+
+    `dissertation` are its values, where its tables hold them.
+    """
+
+    title: str
+    series: Mapping[str, Sequence[float]]
+    dissertation: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the dissertation again, with diagrams side by side over the numbers of accelerators."""
+
+    number: str
+    title: str
+    unit: str
+    requesters: tuple[int, ...]
+    panels: tuple[Panel, ...]
+
+    @property
+    def file_name(self) -> str:
+        """Without a suffix, such as `figure_4_10`."""
+        return f"figure_{self.number.replace('.', '_')}"
+
+
+def decimal(value: float | None) -> str:
+    """A value as the dissertation's tables have it, with two digits behind the point."""
+    return UNKNOWN if value is None or math.isnan(value) else f"{value:.2f}"
+
+
+def markdown(table: Table) -> str:
+    """The table under its heading, with aligned columns."""
+    text = f"### Table {table.number}: {table.title}\n\n{grid(table.columns, table.rows)}"
+    return f"{text}\n{table.note}\n" if table.note else text
+
+
+def figure_markdown(figure: Figure) -> str:
+    """The values of a figure under its heading, a table a panel."""
+    parts = [f"### Figure {figure.number}: {figure.title} ({figure.unit})\n"]
+    for panel in figure.panels:
+        columns = ("accelerators", *panel.series)
+        rows = [
+            (str(number), *(decimal(values[index]) for values in panel.series.values()))
+            for index, number in enumerate(figure.requesters)
+        ]
+        parts.append(f"{panel.title}:\n\n{grid(columns, rows)}")
+    return "\n".join(parts)
+
+
+def grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table; the first column to the left, numbers to the right."""
+    lines = [columns, *rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(columns))]
+    rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (width + 1) + ":" for width in widths[1:]), ""])
+    heading, *body = (
+        " | ".join([line[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(line[1:], widths[1:], strict=True))])
+        for line in lines
+    )
+    return "\n".join([f"| {heading} |", rule, *(f"| {line} |" for line in body)]) + "\n"
+
+
+def table_csv(table: Table) -> str:
+    """The table's cells; what is unknown is empty."""
+    return _csv(table.columns, [["" if cell == UNKNOWN else cell for cell in row] for row in table.rows])
+
+
+def figure_csv(figure: Figure) -> str:
+    """A row for each point, with the dissertation's value where it is known."""
+    rows = [
+        [
+            panel.title,
+            name,
+            number,
+            _number(values[index]),
+            _number(panel.dissertation[name][index] if name in panel.dissertation else math.nan),
+        ]
+        for panel in figure.panels
+        for name, values in panel.series.items()
+        for index, number in enumerate(figure.requesters)
+    ]
+    return _csv(("panel", "scheduler", "accelerators", "value", "dissertation"), rows)
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.6g}"
+
+
+def _csv(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,191 @@
+"""`firm system new`: a specification by questions, along the grammar.
+
+Which keys there are, what they mean and which answers are legal all comes from `specification`. An existing file is
+extended and keeps its comments; in a new one each key is explained where it stands for the first time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
+
+from fusesoc_firm.prompts import Asker, Question
+from fusesoc_firm.system.specification import (
+    CONVERTER,
+    PUBLISHER,
+    Accelerator,
+    Block,
+    Outgoing,
+    Project,
+    Specification,
+)
+from fusesoc_firm.yaml_sections import Key, Section, keys_of
+
+# Names that answers of a key are taken from, by what they are.
+MessageNames = Callable[[], Sequence[str]]
+
+_YES, _NO = "yes", "no"
+
+
+def extend_specification(path: Path, asker: Asker, message_names: MessageNames) -> None:
+    """Ask for a specification and write it, or for more of one that is there."""
+    yaml = YAML()
+    yaml.indent(sequence=4, offset=2)
+    yaml.width = 10**6
+    is_new = not path.exists()
+    content = CommentedMap() if is_new else yaml.load(path.read_text(encoding="utf-8"))
+    _Wizard(asker, message_names, content, is_new).run()
+    with path.open("w", encoding="utf-8") as file:
+        yaml.dump(content, file)
+
+
+@dataclass
+class _Wizard:
+    """The state of one run: the specification as far as it is known; in a new one, which keys have been explained."""
+
+    asker: Asker
+    message_names: MessageNames
+    content: Any
+    is_new: bool
+    explained: set[str] = field(default_factory=set)
+
+    def run(self) -> None:
+        """All questions, in the order of the grammar."""
+        if self.is_new:
+            self.asker.tell("project")
+            self.content["project"] = self._section(Project)
+        for name in ("accelerators", "blocks"):
+            if added := self._sections(name, _key(Specification, name)):
+                self.content.setdefault(name, []).extend(added)
+        if not self.is_new:
+            self._connect_blocks()
+
+    def _connect_blocks(self) -> None:
+        """Further connections from blocks that the file has."""
+        blocks = {str(block["name"]): block for block in self.content.get("blocks", [])}
+        question = Question("block", "one that gets further connections", [*blocks], is_choice=True)
+        while name := self.asker.ask(question):
+            if added := self._sections("outgoing", _key(Block, "outgoing"), name):
+                blocks[name].setdefault("outgoing", []).extend(added)
+
+    # --- sections --------------------------------------------------------------------------------------------------
+
+    def _sections(self, name: str, entry: Key, owner: str = "") -> list[CommentedMap]:
+        """As many sections as are wanted, at least one where there must be one."""
+        assert entry.section
+        question = Question(f"add to '{name}'", entry.meaning, (_YES, _NO), is_choice=True, default=_NO)
+        found: list[CommentedMap] = []
+        while (entry.is_required and self.is_new and not found) or self.asker.ask(question) == _YES:
+            self.asker.tell(f"{name} {len(found) + 1}{f' of {owner}' if owner else ''}")
+            found.append(self._section(entry.section, found))
+        return found
+
+    def _section(self, section: type[Section], siblings: Sequence[CommentedMap] = ()) -> CommentedMap:
+        """One section, key by key."""
+        draft = _Draft(section, siblings)
+        for name, (field_name, entry) in keys_of(section).items():
+            if draft.has(entry) and (value := self._value(draft, name, field_name, entry)):
+                draft.made[name] = value
+                self._explain(draft.made, name, entry)
+        return draft.made
+
+    def _explain(self, made: CommentedMap, name: str, entry: Key) -> None:
+        """Say what a key means where it stands for the first time; a section's name says enough."""
+        if self.is_new and entry.section is None and name not in self.explained:
+            self.explained.add(name)
+            made.yaml_add_eol_comment(entry.meaning, name)
+
+    def _value(self, draft: _Draft, name: str, field_name: str, entry: Key) -> Any:
+        """A key's value; empty if it is left out."""
+        if entry.form == "sections":
+            return self._sections(name, entry, str(draft.made.get("name", "")))
+        if entry.form == "section":
+            assert entry.section
+            return self._section(entry.section)
+        is_type = draft.section is Block and name == "type"
+        question = Question(
+            name,
+            entry.meaning,
+            self._words(draft.section, name, entry),
+            is_choice=bool(entry.choices) or is_type,
+            is_required=draft.needs(entry),
+            default=_default(draft.section, field_name),
+            check=lambda answer: self._fault(draft, name, entry, answer),
+        )
+        if entry.form == "texts":
+            return self._texts(question)
+        answer = self.asker.ask(question)
+        if answer == question.default:
+            return None
+        # A number is as good a word, and reads better without quotes.
+        return int(answer) if answer.isdecimal() and str(int(answer)) == answer else answer
+
+    def _texts(self, question: Question) -> list[str]:
+        """One answer after the other, until an empty one."""
+        found: list[str] = []
+        while answer := self.asker.ask(question):
+            found.append(answer)
+            question = Question(f"one more of {question.name}", question.meaning, question.words)
+        return found
+
+    # --- answers ---------------------------------------------------------------------------------------------------
+
+    def _words(self, section: type[Section], name: str, entry: Key) -> Sequence[str]:
+        """What an answer can be completed to."""
+        if entry.choices:
+            return [str(choice) for choice in entry.choices]
+        if name == "message":
+            return self.message_names()
+        if section is Block and name == "type":
+            return self._names("accelerators")
+        if section is Outgoing and name == "name":
+            return self._names("blocks")
+        return ()
+
+    def _names(self, name: str) -> list[str]:
+        return [str(item["name"]) for item in self.content.get(name, [])]
+
+    def _fault(self, draft: _Draft, name: str, entry: Key, answer: str) -> str | None:
+        """What makes an answer wrong, beyond the grammar's choices."""
+        if entry.form == "integer" and not answer.isdecimal():
+            return f"'{name}' must be an integer, not '{answer}'"
+        if name == "name" and draft.section in (Accelerator, Block):
+            taken = self._names("blocks" if draft.section is Block else "accelerators")
+            if answer in (*taken, *(str(item["name"]) for item in draft.siblings)):
+                return f"there is '{answer}' already"
+        return None
+
+
+@dataclass
+class _Draft:
+    """A section on its way, beside those of its list that are made."""
+
+    section: type[Section]
+    siblings: Sequence[CommentedMap]
+    made: CommentedMap = field(default_factory=CommentedMap)
+
+    def has(self, entry: Key) -> bool:
+        """Whether a key is asked for, after the answers so far: what a block is decides which ones it has."""
+        if self.section is not Block or not entry.only_of:
+            return True
+        if entry.only_of == PUBLISHER:
+            return bool(self.made.get("mode") == PUBLISHER)
+        return "type" not in self.made
+
+    def needs(self, entry: Key) -> bool:
+        """Whether a key must be there: a converter has all of one word that the grammar leaves open to a block."""
+        return entry.is_required or (entry.only_of == CONVERTER and entry.form == "text")
+
+
+def _default(section: type[Section], field_name: str) -> str:
+    (default,) = (item.default for item in fields(section) if item.name == field_name)
+    return str(default) if isinstance(default, str | int) else ""
+
+
+def _key(section: type[Section], name: str) -> Key:
+    return keys_of(section)[name][1]

@@ -1,0 +1,45 @@
+"""Programs that speak for the C++ headers of `fusesoc_firm/host/cpp`: lines in, lines out."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import fusesoc_firm.host
+
+HERE = Path(__file__).resolve().parent
+HEADERS = Path(fusesoc_firm.host.__file__).resolve().parent / "cpp"
+_OPTIONS = ["-std=c++17", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-pthread"]
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A compiled driver."""
+
+    program: Path
+
+    def answers(self, lines: Sequence[str]) -> list[str]:
+        """What it says to `lines`; fails if it, or a sanitizer, ends with a fault."""
+        return self._run([], "".join(f"{line}\n" for line in lines)).splitlines()
+
+    def run(self, *arguments: str) -> None:
+        """Run it on its own."""
+        self._run(list(arguments), "")
+
+    def _run(self, arguments: list[str], text: str) -> str:
+        done = subprocess.run(
+            [self.program, *arguments], input=text, capture_output=True, text=True, timeout=120, check=False
+        )
+        assert done.returncode == 0 and not done.stderr, done.stderr
+        return done.stdout
+
+
+def compile_driver(name: str, directory: Path, sanitizers: str = "address,undefined") -> Driver:
+    """Compile `<name>_driver.cpp` with all warnings and these sanitizers."""
+    program = directory / f"{name}_{sanitizers.replace(',', '_')}"
+    sanitize = [f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all"]
+    command = ["g++", *_OPTIONS, *sanitize, "-I", str(HEADERS), str(HERE / f"{name}_driver.cpp"), "-o", str(program)]
+    subprocess.run(command, check=True)
+    return Driver(program)

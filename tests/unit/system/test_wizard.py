@@ -1,0 +1,151 @@
+"""`firm system new`: answers in, a specification out that is as if somebody had written it."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.prompts import PipeAsker, Question
+from fusesoc_firm.system.specification import Accelerator, Block, Outgoing, Project
+from fusesoc_firm.system.wizard import extend_specification
+from fusesoc_firm.yaml_sections import keys_of
+from tests.unit.system.systems import connections, derived
+
+POINT, VECTOR = "geometry_msgs/Point", "geometry_msgs/Vector3"
+
+
+class Answers:
+    """Answers by question, in turn; whatever is not said is left at its default. It notes what was asked."""
+
+    def __init__(self, **answers: list[str]) -> None:
+        self._answers = {name.replace("_", " "): [*given] for name, given in answers.items()}
+        self.asked: list[Question] = []
+
+    def ask(self, question: Question) -> str:
+        self.asked.append(question)
+        given = self._answers.get(question.name.replace("'", ""), [])
+        answer = given.pop(0) if given else ""
+        assert question.fault(answer) is None, (question.name, answer)
+        return answer or question.default
+
+    def tell(self, text: str) -> None:
+        pass
+
+    @property
+    def is_used_up(self) -> bool:
+        return not any(self._answers.values())
+
+
+def turner() -> Answers:
+    """A system of a subscriber, an accelerator and a publisher."""
+    return Answers(
+        name=["turn", "turner", "sub", "acc", "acc", "pub", "pub"],
+        width=["16"],
+        add_to_accelerators=["yes"],
+        type=["VHDL", "", "turner", ""],
+        sources=["acc.vhd"],
+        add_to_input=["yes"],
+        add_to_output=["yes"],
+        middleware=["ROS", "ROS", "ROS", "ROS"],
+        message=[POINT, VECTOR, POINT, VECTOR],
+        mode=["subscriber", "publisher"],
+        add_to_blocks=["yes", "yes"],
+        add_to_outgoing=["yes", "no", "yes", "no"],
+        period=["500"],
+    )
+
+
+def run(path: Path, answers: Answers) -> str:
+    extend_specification(path, answers, lambda: [POINT, VECTOR])
+    assert answers.is_used_up
+    return path.read_text(encoding="utf-8")
+
+
+def test_a_new_specification(tmp_path: Path) -> None:
+    text = run(tmp_path / "robot.yaml", turner())
+    system = derived(tmp_path, text)
+    assert (system.name, system.width) == ("turn", 16)
+    assert connections(system) == ["sub. -> acc.in_", "acc.out_ -> pub."]
+    assert system.scheduling.times[0].period == 500
+
+
+def test_every_key_is_explained_once(tmp_path: Path) -> None:
+    text = run(tmp_path / "robot.yaml", turner())
+    assert text.count("# the system's name; the top level is <name>_system") == 1
+    assert text.count("middleware: ROS") == 4
+    assert text.count("# whose message it is") == 1
+
+
+def test_every_key_of_the_grammar_is_asked_for(tmp_path: Path) -> None:
+    answers = turner()
+    run(tmp_path / "robot.yaml", answers)
+    asked = {question.name for question in answers.asked}
+    for section in (Project, Accelerator, Block, Outgoing):
+        for name, (_, entry) in keys_of(section).items():
+            assert name in asked or f"add to '{name}'" in asked or entry.form == "section", name
+
+
+def test_what_a_block_is_decides_what_is_asked(tmp_path: Path) -> None:
+    answers = turner()
+    run(tmp_path / "robot.yaml", answers)
+    asked = [question.name for question in answers.asked]
+    # Of the three blocks two are converters, and one of these is a publisher; two accelerators' messages ask, too.
+    assert (asked.count("mode"), asked.count("period"), asked.count("buffer")) == (2, 1, 1)
+    assert asked.count("middleware") == 4
+
+
+def test_answers_are_completed(tmp_path: Path) -> None:
+    answers = turner()
+    run(tmp_path / "robot.yaml", answers)
+    words = {question.name: question.words for question in answers.asked if question.words}
+    assert words["message"] == [POINT, VECTOR]
+    assert words["type"] == ["turner"]
+    assert "lru" in words["scheduler"]
+
+
+def test_a_specification_that_is_there_is_extended(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    before = run(path, turner()).replace("blocks:", "# my blocks\nblocks:").replace("width: 16", "width: 0x10")
+    path.write_text(before, encoding="utf-8")
+    text = run(
+        path,
+        Answers(
+            name=["copy", "copy"],
+            add_to_blocks=["yes"],
+            middleware=["ROS"],
+            mode=["publisher"],
+            message=[POINT],
+            block=["sub"],
+            add_to_outgoing=["no", "yes"],
+        ),
+    )
+    assert connections(derived(tmp_path, text)) == ["sub. -> acc.in_, copy.", "acc.out_ -> pub."]
+    assert "# my blocks" in text and "0x10" in text
+    added = [line.strip() for line in text.splitlines() if line not in before.splitlines()]
+    assert added == ["- name: copy", "- name: copy"]
+
+
+@pytest.mark.parametrize(
+    ("answers", "message"),
+    [
+        (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
+        (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
+        (["robot", "", "", "", "", "", "no", "a", "b"], "answer 9: 'type' cannot be 'b'"),
+        (["robot", "", "", "", "", "", "no", "a", "", "ROS", "subscriber", ""], "answer 12: 'message' is needed"),
+    ],
+)
+def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:
+    path = tmp_path / "robot.yaml"
+    with pytest.raises(InputError, match=message):
+        extend_specification(path, PipeAsker(answers, io.StringIO()), list)
+    assert not path.exists()
+
+
+def test_no_block_is_called_like_another(tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    answers = ["robot", *[""] * 5, "no", "a", "", "ROS", "subscriber", POINT, "", "", "no", "yes", "a"]
+    with pytest.raises(InputError, match="answer 17: there is 'a' already"):
+        extend_specification(path, PipeAsker(answers, io.StringIO()), list)
