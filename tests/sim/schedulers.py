@@ -107,3 +107,37 @@ def part_of(generics: Generics, part: slice) -> Generics:
         generics.shortest_run,
         generics.time_bits,
     )
+
+
+_BY_POLICY_GENERICS = """generic (
+    POLICY : policy_t; REQUESTERS : integer; PERIODS, TRANSFER_TIMES, DEADLINES : times_t := IMPLICIT;
+    TIME_BITS, SHORTEST_RUN : integer := 1);"""
+
+
+def wrapper(name: str, entity: str, requesters: int, generics: Mapping[str, str]) -> str:
+    """An entity around a scheduler with its generics; one named firm_sched_by_policy can take that one's place."""
+    own_generics = _BY_POLICY_GENERICS if name == "firm_sched_by_policy" else ""
+    generic_map = ", ".join(f"{generic} => {value}" for generic, value in generics.items())
+    return f"""
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+use firm.firm_axis_pkg.all;
+use firm.firm_sched_pkg.all;
+entity {name} is
+  {own_generics}
+  port (
+    clk, rst_n : in std_logic;
+    request : in std_logic_vector({requesters}-1 downto 0);
+    beat, last : in std_logic;
+    grant_valid : out std_logic;
+    grant_select : out std_logic_vector(index_bits({requesters})-1 downto 0));
+end entity {name};
+architecture wrapper of {name} is
+begin
+  u_scheduler : entity firm.{entity}
+    {f"generic map ({generic_map})" if generic_map else ""}
+    port map (clk => clk, rst_n => rst_n, request => request, beat => beat, last => last,
+      grant_valid => grant_valid, grant_select => grant_select);
+end architecture wrapper;
+"""

@@ -9,7 +9,7 @@ import pytest
 
 from tests.sim.ghdl import Library
 from tests.sim.sched_trace import Trace, first_difference, most_overtaken
-from tests.sim.schedulers import ENTITIES, analyse_bench, analysed, model_of, trace_of
+from tests.sim.schedulers import ENTITIES, analyse_bench, analysed, model_of, trace_of, wrapper
 
 TIMED = [policy for policy, entity in ENTITIES.items() if entity.has_times]
 # Each policy with each way to keep its tasks: in a heap, in a sorted queue, all at once.
@@ -166,20 +166,20 @@ def test_the_netlist_does_the_same(
     source = run(library)
     text = (tmp_path / "trace.txt").read_text()
     netlists = analysed(tmp_path)
-    wrapper = netlists.directory / "wrapper.vhd"
-    wrapper.write_text(_wrapper("told", f"firm_sched_{policy}", requesters, _generic_map(source, policy)))
-    netlists.analyse([wrapper])
+    told = netlists.directory / "told.vhd"
+    told.write_text(wrapper("told", f"firm_sched_{policy}", requesters, _generics(source, policy)))
+    netlists.analyse([told])
     assert netlists.latches("told") == []
     netlists.replace_by_netlist("told")
     by_policy = netlists.directory / "by_policy.vhd"
-    by_policy.write_text(_wrapper("firm_sched_by_policy", "told", requesters, ""))
+    by_policy.write_text(wrapper("firm_sched_by_policy", "told", requesters, {}))
     analyse_bench(netlists, by_policy)
     run(netlists)
     assert (tmp_path / "trace.txt").read_text() == text
 
 
-def _generic_map(trace: Trace, policy: str) -> str:
-    """The generic map of a policy's entity as it is in the trace's bench."""
+def _generics(trace: Trace, policy: str) -> dict[str, str]:
+    """The generics of a policy's entity as they are in the trace's bench."""
 
     def times(name: str) -> str:
         return "(" + ", ".join(f"{place} => {time}" for place, time in enumerate(trace.head[name])) + ")"
@@ -191,40 +191,7 @@ def _generic_map(trace: Trace, policy: str) -> str:
         generics["SHORTEST_RUN"] = str(trace.head["shortest_run"][0])
     if policy == "lst":
         generics["TRANSFER_TIMES"] = times("transfer_times")
-    return "generic map (" + ", ".join(f"{name} => {value}" for name, value in generics.items()) + ")"
-
-
-_BY_POLICY_GENERICS = """generic (
-    POLICY : policy_t; REQUESTERS : integer; PERIODS, TRANSFER_TIMES, DEADLINES : times_t := IMPLICIT;
-    TIME_BITS, SHORTEST_RUN : integer := 1);"""
-
-
-def _wrapper(name: str, inner: str, requesters: int, generic_map: str) -> str:
-    """An entity `name` around `inner`, with the generics of firm_sched_by_policy if it is to take its place."""
-    generics = _BY_POLICY_GENERICS if name == "firm_sched_by_policy" else ""
-    return f"""
-library ieee;
-use ieee.std_logic_1164.all;
-library firm;
-use firm.firm_axis_pkg.all;
-use firm.firm_sched_pkg.all;
-entity {name} is
-  {generics}
-  port (
-    clk, rst_n : in std_logic;
-    request : in std_logic_vector({requesters}-1 downto 0);
-    beat, last : in std_logic;
-    grant_valid : out std_logic;
-    grant_select : out std_logic_vector(index_bits({requesters})-1 downto 0));
-end entity {name};
-architecture wrapper of {name} is
-begin
-  u_inner : entity firm.{inner}
-    {generic_map}
-    port map (clk => clk, rst_n => rst_n, request => request, beat => beat, last => last,
-      grant_valid => grant_valid, grant_select => grant_select);
-end architecture wrapper;
-"""
+    return generics
 
 
 ILLEGAL = [
@@ -234,11 +201,11 @@ ILLEGAL = [
     (3, "PERIODS => (10, 20)", "PERIODS has 2 times; legal: one for each of 3 requesters"),
     (2, "PERIODS => (10, 0)", "the deadline of requester 1 is 0; legal: 1 and more cycles"),
     (2, "PERIODS => (10, 9000)", "TIME_BITS is 16; the deadline 9000 of requester 1 needs 17"),
-    (2, "PERIODS => (10, 20), TIME_BITS => 7", "TIME_BITS is 7; legal: 8 to 31"),
-    (2, "PERIODS => (10, 20), TIME_BITS => -1", "TIME_BITS is -1; legal: 8 to 31"),
-    (2, "PERIODS => (10, 20), TIME_BITS => 40", "TIME_BITS is 40; legal: 8 to 31"),
-    (20, "PERIODS => (10, 20), SHORTEST_RUN => 0", "SHORTEST_RUN is 0; legal: 1 and more beats"),
-    (2, "PERIODS => (10, 20), DEADLINES => (5, 6, 7)", "DEADLINES has 3 times; legal: one for each of 2 requesters"),
+    (2, "PERIODS => (10, 20); TIME_BITS => 7", "TIME_BITS is 7; legal: 8 to 31"),
+    (2, "PERIODS => (10, 20); TIME_BITS => -1", "TIME_BITS is -1; legal: 8 to 31"),
+    (2, "PERIODS => (10, 20); TIME_BITS => 40", "TIME_BITS is 40; legal: 8 to 31"),
+    (20, "PERIODS => (10, 20); SHORTEST_RUN => 0", "SHORTEST_RUN is 0; legal: 1 and more beats"),
+    (2, "PERIODS => (10, 20); DEADLINES => (5, 6, 7)", "DEADLINES has 3 times; legal: one for each of 2 requesters"),
 ]
 
 
@@ -246,7 +213,7 @@ ILLEGAL = [
 @pytest.mark.parametrize(("requesters", "generics", "message"), ILLEGAL)
 def test_illegal_generics_are_named(tmp_path: Path, policy: str, requesters: int, generics: str, message: str) -> None:
     if policy == "lst":
-        generics += ", TRANSFER_TIMES => (1, 1)"
+        generics += "; TRANSFER_TIMES => (1, 1)"
     entity = ENTITIES[policy].entity
     assert f"{entity}: {message}" in _refusal(analysed(tmp_path), entity, requesters, generics)
 
@@ -260,15 +227,15 @@ def test_illegal_generics_are_named(tmp_path: Path, policy: str, requesters: int
     ],
 )
 def test_illegal_transfer_times_are_named(tmp_path: Path, times: str, message: str) -> None:
-    generics = f"PERIODS => (10, 20), TRANSFER_TIMES => {times}"
+    generics = f"PERIODS => (10, 20); TRANSFER_TIMES => {times}"
     assert f"firm_sched_lst: {message}" in _refusal(analysed(tmp_path), "firm_sched_lst", 2, generics)
 
 
 def _refusal(library: Library, entity: str, requesters: int, generics: str) -> str:
-    """What elaborating `entity` prints; it must fail."""
+    """What elaborating `entity` prints; it must fail. `generics` stand between semicolons."""
     file = library.directory / "refused.vhd"
-    generic_map = f"generic map (REQUESTERS => {requesters}, {generics})"
-    file.write_text(_wrapper("refused", entity, requesters, generic_map))
+    named = dict(generic.split(" => ") for generic in generics.split("; "))
+    file.write_text(wrapper("refused", entity, requesters, {"REQUESTERS": str(requesters), **named}))
     library.analyse([file])
     result = library.run("refused")
     assert result.exit_code != 0

@@ -14,6 +14,7 @@ import numpy as np
 from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
 _NOBODY = np.iinfo(np.int64).max
+_SHORTEST_TIME, _LONGEST_TIME = 8, 31  # bits
 
 
 def index_bits(requesters: int) -> int:
@@ -230,6 +231,18 @@ class Keys(ABC):
     @abstractmethod
     def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
         """A rising edge."""
+
+
+def check_times(name: str, times: Ints, time_bits: int | None) -> None:
+    """Raises `ValueError` if a time of many bits does not fit; `name` is what `times` are, as "deadline"."""
+    if time_bits is None:
+        return
+    if not _SHORTEST_TIME <= time_bits <= _LONGEST_TIME:
+        raise ValueError(f"time_bits is {time_bits}; legal: {_SHORTEST_TIME} to {_LONGEST_TIME}")
+    longest = int(times.max())
+    if longest >= 2 ** (time_bits - 3):
+        needed = longest.bit_length() + 3
+        raise ValueError(f"time_bits is {time_bits}; legal: {needed} and more for a {name} of {longest} cycles")
 
 
 class Times(Keys):

@@ -26,7 +26,8 @@ def grants(scheduler: Scheduler, tasks: list[list[int]], cycles: int) -> list[li
 
 
 def scheduler_of(policy: str, requesters: int = 2, batch: int = 1, shortest_run: int = 1) -> Scheduler:
-    return POLICIES[policy](Generics(np.full((batch, requesters), 100), shortest_run=shortest_run))
+    times = np.full((batch, requesters), 100)
+    return POLICIES[policy](Generics(times, transfer_times=times // 2, shortest_run=shortest_run))
 
 
 @pytest.mark.parametrize(
@@ -77,6 +78,21 @@ def test_input_is_left_as_it_was() -> None:
         for _ in range(3):
             scheduler.step(request, scheduler.grant_valid.copy(), np.array([True]))
     assert request.all()
+
+
+@pytest.mark.parametrize("policy", ["edf_resources", "edf_latency", "lst"])
+@pytest.mark.parametrize("requesters", [2, 20])
+def test_times_that_do_not_fit_are_named(policy: str, requesters: int) -> None:
+    periods = np.full((1, requesters), 32)
+    with pytest.raises(ValueError, match="time_bits is 8; legal: 9 and more for a deadline of 32 cycles"):
+        POLICIES[policy](Generics(periods, periods, time_bits=8))
+    with pytest.raises(ValueError, match="time_bits is 32; legal: 8 to 31"):
+        POLICIES[policy](Generics(periods, periods, time_bits=32))
+
+
+def test_least_slack_time_needs_transfer_times() -> None:
+    with pytest.raises(ValueError, match="transfer_times is None; legal: the beats of each requester's tasks"):
+        POLICIES["lst"](Generics(np.full((1, 2), 10)))
 
 
 def test_illegal_generics_are_named() -> None:
