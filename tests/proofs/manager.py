@@ -99,7 +99,7 @@ _BURSTS = Proof(
         *_SLOT,
         _overwrites("m_valid_stays", "m_payload_stays", "no_beat_lost"),
         _loses_id("tid_is_the_publisher"),
-        Mutation(_BURST, "(sent_tready and not resume_r)", "sent_tready", ("in_order_unchanged",)),
+        Mutation(_BURST, "(m_axis_tready and not resume_r)", "m_axis_tready", ("in_order_unchanged",)),
         Mutation(_BURST, "(resume_r or held_tlast_r or s_axis_tvalid)", "'1'", ("sent_when_its_end_is_known",)),
         Mutation(
             _BURST, "(resume_r or held_tlast_r or s_axis_tvalid)", "(resume_r or s_axis_tvalid)", ("all_comes_out",)
@@ -111,7 +111,10 @@ _BURSTS = Proof(
             ("bursts_end_with_tlast", "bursts_begin_frames", "resumption_begins_a_burst"),
         ),
         Mutation(
-            _BURST, "downto 0) <= held_source_r", "downto 0) <= not held_source_r", ("resumption_names_the_publisher",)
+            _BURST,
+            "resize(unsigned(held_source_r)",
+            "resize(unsigned(not held_source_r)",
+            ("resumption_names_the_publisher",),
         ),
         Mutation(_BURST, "held_r   <= resume_r;", "held_r   <= '1';", ("no_beat_invented",)),
         Mutation(_BURST, "clearing_r <= '0'", "clearing_r <= '1'", ("no_bubble",)),

@@ -227,12 +227,10 @@ def _parallel(policy: int, name: str) -> tuple[Proof, ...]:
         ),
         "scheduler_service": (
             Mutation(
-                file, "and not (current(leaf) and finished);\n          end if", ";\n          end if", ("no_deadlock",)
+                file, "not request(leaf)) or (current(leaf) and finished)", "not request(leaf))", ("no_deadlock",)
             ),
         ),
-        "scheduler_gaps": (
-            Mutation(file, "and not finished when beats > 0", "when beats > 0", ("no_gap_between_tasks",)),
-        ),
+        "scheduler_gaps": (Mutation(file, "and not finished\n", "\n", ("no_gap_between_tasks",)),),
     }
     return _timed(policy, name, f"timed_scheduler_{name}", mutations, (2, 3, 4))
 

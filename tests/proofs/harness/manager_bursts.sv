@@ -109,17 +109,17 @@ end
 
 // What the registers mean, for induction: the slice holds up to two beats, the older one in its output; behind them may come
 // what resumes a frame, and then the beat that is held.
-(* hierconn *) wire                  \dut.parts_of_frames_u_burst.u_slice.valid_r ;
-(* hierconn *) wire                  \dut.parts_of_frames_u_burst.u_slice.ready_r ;
-(* hierconn *) wire [SLICE_BITS-1:0] \dut.parts_of_frames_u_burst.u_slice.output_r ;
-(* hierconn *) wire [SLICE_BITS-1:0] \dut.parts_of_frames_u_burst.u_slice.skid_r ;
-(* hierconn *) wire [7:0]            \dut.parts_of_frames_u_burst.u_slice.id_r ;
+(* hierconn *) wire                  \dut.u_slice_out.valid_r ;
+(* hierconn *) wire                  \dut.u_slice_out.ready_r ;
+(* hierconn *) wire [SLICE_BITS-1:0] \dut.u_slice_out.output_r ;
+(* hierconn *) wire [SLICE_BITS-1:0] \dut.u_slice_out.skid_r ;
+(* hierconn *) wire [7:0]            \dut.u_slice_out.id_r ;
 
-wire                    has_older = \dut.parts_of_frames_u_burst.u_slice.valid_r ;
-wire                    has_newer = has_older && !\dut.parts_of_frames_u_burst.u_slice.ready_r ;
-wire [PAYLOAD_BITS-1:0] older     = payload_of(\dut.parts_of_frames_u_burst.u_slice.output_r );
-wire [PAYLOAD_BITS-1:0] newer     = payload_of(\dut.parts_of_frames_u_burst.u_slice.skid_r );
-wire [7:0]              older_id  = \dut.parts_of_frames_u_burst.u_slice.id_r ;
+wire                    has_older = \dut.u_slice_out.valid_r ;
+wire                    has_newer = has_older && !\dut.u_slice_out.ready_r ;
+wire [PAYLOAD_BITS-1:0] older     = payload_of(\dut.u_slice_out.output_r );
+wire [PAYLOAD_BITS-1:0] newer     = payload_of(\dut.u_slice_out.skid_r );
+wire [7:0]              older_id  = \dut.u_slice_out.id_r ;
 wire [7:0]              newer_id  = older[PAYLOAD_BITS-1] ? newer[7:0] : older_id;
 wire [7:0]              newest_id = has_newer ? newer_id : older_id;
 wire                    is_over   = has_newer ? newer[PAYLOAD_BITS-1] : older[PAYLOAD_BITS-1];
