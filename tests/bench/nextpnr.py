@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
+from math import isqrt
 from pathlib import Path
 from typing import Any
 
@@ -105,9 +106,12 @@ def harness(top: str, ports: Mapping[str, Any]) -> dict[str, Any]:
         mapped.append((name, f"{port['direction']}s[{low + count - 1}:{low}]"))
         widths[port["direction"]] += count
     steps = list(_steps(widths["output"]))
+    chains = list(_chains(widths["input"]))
     return {
         "top": top,
         "input_high": widths["input"] - 1,
+        "feed_high": len(chains) - 1,
+        "chains": chains,
         "output_high": widths["output"] - 1,
         "ports": [
             {"name": name, "signal": signal, "comma": "," if number < len(mapped) else ""}
@@ -116,6 +120,18 @@ def harness(top: str, ports: Mapping[str, Any]) -> dict[str, Any]:
         "steps": steps,
         "last": steps[-1]["name"],
     }
+
+
+def _chains(bits: int) -> Iterator[dict[str, Any]]:
+    """The shift registers that hold the inputs, each fed by a bit of another one.
+
+    One long register is a path through all cells, on which Yosys' sorting of cells runs out of its stack.
+    """
+    length = max(2, isqrt(bits))
+    for number, low in enumerate(range(0, bits, length)):
+        high = min(low + length, bits) - 1
+        kept = f"{{inputs[{high - 1}:{low}], feed[{number}]}}" if high > low else f"feed[{number}]"
+        yield {"high": high, "low": low, "value": kept}
 
 
 def _steps(bits: int) -> Iterator[dict[str, Any]]:
