@@ -110,7 +110,7 @@ def harness(top: str, ports: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "top": top,
         "input_high": widths["input"] - 1,
-        "feed_high": len(chains) - 1,
+        "serial_high": len(chains) - 1,
         "chains": chains,
         "output_high": widths["output"] - 1,
         "ports": [
@@ -123,14 +123,14 @@ def harness(top: str, ports: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _chains(bits: int) -> Iterator[dict[str, Any]]:
-    """The shift registers that hold the inputs, each fed by a bit of another one.
+    """The shift registers that hold the inputs, each fed by a pin of its own, so that no two hold the same.
 
     One long register is a path through all cells, on which Yosys' sorting of cells runs out of its stack.
     """
     length = max(2, isqrt(bits))
     for number, low in enumerate(range(0, bits, length)):
         high = min(low + length, bits) - 1
-        kept = f"{{inputs[{high - 1}:{low}], feed[{number}]}}" if high > low else f"feed[{number}]"
+        kept = f"{{inputs[{high - 1}:{low}], serial[{number}]}}" if high > low else f"serial[{number}]"
         yield {"high": high, "low": low, "value": kept}
 
 
