@@ -6,6 +6,7 @@ import random
 import re
 import shutil
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -357,14 +358,11 @@ def test_the_netlist_of_quat2euler_does_the_same(quat2euler: GeneratedSystem) ->
 
 
 def test_every_vhdl_file_of_the_house_is_vhdl_93(tmp_path: Path) -> None:
-    """In the order of the .core files; `build` does the same with all that is generated."""
+    """In the order of what cores depend on; `build` does the same with all that is generated."""
     library = Library("firm", tmp_path)
-    cores = sorted(path.relative_to(CORES).with_suffix("").as_posix() for path in CORES.rglob("*.core"))
-    ordered = sorted(cores, key=lambda core: (not core.startswith("axis/"), core.startswith("sim/"), core))
     analysed: set[Path] = set()
     for fileset in ("rtl", "tb"):
-        for core in ordered:
-            filesets = yaml.safe_load((CORES / f"{core}.core").read_text(encoding="utf-8"))["filesets"]
+        for core, filesets in cores_in_order():
             if fileset in filesets:
                 files = core_files(core, fileset=fileset)
                 library.analyse(files)
@@ -375,6 +373,19 @@ def test_every_vhdl_file_of_the_house_is_vhdl_93(tmp_path: Path) -> None:
     in_order = [*dict.fromkeys(application_files())]
     assert others.issuperset(in_order)
     Library("work", tmp_path).analyse([*in_order, *sorted(others.difference(in_order))])
+
+
+def cores_in_order() -> Iterator[tuple[str, dict[str, dict[str, list[str]]]]]:
+    """Each core's path below cores/ and its filesets, behind those that its RTL depends on."""
+    paths = {}
+    filesets = {}
+    for path in sorted(CORES.rglob("*.core")):
+        core = yaml.safe_load(path.read_text(encoding="utf-8"))
+        name = core["name"].rpartition(":")[0]
+        paths[name], filesets[name] = path.relative_to(CORES).with_suffix("").as_posix(), core["filesets"]
+    graph = {name: found["rtl"].get("depend", []) for name, found in filesets.items()}
+    for name in TopologicalSorter(graph).static_order():
+        yield paths[name], filesets[name]
 
 
 def application_files() -> Iterator[Path]:
