@@ -16,6 +16,9 @@ from fusesoc_firm.scheduling.tasks import Task
 # Above this LRU takes its requests in one after the other, and so do those that compare deadlines above the other one.
 _MOST_AT_ONCE = {"lru": 16, "edf_latency": 8, "lst": 8, "edf_resources": 0}
 
+# What the Manager takes more for bursts, with two channels (docs/figures.md).
+_BURST_LUT = 30
+
 
 class Criterion(StrEnum):
     """What the best policy is best at."""
@@ -137,7 +140,7 @@ def luts(policy: str, requesters: int) -> int | None:
     """LUTs of a scheduler: what was measured of ours, or else the dissertation's table 4.1; None if neither has it."""
     if measured := area.measured():
         found = area.at(measured, policy, requesters)
-        return found.lut if found else None
+        return found.lut + (_BURST_LUT if POLICIES[policy].is_preemptive else 0) if found else None
     known = {number: lut for number, (lut, _) in dissertation().area.get(policy, {}).items() if number >= requesters}
     return int(known[min(known)]) if known else None
 
