@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -34,13 +33,5 @@ def combined(policies: tuple[str, str], generics: Generics) -> Combined:
     """The model of a combination, whose two halves have the requesters in their order."""
     half = generics.requesters // 2
     parts = (slice(0, half), slice(half, None))
-    groups = [POLICIES[policy](_part(generics, part)) for policy, part in zip(policies, parts, strict=True)]
+    groups = [POLICIES[policy](generics.part(part)) for policy, part in zip(policies, parts, strict=True)]
     return Combined(groups, POLICIES[TOP](Generics(np.ones((generics.batch, 2), np.int64))))
-
-
-def _part(generics: Generics, part: slice) -> Generics:
-    """The generics for some of the requesters."""
-    deadlines, transfer_times = (
-        None if times is None else times[:, part] for times in (generics.deadlines, generics.transfer_times)
-    )
-    return replace(generics, periods=generics.periods[:, part], transfer_times=transfer_times, deadlines=deadlines)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusesoc_firm.scheduling.models import POLICIES, Combined, Generics, Scheduler
+from fusesoc_firm.scheduling.models import POLICIES, Combined, Scheduler
 from tests.sim.ghdl import Generic, Library, core_files
 from tests.sim.sched_trace import Trace, read_trace
 
@@ -92,21 +92,9 @@ def model_of(trace: Trace, policy: str, groups: str = "") -> Scheduler:
     names = list(ENTITIES)
     members, first = [], 0
     for digit, size in zip(groups, trace.head["sizes"], strict=True):
-        members.append(POLICIES[names[int(digit)]](part_of(trace.generics, slice(first, first + size))))
+        members.append(POLICIES[names[int(digit)]](trace.generics.part(slice(first, first + size))))
         first += size
-    return Combined(members, POLICIES[policy](part_of(trace.generics, slice(0, len(groups)))))
-
-
-def part_of(generics: Generics, part: slice) -> Generics:
-    """Those of some of the requesters."""
-    transfer_times, deadlines = generics.transfer_times, generics.deadlines
-    return Generics(
-        generics.periods[:, part],
-        None if transfer_times is None else transfer_times[:, part],
-        None if deadlines is None else deadlines[:, part],
-        generics.shortest_run,
-        generics.time_bits,
-    )
+    return Combined(members, POLICIES[policy](trace.generics.part(slice(0, len(groups)))))
 
 
 _BY_POLICY_GENERICS = """generic (

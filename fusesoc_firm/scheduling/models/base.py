@@ -12,7 +12,7 @@ with N requesters. The ports are arrays; `step` is a rising edge of the clock.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +61,14 @@ class Generics:
     def relative_deadlines(self) -> Ints:
         """From a request to its deadline, (B, N)."""
         return self.periods if self.deadlines is None else self.deadlines
+
+    def part(self, requesters: slice) -> Generics:
+        """The generics for some of the requesters."""
+        deadlines, transfer_times = (
+            None if times is None else times[:, requesters] for times in (self.deadlines, self.transfer_times)
+        )
+        periods = self.periods[:, requesters]
+        return replace(self, periods=periods, transfer_times=transfer_times, deadlines=deadlines)
 
 
 class Scheduler(ABC):
