@@ -10,6 +10,7 @@ from enum import Enum
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.specification import Accelerator
 
 
@@ -73,6 +74,12 @@ class AcceleratorType:
     inputs: tuple[MessageSide, ...]
     outputs: tuple[MessageSide, ...]
     has_width: bool = False
+
+    @property
+    def entity(self) -> str:
+        """The entity that the top level instantiates: the user's own, or the wrapper of a C++ function."""
+        name = identifier(self.accelerator.name)
+        return f"{name}_wrapper" if self.accelerator.type == "HLS" else name
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.system.configuration import accelerator_entity, top_level_pins
+from fusesoc_firm.system.configuration import top_level_pins
 from fusesoc_firm.system.derived import (
     AcceleratorBlock,
     Connection,
@@ -45,7 +45,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
         "Accelerators": [
             {
                 "name": block.block,
-                "entity": accelerator_entity(block.type),
+                "entity": block.type.entity,
                 "type": str(block.type.accelerator.type),
                 "sources": [str(source) for source in block.type.accelerator.sources],
                 **_pins(block, top_level_pins(system)),
