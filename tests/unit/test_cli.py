@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.cli import STAGES, main
+from fusesoc_firm.cli import main
+from fusesoc_firm.cli.message import STAGES
 from fusesoc_firm.library_path import library_root
 
 ROOT = Path(__file__).resolve().parents[2]
