@@ -145,9 +145,24 @@ class Scheduling:
     reasons: tuple[str, ...] = ()
 
 
+class LinkKind(Enum):
+    """What carries bytes between the host and a board without a processor."""
+
+    UART = "uart"
+    SPI = "spi"
+
+
+@dataclass(frozen=True)
+class Link:
+    """The link between the host and the system; one over UART knows the clock's frequency."""
+
+    kind: LinkKind
+    clock_hz: int | None
+
+
 @dataclass(frozen=True)
 class DerivedSystem:
-    """The whole system; `name` is an identifier, `width` the streams' bits."""
+    """The whole system; `name` is an identifier, `width` the streams' bits. Without a `link` its streams are ports."""
 
     name: str
     fpga_part: str
@@ -157,6 +172,7 @@ class DerivedSystem:
     publishers: tuple[Converter, ...]
     accelerators: tuple[AcceleratorBlock, ...]
     connections: tuple[Connection, ...]
+    link: Link | None = None
 
     @property
     def entity(self) -> str:

@@ -19,6 +19,7 @@ from fusesoc_firm.system.derived import (
     Scheduling,
 )
 from fusesoc_firm.system.sides import side_ports
+from fusesoc_firm.system.specification import AXI_STREAM
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
@@ -29,6 +30,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "top": system.entity,
             "fpgaPart": system.fpga_part,
             "width": system.width,
+            "interconnect": system.link.kind.value if system.link else AXI_STREAM,
             **_scheduling(system.scheduling),
         },
         "Converters": {
