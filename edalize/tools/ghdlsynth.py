@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import shlex
 import sys
+from pathlib import Path
 from typing import Any, ClassVar
 
 from edalize.tools.edatool import Edatool
 from edalize.utils import EdaCommands
-from fusesoc_firm.netlist.translation import Translation
+from fusesoc_firm.netlist.translation import Translation, translator
 
 
 class Ghdlsynth(Edatool):  # type: ignore[misc]
@@ -52,7 +53,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
         self.commands.add(
             [shlex.quote(sys.executable), "-m", "fusesoc_firm.netlist", self._request],
             [output],
-            [self._request, *(file["name"] for file in sources)],
+            [self._request, *(file["name"] for file in sources), *map(_prerequisite, translator())],
         )
         self.commands.set_default_target(output)
         netlist = {"name": output, "file_type": "verilogSource"}
@@ -65,3 +66,8 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
     @property
     def _request(self) -> str:
         return f"{self.name}.ghdlsynth"
+
+
+def _prerequisite(path: Path) -> str:
+    """A path in a makefile."""
+    return str(path).replace(" ", "\\ ")

@@ -29,6 +29,8 @@ _STRING = re.compile(r'"([01XZUWLH-]+)"')
 _LEVELS = str.maketrans("UWLH-XZ", "xx01xxz")
 
 _VHDL = re.compile(r'^.*(?:\bstd_logic\w*|"|\babs\b|\bwhen\b).*$', re.MULTILINE)
+# An assertion of the VHDL, which may well stand in what is simulated.
+_ASSERTION = re.compile(r'\$fatal\(1, "[^"]*"\)')
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 
 
@@ -54,7 +56,7 @@ def repair(verilog: str, vhdl: str) -> str:
 
 def check(verilog: str) -> None:
     """Raise `NetlistError` if there is a latch in a netlist, or something that is no Verilog."""
-    text = _COMMENT.sub("", verilog)
+    text = _ASSERTION.sub("$fatal", _COMMENT.sub("", verilog))
     for case in _CASE.finditer(text):
         if not _is_complete(case):
             target = _target(case)

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,13 @@ from fusesoc_firm.netlist.repair import NetlistError, repair
 _UNBOUND = re.compile(r'instance "(.*?)" of component "(.*?)" is not bound')
 _MODULE = r"^[ \t]*module\s+({name})\b"
 _EMPTY_MODULE = r"^module\s+({name})\b[^;]*;\s*endmodule\n*"
+# GHDL compares with bounds that a number cannot leave, and puts what is in no loop into one vector; a linter is to look
+# at what people wrote.
+_WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT")
+_HEADER = "\n".join(
+    ["// Made of VHDL by GHDL; changes belong there.", *(f"// verilator lint_off {word}" for word in _WAIVED), ""]
+)
+_FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 # What GHDL says of logic that is not there afterwards; the words are those of its sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
 
@@ -61,6 +69,11 @@ class Translation:
         return self.top.rpartition(".")[0] or "work"
 
 
+def translator() -> list[Path]:
+    """The files whose change may change a netlist, beside its sources."""
+    return sorted(Path(__file__).parent.glob("*.py"))
+
+
 def translate(translation: Translation, folder: Path) -> str:
     """Write the netlist, with GHDL's libraries in `folder`; the text is what GHDL warns of.
 
@@ -81,7 +94,7 @@ def translate(translation: Translation, folder: Path) -> str:
         raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"]))
     black_boxes = _black_boxes(warnings, translation.verilog)
     vhdl, _ = ghdl.synthesise("vhdl")
-    netlist = repair(_without(netlist, black_boxes), vhdl)
+    netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl) + _FOOTER
     part = output.with_name(f"{output.name}.part")
     part.write_text(netlist, encoding="utf-8")
     part.replace(output)
@@ -152,7 +165,7 @@ def _other_warnings(text: str) -> str:
     """What GHDL warns of besides components without an entity; each warning is a line, and the source with a caret."""
     lines = text.splitlines()
     starts = [number for number, line in enumerate(lines) if re.match(r"\S+:\d+:\d+:", line)]
-    warnings = [lines[start:end] for start, end in zip(starts, [*starts[1:], None], strict=True)]
+    warnings = [lines[start:end] for start, end in pairwise([*starts, len(lines)])]
     kept = [
         item
         for item in warnings
