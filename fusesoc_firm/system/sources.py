@@ -34,9 +34,9 @@ _LANGUAGES = {
     ),
     # In the header, or within the module as before Verilog-2001.
     "Verilog": _Language(
-        re.compile(r"//.*|/\*.*?\*/", re.DOTALL),
+        re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL),
         r"\bmodule\s+{unit}\b(.*?)\bendmodule\b",
-        re.compile(r"\bparameter\b[^;]*?\bWIDTH\s*="),
+        re.compile(r"\bparameter\b[^;]*?\bWIDTH\s*=(?!=)"),
         re.DOTALL,
     ),
 }
