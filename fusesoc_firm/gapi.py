@@ -109,6 +109,9 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter(
                 "environment", "list", "VHDL files that play what is at the pins; the last is called as its entity"
             ),
+            Parameter(
+                "simulator", "str", "what shall run the simulation", "ghdl", choices=("ghdl", "icarus", "verilator")
+            ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
             _PATHS,

@@ -48,7 +48,7 @@ class GeneratedFile:
     """A file of a generated core.
 
     `file_type` is FuseSoC's (`vhdlSource-93`, `user`, ...), `logical_name` the VHDL library, and `copyto` where in the
-    work folder the tool finds it; "" leaves them out.
+    work folder the tool finds it; "" leaves them out. An include file is one that others name.
     """
 
     content: str | bytes
@@ -56,6 +56,7 @@ class GeneratedFile:
     logical_name: str = ""
     copyto: str = ""
     tags: tuple[str, ...] = ()
+    is_include_file: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,7 @@ def _attributes(file: GeneratedFile) -> dict[str, object]:
         "logical_name": file.logical_name,
         "copyto": file.copyto,
         "tags": list(file.tags),
+        "is_include_file": file.is_include_file,
     }
     return {name: value for name, value in attributes.items() if value}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,15 @@ def add_system(commands: Any) -> None:
         "firm system report robot.yaml",
         _report_system,
     )
-    for parser in (new, check, show, skeletons, draw, report):
+    core = command(
+        actions,
+        "core",
+        "write the FuseSoC core of a system; of one that is there, only the targets are written anew",
+        "firm system core robot.yaml --depend robot:acc:cordic",
+        _write_core,
+    )
+    _add_core_options(core)
+    for parser in (new, check, show, skeletons, draw, report, core):
         parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
         add_sources(parser)
     command(
@@ -59,6 +68,21 @@ def add_system(commands: Any) -> None:
         "print the grammar of specifications as a JSON Schema, for editors",
         "firm system schema > specification.schema.json",
         _print_schema,
+    )
+
+
+def _add_core_options(core: argparse.ArgumentParser) -> None:
+    core.add_argument("-o", "--output", type=Path, metavar="F.core", help="where (default: beside the specification)")
+    new = core.add_argument_group("of a core that is not there yet; paths are relative to it")
+    new.add_argument("--name", metavar="VLNV", default="", help="default: robot:sys:<the system's name>:0.1.0")
+    new.add_argument("--description", metavar="TEXT", default="", help="what the system does")
+    new.add_argument(
+        "--depend", metavar="VLNV", action="append", default=[], help="a core that accelerators need; may be repeated"
+    )
+    new.add_argument("--stimuli", metavar="F", default="stimuli.yaml", help="messages to send (default: %(default)s)")
+    new.add_argument("--model", metavar="F", default="model.py", help="what must come back (default: %(default)s)")
+    new.add_argument(
+        "--environment", metavar="F", action="append", default=[], help="VHDL of what is at the pins; may be repeated"
     )
 
 
@@ -103,6 +127,31 @@ def _write_skeletons(arguments: argparse.Namespace) -> None:
         print(path)
     if not texts:
         print("every accelerator has a source")
+
+
+def _write_core(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
+
+    spec: Path = arguments.spec
+    path: Path = arguments.output or spec.with_suffix(".core")
+    system = load(arguments, needs_sources=False).system
+    if path.exists():
+        text = updated_core(system, path)
+    else:
+        folder = path.absolute().parent
+        options = CoreOptions(
+            arguments.name,
+            arguments.description,
+            arguments.depend,
+            arguments.stimuli,
+            arguments.model,
+            arguments.environment,
+            [os.path.relpath(item, folder) for item in arguments.path],
+            arguments.distro or "",
+        )
+        text = new_core(system, os.path.relpath(spec, folder), options)
+    write(path, text)
+    print(path)
 
 
 def _draw_system(arguments: argparse.Namespace) -> None:

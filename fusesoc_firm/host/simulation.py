@@ -4,16 +4,32 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fusesoc_firm.converter.generator import VHDL
 from fusesoc_firm.diagnostics import SourceRef, fail
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.host.environment import environment_files
 from fusesoc_firm.host.frames import expected_text, stimulus_text
 from fusesoc_firm.host.kernel import kernel_files
-from fusesoc_firm.host.reference import responses
+from fusesoc_firm.host.reference import Response, responses
 from fusesoc_firm.host.stimuli import read_stimuli
 from fusesoc_firm.render import render
 from fusesoc_firm.system import generator
-from fusesoc_firm.system.configuration import TEST_BENCH_TEMPLATE, test_bench_configuration
+from fusesoc_firm.system.configuration import TEST_BENCH_TEMPLATE, Configuration, test_bench_configuration
+from fusesoc_firm.system.derived import DerivedSystem
+from fusesoc_firm.system.verilog_bench import (
+    ENVIRONMENT_TEMPLATE,
+    VERILOG_BENCH_TEMPLATE,
+    translated_unit,
+    verilog_bench_configuration,
+)
+
+GHDL = "ghdl"
+# The first one is what a core asks for unless it says so. The others read Verilog.
+SIMULATORS = (GHDL, "icarus", "verilator")
+
+# A test bench is nothing that synthesis, or a translation to Verilog, should see.
+_BENCH_TAGS = ("simulation",)
 
 
 def inputs(request: Request) -> list[Path]:
@@ -26,6 +42,7 @@ def generate(request: Request) -> GeneratedCore:
     """The core; it belongs beside the one that the same specification gives as a system. Raises `InputError`."""
     loaded = generator.load_requested(request)
     system = loaded.system
+    _check_simulator(system, str(request.parameters["simulator"]))
     stimuli = read_stimuli(_path(request, "stimuli"), system.subscribers)
     expected = responses(_path(request, "model"), stimuli, system.publishers)
     files: dict[str, GeneratedFile] = {}
@@ -37,14 +54,63 @@ def generate(request: Request) -> GeneratedCore:
     assert isinstance(stall_percent, int)
     environment = environment_files(_environment(request), system)
     entity = [*environment][-1].stem if environment else None
-    bench = render(TEST_BENCH_TEMPLATE, test_bench_configuration(system, seed, stall_percent, entity))
+    configuration = test_bench_configuration(system, seed, stall_percent, entity)
     files |= {str(path): file for path, file in environment.items()}
+    if request.parameters["simulator"] == GHDL:
+        files |= _vhdl_bench(configuration, system)
+    else:
+        frames = max(len(stimuli), len(expected))
+        files |= _verilog_bench(configuration, system, frames, _beats(expected, system.width))
     files |= {
-        f"{system.entity}_tb.vhd": GeneratedFile(bench, "vhdlSource-93"),
         "stimulus.txt": GeneratedFile(stimulus_text(stimuli), "user", copyto="stimulus.txt"),
         "expected.txt": GeneratedFile(expected_text(expected), "user", copyto="expected.txt"),
     }
     return GeneratedCore(f"Simulation of system {system.name}", files)
+
+
+def _check_simulator(system: DerivedSystem, simulator: str) -> None:
+    """Fail if an accelerator is written in what the simulator does not understand, or the host's end of a link is."""
+    if simulator != GHDL and system.link:
+        fail(
+            f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",
+            hint="the host's end of a link is written in VHDL: --target=sim",
+        )
+    for type_ in system.accelerator_types:
+        accelerator = type_.accelerator
+        if simulator == GHDL and accelerator.type == "Verilog":
+            hint = "'simulator: icarus' or 'verilator' link it with the Verilog that GHDL makes of the VHDL"
+            fail(f"GHDL simulates no Verilog, which '{accelerator.name}' is written in", accelerator.name.source, hint)
+        if simulator != GHDL and accelerator.type == "HLS":
+            hint = "only GHDL calls a C++ function from within a simulation: --target=sim"
+            fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
+
+
+def _vhdl_bench(configuration: Configuration, system: DerivedSystem) -> dict[str, GeneratedFile]:
+    text = render(TEST_BENCH_TEMPLATE, configuration)
+    return {f"{system.entity}_tb.vhd": GeneratedFile(text, VHDL, tags=_BENCH_TAGS)}
+
+
+def _verilog_bench(
+    configuration: Configuration, system: DerivedSystem, frames: int, beats: int
+) -> dict[str, GeneratedFile]:
+    """The bench, and the entity that holds system and environment if there is one."""
+    has_environment = configuration["environment"] is not None
+    bench = verilog_bench_configuration(configuration, system, frames, beats, has_environment=has_environment)
+    files = {
+        f"{system.entity}_tb.v": GeneratedFile(
+            render(VERILOG_BENCH_TEMPLATE, bench), "verilogSource-2005", tags=_BENCH_TAGS
+        )
+    }
+    if has_environment:
+        unit = translated_unit(system, has_environment=True)
+        files[f"{unit}.vhd"] = GeneratedFile(render(ENVIRONMENT_TEMPLATE, configuration), VHDL)
+    return files
+
+
+def _beats(expected: list[Response], width: int) -> int:
+    """The beats of all frames that are expected; so many can wait for the ends of their frames at most."""
+    lanes = width // 8
+    return sum(-(-(ID_BYTES + LENGTH_BYTES + len(response.payload)) // lanes) for response in expected) or 1
 
 
 def _path(request: Request, parameter: str) -> Path:

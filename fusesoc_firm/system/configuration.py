@@ -11,7 +11,13 @@ from typing import Any
 
 from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.system.derived import DerivedSystem, LinkKind
-from fusesoc_firm.system.instances import ERROR_CODE_BITS, accelerator_instance, publisher_instance, subscriber_instance
+from fusesoc_firm.system.instances import (
+    ERROR_CODE_BITS,
+    accelerator_instance,
+    component,
+    publisher_instance,
+    subscriber_instance,
+)
 from fusesoc_firm.system.maps import port_map
 from fusesoc_firm.system.names import Names, blocks
 from fusesoc_firm.system.scheduler import scheduler_configuration
@@ -29,7 +35,7 @@ def system_configuration(system: DerivedSystem) -> Configuration:
     """The configuration of the top level."""
     names = Names(system)
     return {
-        **_dimensions(system),
+        **dimensions(system),
         "name": system.name,
         **_interconnect(system),
         **scheduler_configuration(system),
@@ -38,11 +44,12 @@ def system_configuration(system: DerivedSystem) -> Configuration:
             for bit, block in enumerate(system.error_blocks)
             if bit >= len(system.subscribers)
         ],
+        "components": [component(type_, system.width) for type_ in system.accelerator_types if type_.is_component],
         "signals": [_signals(names, *block) for block in blocks(system)],
         "subscribers": [subscriber_instance(names, converter, system) for converter in system.subscribers],
         "publishers": [publisher_instance(names, converter, system) for converter in system.publishers],
         "accelerators": [accelerator_instance(names, block, system.width) for block in system.accelerators],
-        "pins": _pins(names, system),
+        "pins": pin_groups(names, system),
         "connections": connections(names, system),
     }
 
@@ -54,7 +61,7 @@ def test_bench_configuration(
 
     That is an entity with `clk`, `rst_n` and the pins, each in the other direction.
     """
-    pins = _pins(Names(system), system)
+    pins = pin_groups(Names(system), system)
     formals = ["clk", "rst_n", *(str(port["formal"]) for group in pins for port in group["ports"])]
     # A link carries bytes.
     host_width = 8 if system.link else system.width
@@ -63,7 +70,7 @@ def test_bench_configuration(
         "environment": {"entity": environment, "ports": port_map((name, name) for name in formals)}
         if environment
         else None,
-        **_dimensions(system),
+        **dimensions(system),
         **_interconnect(system),
         "host_width": host_width,
         "host_data_high": host_width - 1,
@@ -85,7 +92,7 @@ def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
     }
 
 
-def _pins(names: Names, system: DerivedSystem) -> list[Configuration]:
+def pin_groups(names: Names, system: DerivedSystem) -> list[Configuration]:
     """The pins of each block that has some, as ports of the top level."""
     groups = []
     for block in system.accelerators:
@@ -148,7 +155,8 @@ def _interconnect(system: DerivedSystem) -> Configuration:
     }
 
 
-def _dimensions(system: DerivedSystem) -> Configuration:
+def dimensions(system: DerivedSystem) -> Configuration:
+    """The sizes of the top level's ports and signals."""
     publishers = len(system.publishers)
     return {
         "entity": system.entity,

@@ -77,9 +77,14 @@ class AcceleratorType:
 
     @property
     def entity(self) -> str:
-        """The entity that the top level instantiates: the user's own, or the wrapper of a C++ function."""
+        """The unit that the top level instantiates: the user's entity or module, or the wrapper of a C++ function."""
         name = identifier(self.accelerator.name)
         return f"{name}_wrapper" if self.accelerator.type == "HLS" else name
+
+    @property
+    def is_component(self) -> bool:
+        """Whether the top level declares it, since it is no entity: a module in Verilog."""
+        return self.accelerator.type == "Verilog"
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,11 @@ from fusesoc_firm.system.specification import Block
 
 def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
     """Note every block and accelerator that cannot have the entities that its message, name or sources ask for."""
-    owners = {system.entity: "the system", f"{system.entity}_tb": "the system's test bench"}
+    owners = {
+        system.entity: "the system",
+        f"{system.entity}_tb": "the system's test bench",
+        f"{system.entity}_in_environment": "the system's test bench",
+    }
     frames: dict[str, Frame] = {}
     packages: dict[str, MessageName] = {}
     for entity, block, frame in _converters(system):
@@ -36,9 +40,11 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
         owners.setdefault(length_entity(frame, suffix), f"what computes the length of {frame.message}")
     for accelerator in system.accelerator_types:
         name = accelerator.accelerator.name
-        if accelerator.accelerator.type == "VHDL" and identifier(name) != name:
+        if accelerator.accelerator.type != "HLS" and identifier(name) != name:
             hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
-            faults.error(f"no entity can be called '{name}'", name.source, hint)
+            faults.error(
+                f"no {'module' if accelerator.is_component else 'entity'} can be called '{name}'", name.source, hint
+            )
         for entity in _entities(accelerator):
             if owner := owners.get(entity.lower()):
                 faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source)

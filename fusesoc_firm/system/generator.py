@@ -27,6 +27,18 @@ from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, wrapper_configuration
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
 
 
+# FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
+_FILE_TYPES = {
+    ".vhd": VHDL,
+    ".vhdl": VHDL,
+    ".v": "verilogSource-2005",
+    ".vh": "verilogSource-2005",
+    ".sv": "systemVerilogSource",
+    ".svh": "systemVerilogSource",
+}
+_INCLUDE_SUFFIXES = (".vh", ".svh")
+
+
 @dataclass(frozen=True)
 class LoadedSystem:
     """A specification, the folder its paths are relative to, and the system derived from it."""
@@ -139,15 +151,18 @@ def generate(request: Request) -> GeneratedCore:
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:
-    """The user's VHDL; a package of two accelerators is there once, as it must not be analysed twice."""
+    """The user's VHDL and Verilog; a package of two accelerators is there once, as it must not be analysed twice."""
     files: dict[str, GeneratedFile] = {}
     taken: set[Path] = set()
     for type_ in types:
         accelerator = type_.accelerator
-        for source in accelerator.sources if accelerator.type == "VHDL" else ():
+        for source in accelerator.sources if accelerator.type != "HLS" else ():
             path = (folder / source).resolve()
             if path not in taken:
-                files[source_name(accelerator, source)] = GeneratedFile(path.read_bytes(), VHDL)
+                suffix = path.suffix.lower()
+                files[source_name(accelerator, source)] = GeneratedFile(
+                    path.read_bytes(), _FILE_TYPES[suffix], is_include_file=suffix in _INCLUDE_SUFFIXES
+                )
                 taken.add(path)
     return files
 

@@ -7,7 +7,7 @@ from typing import Any
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
-from fusesoc_firm.system.derived import AcceleratorBlock, Converter, DerivedSystem
+from fusesoc_firm.system.derived import AcceleratorBlock, AcceleratorType, Converter, DerivedSystem
 from fusesoc_firm.system.maps import port_map
 from fusesoc_firm.system.names import AXIS, FRAME_SIGNALS, Names
 from fusesoc_firm.system.sides import accelerator_ports, side_ports
@@ -115,11 +115,33 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, width: int) -> d
     formals += [str(pin.name) for pin in block.type.accelerator.pins]
     return {
         **_instance(names, block.block, block.type.entity),
+        "unit": f"component {block.type.entity}" if block.type.is_component else f"entity work.{block.type.entity}",
         "has_width": block.type.has_width,
         "width": width,
         "ports": port_map(
             [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names.port(block.block, formal)) for formal in formals)]
         ),
+    }
+
+
+def component(type_: AcceleratorType, width: int) -> dict[str, Any]:
+    """The declaration of an accelerator that is no entity."""
+    ports = [("clk", False, None), ("rst_n", False, None)]
+    ports += [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_, width)]
+    ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
+    column = max(len(name) for name, *_ in ports)
+    return {
+        "entity": type_.entity,
+        "has_width": type_.has_width,
+        "declarations": [
+            {
+                "name": name.ljust(column),
+                "direction": "out" if is_output else "in ",
+                "type": vhdl_type(bits),
+                "semicolon": ";" if number < len(ports) - 1 else "",
+            }
+            for number, (name, is_output, bits) in enumerate(ports)
+        ],
     }
 
 

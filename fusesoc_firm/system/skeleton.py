@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,47 @@ from fusesoc_firm.system.specification import Pin
 
 Configuration = dict[str, Any]
 
-_TEMPLATES = {"VHDL": "vhdl/skeleton.vhd", "HLS": "hls/skeleton.cpp"}
+_FUNCTION_TEMPLATE = "hls/skeleton.cpp"
+
+
+@dataclass(frozen=True)
+class _Language:
+    """How a language of hardware says what a first version is made of."""
+
+    template: str
+    directions: tuple[str, str]
+    type: Callable[[int | None], str]
+    zero: Callable[[int | None], str]
+    one: str
+    conjunction: str
+    separator: str
+    comment: str
+    has_types_first: bool = False
+
+
+_LANGUAGES = {
+    "VHDL": _Language(
+        template="vhdl/skeleton.vhd",
+        directions=("in ", "out"),
+        type=vhdl_type,
+        zero=lambda bits: "'0'" if bits is None else "(others => '0')",
+        one="'1'",
+        conjunction=" and ",
+        separator=";",
+        comment="--",
+    ),
+    "Verilog": _Language(
+        template="verilog/skeleton.v",
+        directions=("input  wire", "output wire"),
+        type=lambda bits: "" if bits is None else f"[{bits - 1}:0] ",
+        zero=lambda bits: f"{bits or 1}'b0",
+        one="1'b1",
+        conjunction=" && ",
+        separator=",",
+        comment="//",
+        has_types_first=True,
+    ),
+}
 
 
 def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
@@ -31,9 +72,11 @@ def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
 
 def skeleton(type_: AcceleratorType, width: int) -> str:
     """The text of an accelerator's source; streams have `width` bits."""
-    language = str(type_.accelerator.type)
-    configuration = _function(type_) if language == "HLS" else _entity(type_, width)
-    return render(_TEMPLATES[language], {**configuration, "purpose": _purpose(type_)})
+    if language := _LANGUAGES.get(type_.accelerator.type):
+        template, configuration = language.template, _entity(type_, width, language)
+    else:
+        template, configuration = _FUNCTION_TEMPLATE, _function(type_)
+    return render(template, {**configuration, "purpose": _purpose(type_)})
 
 
 def _purpose(type_: AcceleratorType) -> str:
@@ -53,7 +96,7 @@ def _function(type_: AcceleratorType) -> Configuration:
     }
 
 
-def _entity(type_: AcceleratorType, width: int) -> Configuration:
+def _entity(type_: AcceleratorType, width: int, language: _Language) -> Configuration:
     ports = accelerator_ports(type_, width)
     of_side = {
         side.prefix: [port for prefix, port in ports if prefix == side.prefix]
@@ -62,20 +105,20 @@ def _entity(type_: AcceleratorType, width: int) -> Configuration:
     pins = type_.accelerator.pins
     return {
         "entity": identifier(type_.accelerator.name),
-        "sides": _declarations(type_, of_side, pins),
-        "all_valid": " and ".join(f"{side.prefix}msg_valid" for side in type_.inputs) or "'1'",
+        "sides": _declarations(type_, of_side, pins, language),
+        "all_valid": language.conjunction.join(f"{side.prefix}msg_valid" for side in type_.inputs) or language.one,
         "output_high": max(1, len(type_.outputs)) - 1,
         "takes": [{"port": f"{side.prefix}msg_ready"} for side in type_.inputs],
-        "gives": [_given(number, side, of_side[side.prefix]) for number, side in enumerate(type_.outputs)],
+        "gives": [_given(number, side, of_side[side.prefix], language) for number, side in enumerate(type_.outputs)],
         "discards": _discards(type_.inputs, of_side),
-        "pins": _driven_pins(pins),
+        "pins": _driven_pins(pins, language),
     }
 
 
 def _declarations(
-    type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin]
+    type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin], language: _Language
 ) -> list[Configuration]:
-    """The ports of each side, and the pins, as the entity declares them."""
+    """The ports of each side, and the pins, as the entity or module declares them."""
     groups = [
         (
             f"{side.frame.message}",
@@ -85,18 +128,20 @@ def _declarations(
     ]
     if pins:
         groups.append(("pins", [(str(pin.name), pin.direction == "out", pin.bits, "") for pin in pins]))
-    column = max((len(name) for _, ports in groups for name, *_ in ports), default=0)
-    last = groups[-1][1][-1][0] if groups else ""
+    declared = [port for _, ports in groups for port in ports]
+    names = max((len(name) for name, *_ in declared), default=0)
+    types = max((len(language.type(bits)) for *_, bits, _ in declared), default=0) if language.has_types_first else 0
+    last = declared[-1][0] if declared else ""
     return [
         {
             "comment": title,
             "ports": [
                 {
-                    "name": name.ljust(column),
-                    "direction": "out" if is_output else "in ",
-                    "type": vhdl_type(bits),
-                    "semicolon": "" if name == last else ";",
-                    "comment": f"  -- {comment}" if comment else "",
+                    "name": name if language.has_types_first else name.ljust(names),
+                    "direction": language.directions[is_output],
+                    "type": language.type(bits).ljust(types),
+                    "semicolon": "" if name == last else language.separator,
+                    "comment": f"  {language.comment} {comment}" if comment else "",
                 }
                 for name, is_output, bits, comment in ports
             ],
@@ -105,7 +150,7 @@ def _declarations(
     ]
 
 
-def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Configuration:
+def _given(number: int, side: MessageSide, ports: Sequence[SidePort], language: _Language) -> Configuration:
     """What an output does: its handshake with the message, zeros for the rest."""
     names = {port.name for port in ports}
     own = {"segment_valid", "msg_valid", "msg_ready"}
@@ -113,9 +158,10 @@ def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Configu
         "number": number,
         "ready": f"{side.prefix}msg_ready",
         "segment_valid": f"{side.prefix}segment_valid",
+        "segments": next(port.width or 1 for port in ports if port.name == "segment_valid"),
         "valid": [{"port": f"{side.prefix}msg_valid", "number": number}] if "msg_valid" in names else [],
         "zeros": [
-            {"port": f"{side.prefix}{port.name}", "zero": _zero(port.width)}
+            {"port": f"{side.prefix}{port.name}", "zero": language.zero(port.width)}
             for port in ports
             if port.is_output and port.name not in own
         ],
@@ -133,10 +179,6 @@ def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]])
     return {"ports": ready} if ready else None
 
 
-def _driven_pins(pins: Sequence[Pin]) -> Configuration | None:
-    driven = [{"port": str(pin.name), "zero": _zero(pin.bits)} for pin in pins if pin.direction == "out"]
+def _driven_pins(pins: Sequence[Pin], language: _Language) -> Configuration | None:
+    driven = [{"port": str(pin.name), "zero": language.zero(pin.bits)} for pin in pins if pin.direction == "out"]
     return {"ports": driven} if driven else None
-
-
-def _zero(bits: int | None) -> str:
-    return "'0'" if bits is None else "(others => '0')"

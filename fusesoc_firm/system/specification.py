@@ -16,7 +16,11 @@ from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
 # The types of accelerators, each with the endings of its sources' names.
-SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
+SOURCE_SUFFIXES = {
+    "HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"),
+    "VHDL": (".vhd", ".vhdl"),
+    "Verilog": (".v", ".sv", ".vh", ".svh"),
+}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
 # A block that is no accelerator.
@@ -107,7 +111,7 @@ class Pin(Section):
 class Accelerator(Section):
     """A type of accelerator; blocks are its instances."""
 
-    name: Text = key("the type's name; for VHDL that of the entity", is_required=True)
+    name: Text = key("the type's name; in VHDL that of the entity, in Verilog of the module", is_required=True)
     type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
     sources: tuple[Text, ...] = key("its source files, relative to the specification", form="texts", is_required=True)
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)

@@ -49,6 +49,7 @@ class GeneratedSystem:
 def call(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request:
     """A generator call for the specification `spec`."""
     known: dict[str, Plain] = {
+        "simulator": "ghdl",
         "seed": 1,
         "stall_percent": 25,
         "environment": None,

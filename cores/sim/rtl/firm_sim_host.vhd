@@ -21,6 +21,8 @@ entity firm_sim_host is
     -- Paths relative to the directory the simulator runs in.
     STIMULUS_FILE : string := "stimulus.txt";
     EXPECTED_FILE : string := "expected.txt";
+    -- Where to write what came, in the grammar of the expected file; none where it is empty.
+    RECEIVED_FILE : string := "";
     -- All randomness follows from it.
     SEED : integer := 1;
     -- The chance, each cycle and direction, that the host offers no beat or takes none.
@@ -64,6 +66,7 @@ architecture simulation of firm_sim_host is
   constant FAULTS_SHOWN  : positive := 10;
   constant HIGHEST_SEED  : positive := 2147483562;  -- of math_real.uniform
   constant NO_ID         : integer  := -1;
+  constant LINE_BYTES    : positive := 64;
 
 begin
 
@@ -127,6 +130,10 @@ begin
     variable held_tkeep : std_logic_vector(s_axis_tkeep'range);
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
+
+    -- The file of what came: its line of the frame that comes in.
+    file received         : text;
+    variable received_line : line;
 
     variable id_errors    : natural := 0;
     variable frame_errors : natural := 0;
@@ -249,8 +256,38 @@ begin
             & integer'image(first_out - cause.last_cycle) & " last beat in to first beat out");
     end procedure show_frame;
 
+    -- Nothing is written where nobody asks for it: that would take as long as all the rest.
+    procedure note_frame(id : in byte_t) is
+    begin
+      if RECEIVED_FILE /= "" then
+        write(received_line, "< id " & to_hex(id));
+        writeline(received, received_line);
+      end if;
+    end procedure note_frame;
+
+    procedure note_byte(value : in byte_t) is
+    begin
+      if RECEIVED_FILE /= "" then
+        if bytes_received mod LINE_BYTES = 0 then
+          if bytes_received > 0 then
+            writeline(received, received_line);
+          end if;
+          write(received_line, string'("  "));
+        end if;
+        write(received_line, to_hex(value));
+      end if;
+    end procedure note_byte;
+
+    procedure note_end is
+    begin
+      if RECEIVED_FILE /= "" and bytes_received > 0 then
+        writeline(received, received_line);
+      end if;
+    end procedure note_end;
+
     procedure begin_frame(id : in byte_t) is
     begin
+      note_frame(id);
       is_in_frame    := true;
       is_frame_right := true;
       bytes_received := 0;
@@ -288,6 +325,7 @@ begin
 
     procedure receive_byte(value : in byte_t) is
     begin
+      note_byte(value);
       if receiving /= null then
         if bytes_received < receiving.size then
           idle_cycles := 0;
@@ -302,6 +340,7 @@ begin
     procedure finish_frame is
     begin
       is_in_frame := false;
+      note_end;
       if receiving = null then
         return;
       end if;
@@ -498,6 +537,9 @@ begin
     random_1 := SEED;
     read_stimulus_file(STIMULUS_FILE, stimulus);
     read_expected_file(EXPECTED_FILE, expected);
+    if RECEIVED_FILE /= "" then
+      file_open(received, RECEIVED_FILE, write_mode);
+    end if;
     print("seed " & integer'image(SEED) & ", stalls " & integer'image(STALL_PERCENT) & " %, "
           & integer'image(WIDTH) & " bits; to repeat: -gSEED=" & integer'image(SEED)
           & " -gSTALL_PERCENT=" & integer'image(STALL_PERCENT));
@@ -527,6 +569,9 @@ begin
     check_announced("id_error", id_errors, expected.id_errors);
     check_announced("frame_error", frame_errors, expected.frame_errors);
     report_traffic;
+    if RECEIVED_FILE /= "" then
+      file_close(received);
+    end if;
     if faults = 0 then
       report_verdict("PASS");
     else

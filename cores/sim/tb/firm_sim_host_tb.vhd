@@ -11,6 +11,7 @@ entity firm_sim_host_tb is
     WIDTH         : integer := 8;
     STIMULUS_FILE : string  := "stimulus.txt";
     EXPECTED_FILE : string  := "expected.txt";
+    RECEIVED_FILE : string  := "received.txt";
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;
     SHOWN         : integer := 10;
@@ -55,6 +56,7 @@ begin
       ERRORS        => 1,
       STIMULUS_FILE => STIMULUS_FILE,
       EXPECTED_FILE => EXPECTED_FILE,
+      RECEIVED_FILE => RECEIVED_FILE,
       SEED          => SEED,
       STALL_PERCENT => STALL_PERCENT,
       SHOWN         => SHOWN,

@@ -1,0 +1,73 @@
+"""Edalize's tool `ghdlsynth`: all VHDL of a build to one Verilog netlist, as a frontend of any flow that takes Verilog.
+
+    flow: sim
+    flow_options: {tool: icarus, frontends: [ghdlsynth], ghdlsynth_top: robot_system}
+
+Edalize finds a tool by its file's name, and its packages are namespace packages; so this one can lie in another wheel.
+What it does stands in `fusesoc_firm.netlist`.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Any, ClassVar
+
+from edalize.tools.edatool import Edatool
+from edalize.utils import EdaCommands
+from fusesoc_firm.netlist.translation import Translation, translator
+
+
+class Ghdlsynth(Edatool):  # type: ignore[misc]
+    """VHDL to Verilog; files with the tag `simulation`, such as test benches, are left out."""
+
+    description = "Translate VHDL to a Verilog netlist with GHDL"
+
+    TOOL_OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
+        "ghdlsynth_top": {"type": "str", "desc": "VHDL unit to translate, [library.]unit (default: the toplevel)"},
+        "ghdlsynth_std": {"type": "str", "desc": "VHDL standard (default: 93)"},
+        "ghdlsynth_options": {"type": "str", "desc": "Additional options of ghdl --synth", "list": True},
+    }
+
+    def setup(self, edam: dict[str, Any]) -> None:
+        """Add the command that makes the netlist, and hand on the netlist in place of the VHDL."""
+        super().setup(edam)
+        vhdl = [file for file in self.files if file.get("file_type", "").startswith("vhdlSource")]
+        others = [file for file in self.files if file not in vhdl]
+        sources = [file for file in vhdl if "simulation" not in file.get("tags", [])]
+        libraries: dict[str, list[str]] = {}
+        for file in sources:
+            libraries.setdefault(file.get("logical_name") or "work", []).append(file["name"])
+        self.translation = Translation(
+            top=self.tool_options.get("ghdlsynth_top") or self.toplevel,
+            output=f"{self.name}_netlist.v",
+            libraries=libraries,
+            generics={name: self._param_value_str(value, bool_is_str=True) for name, value in self.generic.items()},
+            verilog=[file["name"] for file in others if "erilogSource" in file.get("file_type", "")],
+            std=self.tool_options.get("ghdlsynth_std") or "93",
+            options=self.tool_options.get("ghdlsynth_options", []),
+        )
+        output = self.translation.output
+        self.commands = EdaCommands()
+        self.commands.add(
+            [shlex.quote(sys.executable), "-m", "fusesoc_firm.netlist", self._request],
+            [output],
+            [self._request, *(file["name"] for file in sources), *map(_prerequisite, translator())],
+        )
+        self.commands.set_default_target(output)
+        netlist = {"name": output, "file_type": "verilogSource"}
+        self.edam = {**edam, "files": [netlist, *others]}
+
+    def write_config_files(self) -> None:
+        """What to translate; it changes only if that does, and then the netlist is made again."""
+        self.update_config_file(self._request, self.translation.to_json())
+
+    @property
+    def _request(self) -> str:
+        return f"{self.name}.ghdlsynth"
+
+
+def _prerequisite(path: Path) -> str:
+    """A path in a makefile."""
+    return str(path).replace(" ", "\\ ")

@@ -1,0 +1,26 @@
+"""`python -m fusesoc_firm.netlist FILE`: translate what a file of `Translation.to_json` says."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from fusesoc_firm.netlist.repair import NetlistError
+from fusesoc_firm.netlist.translation import Translation, translate
+
+
+def main(path: Path) -> int:
+    """The exit status is 1 where there is no netlist; then it is said why."""
+    translation = Translation.from_json(path.read_text(encoding="utf-8"))
+    try:
+        warnings = translate(translation, path.with_suffix(".ghdl"))
+    except NetlistError as error:
+        print(f"ghdlsynth: {translation.top}: no Verilog netlist\n{error}", file=sys.stderr)
+        return 1
+    if warnings:
+        print(warnings, file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))

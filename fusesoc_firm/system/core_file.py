@@ -1,0 +1,105 @@
+"""The `.core` file of a system: what FuseSoC is told about it, with all targets that a system can have.
+
+Its upper part is written once and is its author's from then on. The targets are written anew from one template, so
+that a target that is new there comes to every system; those of the author's own, by other names, stay.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import yaml
+
+from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.render import render
+from fusesoc_firm.system.derived import DerivedSystem
+from fusesoc_firm.system.verilog_bench import translated_unit
+
+HEAD_TEMPLATE = "core/system.core"
+TARGETS_TEMPLATE = "core/targets.core"
+
+# The instances of the generator that targets ask for.
+_SYSTEM, _SIMULATION = "system", "simulation"
+_SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
+# A target with the comment above it; blank lines part them.
+_TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class CoreOptions:
+    """What a new `.core` is to say beside what the specification does; paths are relative to it."""
+
+    name: str = ""
+    description: str = ""
+    depend: Sequence[str] = ()
+    stimuli: str = "stimuli.yaml"
+    model: str = "model.py"
+    environment: Sequence[str] = ()
+    paths: Sequence[str] = ()
+    distro: str = ""
+
+
+def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
+    """The text of a `.core` that is not there yet, for the specification `spec` beside it."""
+    further = {"paths": _flow(options.paths), "distro": options.distro}
+    head = render(
+        HEAD_TEMPLATE,
+        {
+            "name": options.name or f"robot:sys:{system.name}:0.1.0",
+            "description": options.description or f"System {system.name}",
+            "depend": list(options.depend),
+            "spec": spec,
+            "options": [{"name": name, "value": value} for name, value in further.items() if value],
+            "stimuli": options.stimuli,
+            "model": options.model,
+            "environment": {"files": _flow(options.environment)} if options.environment else None,
+        },
+    )
+    return head + _targets(system, is_simulated=True, has_environment=bool(options.environment))
+
+
+def updated_core(system: DerivedSystem, path: Path) -> str:
+    """The text of the `.core` in `path` with the targets of today. Raises `InputError` if it is none of a system."""
+    text = path.read_text(encoding="utf-8")
+    instances = _instances(path, text)
+    if _SYSTEM not in instances:
+        fail(f"{path} has no instance '{_SYSTEM}' under 'generate'; without the file, this command writes another one")
+    is_simulated = _SIMULATION in instances
+    has_environment = is_simulated and bool(instances[_SIMULATION].get("parameters", {}).get("environment"))
+    targets = _targets(system, is_simulated=is_simulated, has_environment=has_environment)
+    if not (section := _SECTION.search(text)):
+        return f"{text.rstrip()}\n\n{targets}"
+    names = _TARGET.findall(targets)
+    own = [target[0].strip("\n") for target in _TARGET.finditer(section[1]) if target[1] not in names]
+    rest = text[section.end() :]
+    return text[: section.start()] + "\n\n".join([targets.rstrip("\n"), *own]) + "\n" + (f"\n{rest}" if rest else "")
+
+
+def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool) -> str:
+    return render(
+        TARGETS_TEMPLATE,
+        {
+            "entity": system.entity,
+            "translated": translated_unit(system, has_environment=has_environment),
+            "is_simulated": is_simulated,
+            "is_vhdl": not any(item.is_component for item in system.accelerator_types),
+        },
+    )
+
+
+def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]:
+    """The generator's instances of a core."""
+    try:
+        content = yaml.safe_load(text.replace("CAPI=2:", "", 1))
+        instances = dict(content["generate"])
+    except (yaml.YAMLError, TypeError, KeyError, ValueError):
+        fail(f"{path} is no core with a section 'generate'")
+    return instances
+
+
+def _flow(items: Sequence[str]) -> str:
+    """A list on one line; nothing if it is empty."""
+    return f"[{', '.join(str(PurePosixPath(item)) for item in items)}]" if items else ""
