@@ -8,6 +8,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 SYSTEM ?= robot:sys:quat2euler
+# For make bitstream; each is a file in fusesoc_firm/boards.
+BOARD ?= ulx3s
+FUSESOC_OPTIONS ?=
 # The test bench's seed of random stalls; empty is the one of the system's .core.
 SEED ?=
 # WAVES=1 writes waves.ghw into the build folder.
@@ -27,7 +30,7 @@ PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
 
-.PHONY: help sim test bench proofs corpus lint setup tools clean distclean
+.PHONY: help sim test bitstream bench proofs corpus lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -39,7 +42,7 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIO
 	  $(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)") 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator dot:graphviz
+test: TOOLS = iverilog verilator yosys dot:graphviz
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -59,6 +62,12 @@ endif
 bench: TOOLS = verilator
 bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area timing cycles fuzz images'
 	@$(BIN)/python -m tests.bench $(BENCH)
+
+# Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
+bitstream: TOOLS = yosys
+bitstream: setup $(VENV)/.boards ## Build SYSTEM for BOARD (icebreaker, tangnano9k, ulx3s) to a bitstream
+	@EDALIZE_LAUNCHER="$(abspath $(BIN))/firm tool" \
+	  $(BIN)/fusesoc run --setup --build --target=$(BOARD) $(FUSESOC_OPTIONS) $(SYSTEM)
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
 	@$(BIN)/python -m tests.proofs
@@ -86,6 +95,11 @@ $(VENV)/.installed: pyproject.toml | tools
 $(VENV)/.bench: $(VENV)/.installed
 	@echo "Installing nextpnr into $(VENV)"
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	@touch $@
+
+$(VENV)/.boards: $(VENV)/.installed
+	@echo "Installing place and route into $(VENV)"
+	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[boards]'
 	@touch $@
 
 clean: ## Remove what was built; .venv stays

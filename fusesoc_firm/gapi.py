@@ -104,6 +104,7 @@ GENERATORS: Mapping[str, Generator] = {
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
             Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation")),
+            Parameter("board", "str", "the board it is for: one of ours, or a YAML file relative to the core"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
             Parameter("model", "str", "a Python file with the function that says what the system answers"),
             Parameter(

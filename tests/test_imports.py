@@ -37,6 +37,7 @@ ALLOWED: dict[str, set[str]] = {
     "store": set(),
     "library_path": set(),
     "workers": {"diagnostics"},
+    "launcher": {"diagnostics"},
     "yaml_text": {"diagnostics"},
     "yaml_sections": {"diagnostics", "yaml_text"},
     "yaml_schema": {"yaml_sections"},

@@ -12,6 +12,7 @@ from fusesoc_firm.cli.common import command
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.system import add_system
+from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.library_path import library_root
 
@@ -49,6 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     add_message(commands)
     add_system(commands)
     add_scheduler(commands)
+    add_tool(commands)
     return parser
 
 

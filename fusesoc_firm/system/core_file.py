@@ -15,6 +15,7 @@ import yaml
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.render import render
+from fusesoc_firm.system.board import FOLDER, board_entity, boards, read_board
 from fusesoc_firm.system.derived import DerivedSystem
 from fusesoc_firm.system.verilog_bench import translated_unit
 
@@ -86,8 +87,37 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             "translated": translated_unit(system, has_environment=has_environment),
             "is_simulated": is_simulated,
             "is_vhdl": not any(item.is_component for item in system.accelerator_types),
+            # What a C++ function becomes is known to Vitis alone.
+            "boards": [] if _has_kernels(system) else [_board(system, name) for name in boards()],
         },
     )
+
+
+def _has_kernels(system: DerivedSystem) -> bool:
+    return any(item.accelerator.type == "HLS" for item in system.accelerator_types)
+
+
+def _board(system: DerivedSystem, name: str) -> dict[str, object]:
+    """A board's target."""
+    board = read_board(name, FOLDER)
+    options = {
+        "yosys_synth_options": _words(board.synth_options),
+        "nextpnr_options": _words(board.nextpnr_options),
+        "device": str(board.device or ""),
+        "device_family": str(board.device_family or ""),
+    }
+    return {
+        "name": name,
+        "description": str(board.description),
+        "flow": str(board.flow),
+        "options": [{"name": option, "value": value} for option, value in options.items() if value],
+        "toplevel": board_entity(system, board),
+    }
+
+
+def _words(items: Sequence[str]) -> str:
+    """A list of strings on one line; nothing if it is empty."""
+    return yaml.safe_dump([str(item) for item in items], default_flow_style=True, width=10**6).strip() if items else ""
 
 
 def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]:

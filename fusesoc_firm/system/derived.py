@@ -159,10 +159,10 @@ class LinkKind(Enum):
 
 @dataclass(frozen=True)
 class Link:
-    """The link between the host and the system; one over UART knows the clock's frequency."""
+    """The link between the host and the system, and the frequency of clk where it is needed or known."""
 
     kind: LinkKind
-    clock_hz: int | None
+    clock_hz: int
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,20 @@ from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
+from fusesoc_firm.system.board import (
+    BOARD_TEMPLATE,
+    FLOWS,
+    Board,
+    board_configuration,
+    board_entity,
+    board_path,
+    on_board,
+    read_board,
+)
 from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, wrapper_configuration
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
-
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {
@@ -65,20 +74,28 @@ class LoadedSystem:
         return list(dict.fromkeys(found))
 
 
-def load_system(path: Path, libraries: dict[RosVersion, MessageLibrary], *, needs_sources: bool = True) -> LoadedSystem:
-    """Read and derive the system of a specification. Raises `InputError` with all its faults.
+def load_system(
+    path: Path,
+    libraries: dict[RosVersion, MessageLibrary],
+    *,
+    needs_sources: bool = True,
+    board: Board | None = None,
+) -> LoadedSystem:
+    """Read and derive the system of a specification, on a board if one is given. Raises `InputError` with all faults.
 
     Unless it `needs_sources`, those of accelerators may be missing.
     """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
+    if board:
+        specification = on_board(specification, board)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system)
 
 
 def load_requested(request: Request) -> LoadedSystem:
     """The system of a generator call."""
-    return load_system(specification_path(request), libraries(*library_sources(request)))
+    return load_system(specification_path(request), libraries(*library_sources(request)), board=_board(request))
 
 
 def specification_path(request: Request) -> Path:
@@ -88,7 +105,16 @@ def specification_path(request: Request) -> Path:
 
 def inputs(request: Request) -> list[Path]:
     """The specification and every file that it leads to. Raises `InputError`."""
-    return [specification_path(request), *load_requested(request).inputs()]
+    board = [_board_path(request)] if request.parameters["board"] else []
+    return [specification_path(request), *board, *load_requested(request).inputs()]
+
+
+def _board_path(request: Request) -> Path:
+    return board_path(str(request.parameters["board"]), request.files_root)
+
+
+def _board(request: Request) -> Board | None:
+    return read_board(str(request.parameters["board"]), request.files_root) if request.parameters["board"] else None
 
 
 class Part(Enum):
@@ -147,7 +173,20 @@ def generate(request: Request) -> GeneratedCore:
     top = f"{system.entity}.vhd"
     files = {path: file for path, file in made.items() if path != top}
     files |= _sources(system.accelerator_types, loaded.folder)
-    return GeneratedCore(f"System {system.name}", files | {top: made[top]})
+    files[top] = made[top]
+    if board := _board(request):
+        files |= _board_files(loaded, board)
+    return GeneratedCore(f"System {system.name}", files)
+
+
+def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
+    """The board's top level, and the constraints of its ports."""
+    configuration = board_configuration(loaded.system, board)
+    form, file_type = FLOWS[board.flow]
+    return {
+        f"{board_entity(loaded.system, board)}.vhd": GeneratedFile(render(BOARD_TEMPLATE, configuration), VHDL),
+        f"{board.name}.{form}": GeneratedFile(render(f"board/{form}", configuration), file_type),
+    }
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:

@@ -22,22 +22,23 @@ def link_of(project: Project, scheduling: Scheduling, faults: Diagnostics) -> Li
             project.interconnect.source,
             "a row of bytes does not show where a burst ends: take a scheduler that is not preemptive, or 'axi_stream'",
         )
-    return Link(kind, _clock_hz(project, faults) if kind is LinkKind.UART else None)
+    return Link(kind, _clock_hz(project, faults))
 
 
-def _clock_hz(project: Project, faults: Diagnostics) -> int | None:
-    """The clock's frequency as an integer."""
+def _clock_hz(project: Project, faults: Diagnostics) -> int:
+    """The clock's frequency as an integer; 0 where it is not known."""
     if project.clock is None:
-        faults.error(
-            f"interconnect '{project.interconnect}' needs the clock's frequency",
-            project.interconnect.source,
-            "add 'clock' to the project, such as 'clock: 100 MHz'",
-        )
-        return None
+        if project.interconnect == LinkKind.UART.value:
+            faults.error(
+                f"interconnect '{project.interconnect}' needs the clock's frequency",
+                project.interconnect.source,
+                "add 'clock' to the project, such as 'clock: 100 MHz'",
+            )
+        return 0
     # What is wrong with it is noted by who reads the publishers' times.
     frequency = clock_frequency(project, Diagnostics())
     if frequency is None:
-        return None
+        return 0
     if frequency.denominator != 1 or frequency > _FASTEST:
         faults.error(
             f"interconnect '{project.interconnect}' cannot work at 'clock' {project.clock}",

@@ -50,6 +50,7 @@ def call(spec: Path, stimuli: Path, model: Path, **parameters: Plain) -> Request
     """A generator call for the specification `spec`."""
     known: dict[str, Plain] = {
         "simulator": "ghdl",
+        "board": None,
         "seed": 1,
         "stall_percent": 25,
         "environment": None,

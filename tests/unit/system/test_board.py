@@ -1,0 +1,134 @@
+"""Boards: their files, the faults in them, and what becomes of a system on one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.render import render
+from fusesoc_firm.system.analysis import derive
+from fusesoc_firm.system.board import (
+    BOARD_TEMPLATE,
+    FLOWS,
+    Board,
+    board_configuration,
+    boards,
+    on_board,
+    read_board,
+)
+from fusesoc_firm.system.derived import DerivedSystem
+from fusesoc_firm.system.specification import read_specification
+
+LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+SPECIFICATION = """
+project: {{name: robot, clock: 100 MHz, scheduler: {scheduler}}}
+blocks:
+  - {{name: in, middleware: ROS, mode: subscriber, message: geometry_msgs/Point, outgoing: [{{name: out}}]}}
+  - {{name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point, period: 1 ms}}
+"""
+BOARD = """
+description: A board
+flow: trellis
+clock: 25 MHz
+interconnect: uart
+pins:
+  - {port: clk, site: A1}
+  - {port: uart_rxd, site: A2}
+  - {port: uart_txd, site: A3}
+"""
+
+
+def on(tmp_path: Path, board: Board, scheduler: str = "edf_resources") -> DerivedSystem:
+    path = tmp_path / "spec.yaml"
+    path.write_text(SPECIFICATION.format(scheduler=scheduler), encoding="utf-8")
+    faults = Diagnostics()
+    specification = read_specification(path, path.name, faults)
+    return derive(on_board(specification, board), tmp_path, LIBRARIES, faults)
+
+
+def written(tmp_path: Path, text: str) -> Board:
+    (tmp_path / "board.yaml").write_text(text, encoding="utf-8")
+    return read_board("board.yaml", tmp_path)
+
+
+@pytest.mark.parametrize("name", boards())
+def test_every_board_takes_a_system(tmp_path: Path, name: str) -> None:
+    board = read_board(name, tmp_path)
+    system = on(tmp_path, board, "fixed_priority")
+    assert system.link is not None
+    assert system.link.kind.value == board.interconnect
+    configuration = board_configuration(system, board)
+    assert f"entity robot_{name} is" in render(BOARD_TEMPLATE, configuration)
+    form, _ = FLOWS[board.flow]
+    constraints = render(f"board/{form}", configuration)
+    for pin in board.pins:
+        assert pin.port in constraints
+        assert pin.site in constraints
+
+
+def test_times_are_those_of_the_boards_clock(tmp_path: Path) -> None:
+    """A millisecond is 12,000 cycles at 12 MHz."""
+    system = on(tmp_path, written(tmp_path, BOARD.replace("25 MHz", "12 MHz")), "fixed_priority")
+    assert [times.period for times in system.scheduling.times] == [12_000]
+
+
+def test_constraints_of_each_form(tmp_path: Path) -> None:
+    texts = {}
+    for flow, (form, _) in FLOWS.items():
+        board = written(tmp_path, BOARD.replace("trellis", flow) + "standard: LVCMOS33\n")
+        configuration = board_configuration(on(tmp_path, board, "fixed_priority"), board)
+        texts[form] = render(f"board/{form}", configuration).splitlines()
+    assert 'FREQUENCY PORT "clk" 25 MHZ;' in texts["lpf"]
+    assert 'LOCATE COMP "clk" SITE "A1";' in texts["lpf"]
+    assert 'IOBUF PORT "clk" IO_TYPE=LVCMOS33;' in texts["lpf"]
+    assert "set_io clk A1" in texts["pcf"]
+    assert "set_frequency clk 25" in texts["pcf"]
+    assert 'IO_LOC "clk" A1;' in texts["cst"]
+    assert 'IO_PORT "clk" IO_TYPE=LVCMOS33;' in texts["cst"]
+
+
+def test_a_board_of_spi(tmp_path: Path) -> None:
+    pins = "".join(f"  - {{port: spi_{name}, site: B{number}}}\n" for number, name in enumerate(["sclk", "cs_n"]))
+    text = BOARD.replace("uart\n", "spi\n").split("  - {port: uart_rxd")[0] + pins
+    with pytest.raises(InputError, match="the board has no pin for 'spi_miso'"):
+        written(tmp_path, text)
+    board = written(tmp_path, f"{text}  - {{port: spi_miso, site: C1}}\n  - {{port: spi_mosi, site: C2}}\n")
+    text = render(BOARD_TEMPLATE, board_configuration(on(tmp_path, board, "fixed_priority"), board))
+    assert "CLOCK_HZ" not in text
+    assert "spi_irq" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (BOARD.replace("{port: uart_rxd, site: A2}", "{port: led, site: A2}"), "the board has no pin for 'uart_rxd'"),
+        (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' has a pin already"),
+        (BOARD + "  - {port: lamp, site: A4}\n", "'port' cannot be 'lamp'"),
+        (BOARD.replace("trellis", "vivado"), "'flow' cannot be 'vivado'"),
+        (BOARD.replace("clock: 25 MHz\n", ""), "a board needs the key 'clock'"),
+        (BOARD.replace("flow:", "flows:"), "did you mean 'flow'"),
+        ("", "board.yaml is empty; a board needs the keys"),
+    ],
+)
+def test_a_wrong_board_is_explained(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        written(tmp_path, text)
+
+
+def test_an_unknown_board_names_the_nearest(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"there is no board 'ulx3'[^?]*did you mean 'ulx3s'"):
+        read_board("ulx3", tmp_path)
+
+
+def test_a_preemptive_scheduler_does_not_fit_on_a_link(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot carry the bursts of scheduler 'lst'"):
+        on(tmp_path, written(tmp_path, BOARD), "lst")
+
+
+def test_a_clock_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="'clock' cannot be 'fast'"):
+        on(tmp_path, written(tmp_path, BOARD.replace("25 MHz", "fast")), "fixed_priority")
