@@ -105,7 +105,7 @@ def specification_path(request: Request) -> Path:
 
 def inputs(request: Request) -> list[Path]:
     """The specification and every file that it leads to. Raises `InputError`."""
-    board = [_board_path(request)] if request.parameters["board"] else []
+    board = [_board_path(request)] if request.parameters.get("board") else []
     return [specification_path(request), *board, *load_requested(request).inputs()]
 
 
@@ -114,7 +114,8 @@ def _board_path(request: Request) -> Path:
 
 
 def _board(request: Request) -> Board | None:
-    return read_board(str(request.parameters["board"]), request.files_root) if request.parameters["board"] else None
+    name = request.parameters.get("board")
+    return read_board(str(name), request.files_root) if name else None
 
 
 class Part(Enum):

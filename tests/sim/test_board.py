@@ -39,7 +39,7 @@ def test_the_light_shows_a_broken_frame(work: Library, tmp_path: Path) -> None:
     (tmp_path / "expected.txt").write_text("", encoding="ascii")
     result = work.run("board_tb", {}, directory=tmp_path)
     assert result.exit_code != 0
-    assert "frame_error pulses" in result.output
+    assert "frame_error(0) pulses" in result.output
 
 
 @pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"{' or '.join(TOOLS)} is not installed")
