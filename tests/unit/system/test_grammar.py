@@ -120,7 +120,7 @@ def _rows(section: type[Section], names: str) -> list[list[str]]:
 
 def _default(section: type[Section], field: str, entry: Key) -> str:
     if entry.is_required:
-        return "required"
+        return "required" + (f" unless `{entry.unless[0]}` is {entry.unless[1]}" if entry.unless else "")
     (default,) = (item.default for item in dataclasses.fields(section) if item.name == field)
     return "none" if default in (None, ()) else str(default)
 
