@@ -11,11 +11,14 @@ from __future__ import annotations
 import ast
 import keyword
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import AcceleratorType
+from fusesoc_firm.system.specification import SOFTWARE, SOURCE_SUFFIXES
+from fusesoc_firm.yaml_text import Text
 
 _KEYWORDS = frozenset(word.lower() for word in keyword.kwlist)
 
@@ -37,29 +40,48 @@ def prototype(type_: AcceleratorType) -> str:
 
 
 def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> None:
-    """Note what keeps the file at `path`, if it is there, from holding the function."""
+    """Note what keeps the file at `path`, the first of the sources, from holding the function; it may be missing."""
     accelerator = type_.accelerator
     if not type_.inputs:
         message = f"'{accelerator.name}' takes no message, so nothing would call its function"
         hint = "without 'sources' it stands for software elsewhere, which sends when it likes"
         faults.error(message, accelerator.name.source, hint)
-    if not path.is_file():
         return
-    text = path.read_text(encoding="utf-8", errors="replace")
-    lines = text.splitlines()
-    try:
-        found = _definition(ast.parse(text), function_name(type_))
-    except SyntaxError as error:
-        faults.error(f"this is not Python: {error.msg}", _place(path, lines, error.lineno or 1, error.offset or 1))
+    if not path.is_file() or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:
         return
+    source = accelerator.sources[0]
+    file = _File(_shown(source), path.read_text(encoding="utf-8", errors="replace"))
     hint = f"expected: {prototype(type_)}"
+    try:
+        found = _definition(ast.parse(file.text), function_name(type_))
+    except (SyntaxError, ValueError) as error:
+        line, column = (error.lineno, error.offset) if isinstance(error, SyntaxError) else (1, 1)
+        faults.error(f"this is not Python: {getattr(error, 'msg', error)}", file.place(line or 1, column or 1))
+        return
     if found is None:
-        place = accelerator.sources[0].source
-        faults.error(f"'{accelerator.sources[0]}' has no function '{function_name(type_)}'", place, hint)
+        faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, hint)
     elif isinstance(found, ast.FunctionDef) and not _takes(found.args, len(type_.inputs)):
         count = len(type_.inputs)
         message = f"'{found.name}' cannot be called with {count} message{'' if count == 1 else 's'}"
-        faults.error(message, _place(path, lines, found.lineno, found.col_offset + 1), hint)
+        faults.error(message, file.place(found.lineno, found.col_offset + 1), hint)
+
+
+def _shown(source: Text) -> str:
+    """A source as it is called from where the specification is."""
+    return str(Path(source.source.file).parent / source) if source.source else str(source)
+
+
+@dataclass(frozen=True)
+class _File:
+    """The text of a source, and what it is called in messages."""
+
+    name: str
+    text: str
+
+    def place(self, line: int, column: int) -> SourceRef:
+        """A place in it."""
+        lines = self.text.splitlines()
+        return SourceRef(self.name, line, column, lines[line - 1] if line <= len(lines) else "")
 
 
 def _definition(module: ast.Module, name: str) -> ast.stmt | None:
@@ -96,7 +118,3 @@ def _takes(arguments: ast.arguments, count: int) -> bool:
     fewest = positional - len(arguments.defaults)
     needs_keywords = None in arguments.kw_defaults
     return fewest <= count and (count <= positional or arguments.vararg is not None) and not needs_keywords
-
-
-def _place(path: Path, lines: Sequence[str], line: int, column: int) -> SourceRef:
-    return SourceRef(str(path), line, column, lines[line - 1] if line <= len(lines) else "")

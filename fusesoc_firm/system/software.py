@@ -50,7 +50,8 @@ class Parts:
         """Note what keeps the hardware of a specification with these `blocks` from being one."""
         first = next(iter(blocks.values())).name.source
         if not self.blocks:
-            faults.error("all accelerators are software, so nothing is left for hardware", first)
+            hint = "an accelerator, or a message that goes from a subscriber to a publisher, must stay there"
+            faults.error("all accelerators are software, so nothing is left for hardware", first, hint)
             return
         for mode in (SUBSCRIBER, PUBLISHER):
             found = [*self.of_mode(mode).values()]
