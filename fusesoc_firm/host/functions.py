@@ -35,9 +35,11 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
     """Within it, sources in `folder` can import each other. Raises `InputError` if one imports what is not listed."""
     listed = {(folder / source).resolve(): item for item in accelerators for source in item.sources}
     owners = {path.parent: item for path, item in listed.items()}
-    paths, known = [*sys.path], {*sys.modules}
+    paths, known, writes = [*sys.path], {*sys.modules}, sys.dont_write_bytecode
     # Behind all others: nothing of Python's own is hidden.
     sys.path += map(str, owners)
+    # No __pycache__ beside the user's files.
+    sys.dont_write_bytecode = True
     try:
         yield
         for name, file in _imported(known):
@@ -46,7 +48,7 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
                 message = f"the software of '{owner.name}' imports '{name}', which is none of its sources"
                 fail(message, owner.sources[0].source, f"add {file.name} to 'sources'")
     finally:
-        sys.path[:] = paths
+        sys.path[:], sys.dont_write_bytecode = paths, writes
         for name, file in [*_imported(known)]:
             if file.parent in owners:
                 del sys.modules[name]
