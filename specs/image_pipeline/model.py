@@ -96,5 +96,9 @@ def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
         raise ValueError(f"unknown subscriber '{subscriber}', legal: 'camera'")
     gray_image = ACCELERATORS["rgb_to_gray"](message)
     small_image = ACCELERATORS["scale_down"](gray_image)
-    # What goes to `small` counts where that is software.
-    return [("small_in", gray_image), ("sums", ACCELERATORS["integral_image"](small_image))]
+    # What goes to an accelerator counts where that is software.
+    return [
+        ("small_in", gray_image),
+        ("integral_in", small_image),
+        ("sums", ACCELERATORS["integral_image"](small_image)),
+    ]

@@ -402,7 +402,8 @@ def helped(folder: Path, sources: str, code: str) -> Traffic:
         "def soft(m):\n    import gain\n    return {**m, 'x': gain.GAIN * m['x']}\n",
     ],
 )
-def test_sources_import_each_other(tmp_path: Path, code: str) -> None:
+def test_sources_import_each_other(tmp_path: Path, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
     paths, modules = [*sys.path], {*sys.modules}
     found = helped(tmp_path, "soft.py, gain.py", code)
     assert [item.message["x"] for item in found.stimuli] == [3.0, 15.0]
