@@ -116,7 +116,7 @@ def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> 
     """What a message of software comes from or goes to: another block, a converter of the hardware, or a topic."""
     if end.prefix:
         return {"block": end.block, "message": system.names[end]}
-    crossing = [item for item in converters if item.software and item.block == end.block]
+    crossing = [item for item in converters if item.block == end.block]
     return {"converter": end.block, "id": crossing[0].id} if crossing else {"topic": end.block}
 
 

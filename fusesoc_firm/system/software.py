@@ -102,10 +102,10 @@ class Parting:
             {**self.outputs, **{self.names[end]: (_bare(side),) for end, side in entering}},
             hardware,
             {self.names[end]: end for end, _ in (*entering, *leaving)},
-            self._software(host, blocks),
+            self._software(host),
         )
 
-    def _software(self, connections: tuple[Connection, ...], hardware: Mapping[str, Block]) -> Software:
+    def _software(self, connections: tuple[Connection, ...]) -> Software:
         """The host's part; publishers have the fields that they get."""
         sources = {connection.source.block for connection in connections}
         subscribers = [
@@ -119,7 +119,7 @@ class Parting:
                 for end, frame in zip(connection.sinks, connection.frames, strict=True)
                 if end.block == name
             ]
-            if given and name not in hardware:
+            if given:
                 publishers.append(Topic(name, _joined(given)))
         return Software(tuple(self.software), tuple(subscribers), tuple(publishers), connections)
 

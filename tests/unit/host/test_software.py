@@ -240,15 +240,16 @@ def test_an_answer_is_what_the_middleware_makes_of_it(tmp_path: Path) -> None:
 
 
 def test_software_cannot_change_what_others_get(tmp_path: Path) -> None:
-    code = "def soft(m):\n    m['position']['x'] = m['orientation'] = None\n"
-    types = soft(tmp_path, "soft", code, "Pose", "") + HARD
+    code = "def soft(m):\n    assert m['covariance'][0] == 1.0\n    m['covariance'][0] = m['pose']['position'] = None\n"
+    posed = "geometry_msgs/PoseWithCovariance"
+    types = soft(tmp_path, "soft", code, posed, "") + HARD
     blocks = (
-        converter("sub", "subscriber", "Pose", "a", "b", "pub")
+        converter("sub", "subscriber", posed, "a", "b", "pub")
         + instance("a", "soft")
         + instance("b", "soft")
-        + converter("pub", "publisher", "Pose")
+        + converter("pub", "publisher", posed)
     )
-    pose = {"position": point(1.0), "orientation": {**point(0.0), "w": 7.0}}
+    pose = {"pose": {"position": point(1.0), "orientation": {**point(0.0), "w": 7.0}}, "covariance": [1.0] * 36}
     model = "def respond(block, m):\n    return [('pub', m)]\n"
     found = run(tmp_path, derived(tmp_path, specification(blocks, types)), model, ("sub", pose))
     assert found.stimuli[0].message == found.responses[0].message == pose

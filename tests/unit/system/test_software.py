@@ -10,6 +10,8 @@ import pytest
 
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.select import names_in_use
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.configuration import system_configuration
 from fusesoc_firm.system.derived import Connection, DerivedSystem, End
 from fusesoc_firm.system.diagram import diagram
@@ -413,6 +415,27 @@ def test_a_word_moves_an_accelerator_and_no_message_takes_another_way(tmp_path: 
     assert set(ends) == inside and inside.isdisjoint(software)
     outside = {end.block for item in parted.software.connections for end in (item.source, *item.sinks)}
     assert outside.isdisjoint(set(names) - software)
+
+
+def test_sources_and_messages_of_software_are_inputs(tmp_path: Path) -> None:
+    """Whatever is generated is generated anew when one of them changes."""
+    definition = tmp_path / "own_msgs" / "msg" / "Own.msg"
+    definition.parent.mkdir(parents=True)
+    definition.write_text("float64 x\n", encoding="utf-8")
+    (tmp_path / "own_msgs" / "package.xml").write_text("<package><name>own_msgs</name></package>\n", encoding="utf-8")
+    (tmp_path / "node.py").write_text("def node(message):\n    return message\n", encoding="utf-8")
+    types = accelerator("node", "own_msgs/Own", "own_msgs/Own", "ROS-SW", "node.py")
+    blocks = (
+        converter("sub", "subscriber", "own_msgs/Own", "n")
+        + instance("n", "node", "pub")
+        + converter("pub", "publisher", "own_msgs/Own")
+        + converter("in", "subscriber", "Point", "out")
+        + converter("out", "publisher", "Point")
+    )
+    path = tmp_path / "spec.yaml"
+    path.write_text(specification(blocks, types), encoding="utf-8")
+    libraries = {ros: MessageLibrary(ros, [tmp_path / "own_msgs"]) for ros in RosVersion}
+    assert load_system(path, libraries).inputs() == [tmp_path / "node.py", definition]
 
 
 # --- what is shown ----------------------------------------------------------------------------------------------------
