@@ -8,15 +8,16 @@ A block without sources stands for software elsewhere: the stimuli hold what it 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
-from fusesoc_firm.frame.select import used_part
+from fusesoc_firm.frame.values import shown
 from fusesoc_firm.host.functions import Functions, Message, importable_sources
 from fusesoc_firm.host.reference import Response
 from fusesoc_firm.host.stimuli import Stimulus
@@ -157,8 +158,23 @@ def _check_published(system: DerivedSystem, published: dict[str, list[Message]],
         wanted = [response for response in responses if response.publisher.block == topic.block]
         found = published.get(topic.block, [])
         for number, (message, response) in enumerate(zip(found, wanted, strict=False)):
-            if encode_used(topic.frame, message) != response.payload:
-                said, sent = (used_part(value, topic.frame) for value in (response.message, message))
-                fail(f"message {number} from software to '{topic.block}' is {sent}, but {said} by the model")
+            payload = encode_used(topic.frame, message)
+            if payload != response.payload:
+                sent, said = decode(topic.frame, payload), decode(topic.frame, response.payload)
+                name, *values = next(_differences(sent, said, ""), ("it", sent, said))
+                one, other = map(shown, values)
+                fail(f"message {number} from software to '{topic.block}': {name} is {one}, but {other} by the model")
         if len(found) != len(wanted):
             fail(f"software sends {len(found)} messages to '{topic.block}', but {len(wanted)} by the model")
+
+
+def _differences(one: Any, other: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
+    """The values in which two messages differ, each with its path."""
+    if isinstance(one, Mapping):
+        for name, value in one.items():
+            yield from _differences(value, other[name], f"{path}.{name}" if path else name)
+    elif isinstance(one, list | bytes) and len(one) == len(other):
+        for number, pair in enumerate(zip(one, other, strict=True)):
+            yield from _differences(*pair, f"{path}[{number}]")
+    elif one != other:
+        yield f"'{path}'", one, other

@@ -150,7 +150,7 @@ def test_hardware_and_software_together(
 def test_wrong_software_fails_in_hardware_behind_it(tmp_path: Path) -> None:
     """What it sends there is not what the model thinks."""
     functions = FUNCTIONS.replace("2 * value", "3 * value")
-    with pytest.raises(InputError, match="message 0 from software to 'near' is"):
+    with pytest.raises(InputError, match="message 0 from software to 'near': 'x' is "):
         mixed(tmp_path, functions=functions)
     model = MODEL.replace('("near", scaled)', '("near", times(first, 3))')
     result = mixed(tmp_path, model=model, functions=functions).run()

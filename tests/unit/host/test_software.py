@@ -86,9 +86,34 @@ def test_a_publisher_that_is_no_hardware_is_compared_here(tmp_path: Path) -> Non
     model = "def respond(block, m):\n    return [('b1_in', m), ('pub', {**m, 'x': 2 * m['x'] + ERROR})]\n"
     sent, expected = shown(row(tmp_path, "hard", "soft", code=DOUBLE, model=model.replace("ERROR", "0"), sent=TWO))
     assert (sent, expected) == ([("sub", 1.0), ("sub", 5.0)], [("b1_in", 1.0, 0), ("b1_in", 5.0, 1)])
-    text = "message 0 from software to 'pub' is {'x': 2.0, 'y': 0.0, 'z': 0.0}, but {'x': 3.0, 'y': 0.0, 'z': 0.0} by"
+    text = "message 0 from software to 'pub': 'x' is 2.0, but 3.0 by the model"
     with pytest.raises(InputError, match=text):
         row(tmp_path, "hard", "soft", code=DOUBLE, model=model.replace("ERROR", "1"), sent=TWO)
+
+
+@pytest.mark.parametrize(
+    ("sent", "text"),
+    [
+        ("b'abcd'", r"'data\[2\]' is 99, but 33 by the model"),
+        ("b'abc'", r"'data' is b'abc', but b'ab!d' by the model"),
+        ("bytes(9999)", r"'data' is b'\\x00.{10,60}, but b'ab!d' by the model"),
+    ],
+)
+def test_a_difference_is_found_in_a_long_message(tmp_path: Path, sent: str, text: str) -> None:
+    array = "std_msgs/UInt8MultiArray"
+    types = HARD + soft(tmp_path, "soft", f"def soft(m):\n    return {{**m, 'data': {sent}}}\n", array, array)
+    blocks = (
+        converter("sub", "subscriber", array, "s")
+        + instance("s", "soft", "pub")
+        + converter("pub", "publisher", array)
+        + converter("in", "subscriber", "Point", "h")
+        + instance("h", "hard", "out")
+        + converter("out", "publisher", "Point")
+    )
+    model = "def respond(block, m):\n    return [('pub', {**m, 'data': b'ab!d'})]\n"
+    message = {"layout": {"dim": [], "data_offset": 0}, "data": b""}
+    with pytest.raises(InputError, match=f"^error: message 0 from software to 'pub': {text}$"):
+        run(tmp_path, derived(tmp_path, specification(blocks, types)), model, ("sub", message))
 
 
 @pytest.mark.parametrize(("answer", "count"), [("[('b1_in', m)]", 0), ("[('b1_in', m), ('pub', m), ('pub', m)]", 4)])
@@ -186,7 +211,9 @@ def test_parts_of_a_message_meet_on_the_host(tmp_path: Path) -> None:
     system = derived(tmp_path, specification(blocks, types))
     found = run(tmp_path, system, model, ("sub", pose), ("in", point(1.0)))
     assert shown(found) == ([("in", 1.0)], [("out", 1.0, 0)])
-    with pytest.raises(InputError, match="message 0 from software to 'pub' is"):
+    with pytest.raises(
+        InputError, match=r"message 0 from software to 'pub': 'position.x' is 1.0, but 9.0 by the model"
+    ):
         run(
             tmp_path,
             system,
