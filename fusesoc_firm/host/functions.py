@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import sys
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from fusesoc_firm.diagnostics import fail
@@ -34,7 +33,7 @@ Message = dict[str, Any]
 def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Iterator[None]:
     """Within it, sources in `folder` can import each other. Raises `InputError` if one imports what is not listed."""
     listed = {(folder / source).resolve(): item for item in accelerators for source in item.sources}
-    owners = {path.parent: item for path, item in listed.items()}
+    owners = {path.parent: item for path, item in reversed(listed.items())}
     paths, known, writes = [*sys.path], {*sys.modules}, sys.dont_write_bytecode
     # Behind all others: nothing of Python's own is hidden.
     sys.path += map(str, owners)
@@ -42,26 +41,24 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
     sys.dont_write_bytecode = True
     try:
         yield
-        for name, file in _imported(known):
-            if file.parent in owners and file not in listed:
-                owner = owners[file.parent]
-                message = f"the software of '{owner.name}' imports '{name}', which is none of its sources"
-                fail(message, owner.sources[0].source, f"add {file.name} to 'sources'")
+        for _, file, folder in _imported(known, owners):
+            if file not in listed:
+                message = f"software imports {file.relative_to(folder)}, which is none of its sources"
+                fail(message, owners[folder].sources[0].source, "every file of it is listed in 'sources'")
     finally:
         sys.path[:], sys.dont_write_bytecode = paths, writes
-        for name, file in [*_imported(known)]:
-            if file.parent in owners:
-                del sys.modules[name]
+        for name, _, _ in [*_imported(known, owners)]:
+            del sys.modules[name]
 
 
-def _imported(known: set[str]) -> Iterator[tuple[str, Path]]:
-    """The modules that are not `known`, with their files."""
+def _imported(known: Collection[str], folders: Iterable[Path]) -> Iterator[tuple[str, Path, Path]]:
+    """The modules that are not `known` and come out of one of the folders, each with its file and the folder."""
     for name in sorted(sys.modules.keys() - known):
-        yield name, _file(sys.modules[name])
-
-
-def _file(module: ModuleType) -> Path:
-    return Path(getattr(module, "__file__", None) or "").resolve()
+        file = Path(getattr(sys.modules[name], "__file__", None) or "").resolve()
+        first = name.partition(".")[0]
+        for folder in folders:
+            if file == folder / f"{first}.py" or file.is_relative_to(folder / first):
+                yield name, file, folder
 
 
 @dataclass(frozen=True)

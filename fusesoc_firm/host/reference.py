@@ -4,6 +4,7 @@
 
 It gets each message sent, with the name of the subscriber's block, and returns the messages that the system must
 send for it, each with the name of its publisher's block. It is called in the order of the stimuli and may keep state.
+What goes to an accelerator in software it returns, too (`software`).
 """
 
 from __future__ import annotations

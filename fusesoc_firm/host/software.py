@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.diagnostics import Diagnostics, fail
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.values import shown
@@ -79,18 +79,20 @@ def _sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
 
 
 def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> None:
-    """Fail if software would get nothing from hardware, or hardware nothing from software that is not here."""
+    """Raise `InputError` if stimuli or model leave out all that somebody waits for."""
+    faults = Diagnostics()
     sent = {stimulus.subscriber.block for stimulus in stimuli}
     for topic, end in _sent_elsewhere(system).items():
         if topic.block not in sent:
             hint = f"'{end.block}' has no sources, so what it sends must be among them"
-            fail(f"the stimuli hold no message of '{topic.block}'", hint=hint)
+            faults.error(f"the stimuli hold no message of '{topic.block}'", hint=hint)
     said = {response.publisher.block for response in responses}
     here = {block.block for block in system.software.blocks if block.type.accelerator.sources}
     for publisher in system.publishers:
         if publisher.software and publisher.software.block in here and publisher.block not in said:
             message = f"the model says nothing of what goes from hardware to '{publisher.software.block}'"
-            fail(message, hint=f"'respond' returns it among the others: ('{publisher.block}', message)")
+            faults.error(message, hint=f"'respond' returns it among the others: ('{publisher.block}', message)")
+    faults.raise_if_any()
 
 
 @dataclass

@@ -198,7 +198,6 @@ class Parting:
     def _converter(self, end: End, side: MessageSide) -> Block:
         """The block of a converter that stands for a side; a publisher has the block's keys of publishers."""
         block = self.blocks[end.block]
-        assert block.name.source
         made = Block(name=Text(self.names[end], block.name.source), source=block.source)
         if side in self.outputs[end.block]:
             return replace(made, mode=Text(SUBSCRIBER))

@@ -441,9 +441,27 @@ def test_sources_import_each_other(tmp_path: Path, code: str, monkeypatch: pytes
     assert not (tmp_path / "__pycache__").exists()
 
 
-def test_what_is_imported_must_be_a_source(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("module", "file"), [("gain", "gain.py"), ("parts.gain", "parts/__init__.py")])
+def test_what_is_imported_must_be_a_source(tmp_path: Path, module: str, file: str) -> None:
+    (tmp_path / "parts").mkdir()
+    for name in ("__init__", "gain"):
+        (tmp_path / "parts" / f"{name}.py").write_text("GAIN = 3\n", encoding="utf-8")
+    code = f"from {module} import GAIN\n\ndef soft(m):\n    return m\n"
     with pytest.raises(InputError) as raised:
-        helped(tmp_path, "soft.py", "from gain import GAIN\n\ndef soft(m):\n    return m\n")
+        helped(tmp_path, "soft.py", code)
     text = str(raised.value)
-    assert "error: the software of 'soft' imports 'gain', which is none of its sources" in text
-    assert text.startswith("spec.yaml:") and text.endswith("      = add gain.py to 'sources'")
+    assert text.startswith("spec.yaml:") and text.endswith("      = every file of it is listed in 'sources'")
+    assert f"error: software imports {file}, which is none of its sources\n" in text
+    assert not {"gain", "parts", "parts.gain"} & sys.modules.keys()
+    if module != "gain":
+        assert len(helped(tmp_path, "soft.py, parts/__init__.py, parts/gain.py", code).stimuli) == 2
+
+
+def test_other_packages_are_no_sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An environment below the folder of the specification is not the user's software."""
+    installed = tmp_path / ".venv" / "lib"
+    installed.mkdir(parents=True)
+    (installed / "gain_of_others.py").write_text("GAIN = 3\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(installed)
+    assert len(helped(tmp_path, "soft.py", "import gain_of_others\n\ndef soft(m):\n    return m\n").stimuli) == 2
+    assert sys.modules.pop("gain_of_others").GAIN == 3
