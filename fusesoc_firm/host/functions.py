@@ -41,10 +41,10 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
     sys.dont_write_bytecode = True
     try:
         yield
-        for _, file, folder in _imported(known, owners):
+        for _, file, place in _imported(known, owners):
             if file not in listed:
-                message = f"software imports {file.relative_to(folder)}, which is none of its sources"
-                fail(message, owners[folder].sources[0].source, "every file of it is listed in 'sources'")
+                message = f"software imports {file.relative_to(place)}, which is none of its sources"
+                fail(message, owners[place].sources[0].source, "every file of it is listed in 'sources'")
     finally:
         sys.path[:], sys.dont_write_bytecode = paths, writes
         for name, _, _ in [*_imported(known, owners)]:
