@@ -36,8 +36,8 @@ class Converter(Topic):
     """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks.
 
     The fields that are used in `frame` are its ports. One without all of them has an entity with a `suffix`. `buffer`
-    are the bytes of the longest payload of a publisher that stores its frames whole, 0 of any other. One that the
-    specification does not have stands between hardware and a message side of a block in `software`.
+    are the bytes of the longest payload of a publisher that stores its frames whole, 0 of any other. Those that the
+    specification does not have come last: each stands between hardware and a message side of a block in `software`.
     """
 
     id: int
