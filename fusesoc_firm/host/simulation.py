@@ -12,6 +12,7 @@ from fusesoc_firm.host.environment import environment_files
 from fusesoc_firm.host.frames import expected_text, stimulus_text
 from fusesoc_firm.host.kernel import kernel_files
 from fusesoc_firm.host.reference import Response, responses
+from fusesoc_firm.host.software import answered, stimulated, traffic
 from fusesoc_firm.host.stimuli import read_stimuli
 from fusesoc_firm.render import render
 from fusesoc_firm.system import generator
@@ -43,8 +44,9 @@ def generate(request: Request) -> GeneratedCore:
     loaded = generator.load_requested(request)
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]))
-    stimuli = read_stimuli(_path(request, "stimuli"), system.subscribers)
-    expected = responses(_path(request, "model"), stimuli, system.publishers)
+    stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
+    answers = responses(_path(request, "model"), stimuli, answered(system))
+    found = traffic(system, loaded.folder, stimuli, answers)
     files: dict[str, GeneratedFile] = {}
     for accelerator in system.accelerator_types:
         if accelerator.accelerator.type == "HLS":
@@ -59,11 +61,11 @@ def generate(request: Request) -> GeneratedCore:
     if request.parameters["simulator"] == GHDL:
         files |= _vhdl_bench(configuration, system)
     else:
-        frames = max(len(stimuli), len(expected))
-        files |= _verilog_bench(configuration, system, frames, _beats(expected, system.width))
+        frames = max(len(found.stimuli), len(found.responses))
+        files |= _verilog_bench(configuration, system, frames, _beats(found.responses, system.width))
     files |= {
-        "stimulus.txt": GeneratedFile(stimulus_text(stimuli), "user", copyto="stimulus.txt"),
-        "expected.txt": GeneratedFile(expected_text(expected), "user", copyto="expected.txt"),
+        "stimulus.txt": GeneratedFile(stimulus_text(found.stimuli, system.subscribers), "user", copyto="stimulus.txt"),
+        "expected.txt": GeneratedFile(expected_text(found.responses, system.publishers), "user", copyto="expected.txt"),
     }
     return GeneratedCore(f"Simulation of system {system.name}", files)
 

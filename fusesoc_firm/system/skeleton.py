@@ -12,12 +12,14 @@ from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem, MessageSide
 from fusesoc_firm.system.hls import arguments, function_name, prototype
+from fusesoc_firm.system.python_skeleton import python_skeleton
 from fusesoc_firm.system.sides import SidePort, accelerator_ports
-from fusesoc_firm.system.specification import Pin
+from fusesoc_firm.system.specification import SOFTWARE, Pin
 
 Configuration = dict[str, Any]
 
 _FUNCTION_TEMPLATE = "hls/skeleton.cpp"
+_SOFTWARE_TEMPLATE = "python/skeleton.py"
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,10 @@ _LANGUAGES = {
 def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
     """A text for the first source of each accelerator none of whose sources is in `folder`."""
     texts = {}
-    for type_ in system.accelerator_types:
+    for type_ in (*system.accelerator_types, *system.software.types):
         paths = [folder / source for source in type_.accelerator.sources]
-        if not any(path.exists() for path in paths):
+        # Software elsewhere has none.
+        if paths and not any(path.exists() for path in paths):
             texts[paths[0]] = skeleton(type_, system.width)
     return texts
 
@@ -74,6 +77,8 @@ def skeleton(type_: AcceleratorType, width: int) -> str:
     """The text of an accelerator's source; streams have `width` bits."""
     if language := _LANGUAGES.get(type_.accelerator.type):
         template, configuration = language.template, _entity(type_, width, language)
+    elif type_.accelerator.type == SOFTWARE:
+        template, configuration = _SOFTWARE_TEMPLATE, python_skeleton(type_)
     else:
         template, configuration = _FUNCTION_TEMPLATE, _function(type_)
     return render(template, {**configuration, "purpose": _purpose(type_)})
