@@ -10,8 +10,9 @@ entity firm_sim_frames is
     clk   : in std_logic;
     rst_n : in std_logic;
 
+    -- The byte that came last, and how many came; they change at any time, and not twice within a cycle.
     data  : in std_logic_vector(7 downto 0);
-    valid : in std_logic;  -- in a cycle with a byte
+    count : in natural;
 
     m_axis_tdata  : out std_logic_vector(7 downto 0);
     m_axis_tkeep  : out std_logic_vector(0 downto 0);
@@ -45,6 +46,7 @@ begin
     variable newest : item_ptr_t;
     variable whole  : natural := 0;  -- bytes of whole frames
 
+    variable taken  : natural := 0;  -- bytes so far
     variable bytes  : natural := 0;  -- of the frame that comes in
     variable header : unsigned(8*HEADER_BYTES-1 downto 0);
 
@@ -90,7 +92,8 @@ begin
 
   begin
     if rising_edge(clk) and rst_n = '1' then
-      if valid = '1' then
+      if taken /= count then
+        taken := taken + 1;
         take_byte;
       end if;
       if valid_r = '0' or m_axis_tready = '1' then

@@ -43,7 +43,6 @@ architecture simulation of firm_sim_spi is
 
   signal received_data  : byte_t;
   signal received_count : natural := 0;
-  signal valid          : std_logic := '0';
 
 begin
 
@@ -181,24 +180,12 @@ begin
     end loop;
   end process master;
 
-  clock_bytes : process (clk)
-    variable passed : natural := 0;
-  begin
-    if rising_edge(clk) then
-      valid <= '0';
-      if passed /= received_count then
-        passed := passed + 1;
-        valid  <= '1';
-      end if;
-    end if;
-  end process clock_bytes;
-
   u_frames : entity firm.firm_sim_frames
     port map (
       clk           => clk,
       rst_n         => rst_n,
       data          => received_data,
-      valid         => valid,
+      count         => received_count,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tkeep  => m_axis_tkeep,
       m_axis_tid    => m_axis_tid,

@@ -41,7 +41,6 @@ architecture simulation of firm_sim_uart is
 
   signal received_data  : std_logic_vector(7 downto 0);
   signal received_count : natural := 0;
-  signal valid          : std_logic := '0';
 
 begin
 
@@ -137,24 +136,12 @@ begin
     end if;
   end process want;
 
-  clock_bytes : process (clk)
-    variable passed : natural := 0;
-  begin
-    if rising_edge(clk) then
-      valid <= '0';
-      if passed /= received_count then
-        passed := passed + 1;
-        valid  <= '1';
-      end if;
-    end if;
-  end process clock_bytes;
-
   u_frames : entity firm.firm_sim_frames
     port map (
       clk           => clk,
       rst_n         => rst_n,
       data          => received_data,
-      valid         => valid,
+      count         => received_count,
       m_axis_tdata  => m_axis_tdata,
       m_axis_tkeep  => m_axis_tkeep,
       m_axis_tid    => m_axis_tid,
