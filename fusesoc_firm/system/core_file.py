@@ -22,6 +22,13 @@ from fusesoc_firm.system.verilog_bench import translated_unit
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
 
+# Families of FPGAs as Yosys calls them, and the options of its synth command.
+_FAMILIES = (
+    {"name": "xilinx", "description": "Xilinx UltraScale+", "options": "[-family, xcup, -flatten, -abc9]"},
+    {"name": "ecp5", "description": "Lattice ECP5", "options": "[-abc9]"},
+    {"name": "ice40", "description": "Lattice iCE40 UltraPlus", "options": "[-abc9, -device, u, -dsp]"},
+    {"name": "gowin", "description": "Gowin", "options": "[]"},
+)
 # The instances of the generator that targets ask for.
 _SYSTEM, _SIMULATION = "system", "simulation"
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
@@ -88,6 +95,7 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             "is_simulated": is_simulated,
             "is_vhdl": not any(item.is_component for item in system.accelerator_types),
             # What a C++ function becomes is known to Vitis alone.
+            "families": [] if _has_kernels(system) else list(_FAMILIES),
             "boards": [] if _has_kernels(system) else [_board(system, name) for name in boards()],
         },
     )
