@@ -27,7 +27,9 @@ def add_scheduler(commands: Any) -> None:
     bench.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
     bench.add_argument("--sets", type=positive, metavar="N", help="sets of each data set (default: its own)")
     bench.add_argument("--cycles", type=positive, metavar="N", help="cycles of each simulation (default: its own)")
-    bench.add_argument("--seed", type=natural, default=1, metavar="N", help="all randomness follows from it (default: 1)")
+    bench.add_argument(
+        "--seed", type=natural, default=1, metavar="N", help="all randomness follows from it (default: 1)"
+    )
     bench.add_argument(
         "--distribution", choices=("normal", "uniform"), default="normal", help="how times spread (default: normal)"
     )

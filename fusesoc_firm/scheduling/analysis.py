@@ -10,12 +10,19 @@ from math import floor, inf
 from fusesoc_firm.scheduling import area, response
 from fusesoc_firm.scheduling.area import Areas
 from fusesoc_firm.scheduling.dissertation import dissertation
+from fusesoc_firm.scheduling.models.lru import ImmediateLru
+from fusesoc_firm.scheduling.models.parallel import Parallel
 from fusesoc_firm.scheduling.policies import POLICIES
 from fusesoc_firm.scheduling.response import Overheads
 from fusesoc_firm.scheduling.tasks import Task
 
-# Above this LRU takes its requests in one after the other, and so do those that compare deadlines above the other one.
-_MOST_AT_ONCE = {"lru": 16, "edf_latency": 8, "lst": 8, "edf_resources": 0}
+# Policies that take requests in one after the other, and up to how many requesters they take them all at once instead.
+_MOST_AT_ONCE = {
+    "lru": ImmediateLru.MAX_REQUESTERS,
+    "edf_latency": Parallel.MAX_REQUESTERS,
+    "lst": Parallel.MAX_REQUESTERS,
+    "edf_resources": 0,
+}
 
 
 class Criterion(StrEnum):
