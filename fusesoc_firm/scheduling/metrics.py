@@ -1,8 +1,8 @@
 """The metrics of section 4.3, of each set and over the sets of a data set.
 
 The dissertation says how each is defined, not how it is brought together. Here the minimum, the average and the maximum
-are taken over the tasks of a set, then the mean of each over the sets: so tables 4.3 and 4.4 have fractions in all three
-columns, and the models of the fixed priorities and of LRU come to their values with it.
+are taken over the tasks of a set, then the mean of each over the sets: so tables 4.3 and 4.4 have fractions in all
+three columns, and the models of the fixed priorities and of LRU come to their values with it.
 
 The response time is that of every granted task, though equation 4.4 speaks of completed transactions: the maxima of
 table 4.3 come out only with those that the simulation's end cut short (docs/scheduling.md).

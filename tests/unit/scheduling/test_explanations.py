@@ -32,7 +32,8 @@ class LosingCycles:
 
     @property
     def grant_valid(self) -> Flags:
-        return self._model.grant_valid & (self._left == 0)
+        is_seen: Flags = self._model.grant_valid & (self._left == 0)
+        return is_seen
 
     @property
     def grant_select(self) -> Times:
@@ -78,7 +79,7 @@ class Ideal(Scheduler):
         ranks = np.where(eligible, 2 * self._keys + 1, NEVER)
         ranks[self._members, granted] -= eligible[self._members, granted]
         choice = np.where(self._is_guest(new, eligible, beat), self._guest, ranks.argmin(axis=1))
-        self._grant(choice, eligible.any(axis=1))
+        self._grant(choice, np.asarray(eligible.any(axis=1)))
 
     def _is_guest(self, new: Flags, eligible: Flags, beat: Flags) -> Flags:
         """Where a new request has the grant."""
