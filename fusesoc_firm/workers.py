@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -71,6 +72,8 @@ def cluster_workers(address: str) -> Iterator[Workers]:
         distributed: Any = import_module("distributed")
     except ImportError:
         fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
+    # What is lost is told here, once and in a sentence.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=_CONNECT_SECONDS)
     except (OSError, ValueError) as error:
@@ -84,7 +87,9 @@ def cluster_workers(address: str) -> Iterator[Workers]:
         try:
             yield Workers(executor, count)
         except (CancelledError, distributed.KilledWorker) as error:
-            fail(f"the Dask cluster at '{address}' was lost", hint=" ".join(str(error).split()))
+            fail(
+                f"the Dask cluster at '{address}' was lost", hint=" ".join(str(error).split()) or "its scheduler ended"
+            )
         finally:
             executor.shutdown(wait=False)
 

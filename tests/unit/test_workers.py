@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -105,6 +106,18 @@ def test_workers_that_die() -> None:
         workers.cluster_workers(cluster.scheduler_address) as found,
     ):
         list(found.run(_leave, [1]))
+
+
+def test_a_scheduler_that_ends() -> None:
+    with _cluster(1) as cluster:
+        threading.Timer(2, cluster.close).start()
+        started = time.monotonic()
+        with (
+            pytest.raises(InputError, match="was lost\n      = its scheduler ended"),
+            workers.cluster_workers(cluster.scheduler_address) as found,
+        ):
+            list(found.run(time.sleep, [60]))
+        assert time.monotonic() - started < 45
 
 
 def test_ctrl_c_ends_it(address: str) -> None:
