@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import add_sources, command, load, positive
+from fusesoc_firm.cli.common import add_sources, command, load, natural, positive
 
 
 def add_scheduler(commands: Any) -> None:
@@ -27,9 +27,25 @@ def add_scheduler(commands: Any) -> None:
     bench.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
     bench.add_argument("--sets", type=positive, metavar="N", help="sets of each data set (default: its own)")
     bench.add_argument("--cycles", type=positive, metavar="N", help="cycles of each simulation (default: its own)")
-    bench.add_argument("--seed", type=int, default=1, metavar="N", help="all randomness follows from it (default: 1)")
+    bench.add_argument(
+        "--seed", type=natural, default=1, metavar="N", help="all randomness follows from it (default: 1)"
+    )
     bench.add_argument(
         "--distribution", choices=("normal", "uniform"), default="normal", help="how times spread (default: normal)"
+    )
+    bench.add_argument(
+        "--shortest-run",
+        type=positive,
+        default=1,
+        metavar="BEATS",
+        help="beats of a run before preemptive schedulers may interrupt it (default: 1)",
+    )
+    bench.add_argument(
+        "--resume-beats",
+        type=natural,
+        default=0,
+        metavar="BEATS",
+        help="beats more that a resumed run takes; 1 with the Manager's bursts (default: 0, as in section 4.3)",
     )
     bench.add_argument("--jobs", type=positive, metavar="N", help="simulations at once (default: one a core)")
     bench.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
@@ -68,8 +84,15 @@ def _bench_schedulers(arguments: argparse.Namespace) -> None:
     selection = Selection(
         names(arguments.dataset, list(DATA_SETS), "data set"),
         names(arguments.policies, list(POLICIES), "policy"),
-        numbers_of(arguments.requesters) if arguments.requesters else REQUESTERS,
-        Settings(arguments.seed, arguments.sets, arguments.cycles, Distribution(arguments.distribution)),
+        REQUESTERS if arguments.requesters is None else numbers_of(arguments.requesters),
+        Settings(
+            arguments.seed,
+            arguments.sets,
+            arguments.cycles,
+            Distribution(arguments.distribution),
+            arguments.shortest_run,
+            arguments.resume_beats,
+        ),
     )
     bench(selection, Places(arguments.jobs, arguments.cluster, arguments.output, arguments.csv))
 

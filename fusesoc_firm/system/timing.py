@@ -62,9 +62,12 @@ def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
     faults = Diagnostics()
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
-            faults.error(f"the 'period' of publisher '{publisher.block}' is not given")
+            hint = "the least time between its messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
+            faults.error(f"the 'period' of publisher '{publisher.block}' is not given", hint=hint)
         if times.transfer_time is None:
-            faults.error(f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound")
+            hint = "the cycles that its longest frame takes to be sent"
+            message = f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound"
+            faults.error(message, hint=hint)
     faults.raise_if_any()
     return _tasks(system.publishers, system.scheduling.times)
 
