@@ -99,11 +99,16 @@ def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoRet
 def nearest(word: str, choices: Iterable[str]) -> str:
     """A hint for an unknown word: the nearest legal one, or the legal ones if none is near."""
     legal = sorted(set(choices))
-    lowered = {choice.lower(): choice for choice in legal}
-    close = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
-    if close:
-        return f"did you mean '{lowered[close[0]]}'?"
+    if near := closest(word, legal):
+        return f"did you mean '{near}'?"
     if not legal:
         return ""
     shown = ", ".join(legal[:20]) + (", ..." if len(legal) > 20 else "")
     return f"legal here: {shown}"
+
+
+def closest(word: str, choices: Iterable[str]) -> str | None:
+    """The word that was probably meant, whichever letters are capitals; None if none is near."""
+    lowered = {choice.lower(): choice for choice in sorted(set(choices))}
+    close = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    return lowered[close[0]] if close else None

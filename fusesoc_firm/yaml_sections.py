@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, closest, nearest
 from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind
 
 S = TypeVar("S", bound="Section")
@@ -88,7 +88,7 @@ class _Reader:
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
-            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node)
+            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node, _words_of_keys(section))
             return _empty(section, source)
         known = keys_of(section)
         given = self._given(known, node, what)
@@ -103,19 +103,20 @@ class _Reader:
         """The nodes of the known keys that were given a value, by the key's own name."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
-        hints = []
+        meant: set[str] = set()
         for text, key_node, value in items(self.file, node, self.faults):
             name = spellings.get(text)
             if name is None:
-                hints.append(nearest(text, known))
-                self._error(f"{what} has no key '{text}'", key_node, hints[-1])
+                near = closest(text, spellings)
+                meant |= {spellings[near]} if near else set()
+                self._error(f"{what} has no key '{text}'", key_node, nearest(text, [near] if near else known))
             elif name in given:
                 self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
             elif not is_null(value) or (known[name][1].is_required and not self.file.is_cut):
                 given[name] = value
         for name, (_, entry) in known.items():
             # A key that is only misspelt is no second fault.
-            if entry.is_required and name not in given and not self.file.is_cut and not _names(hints, name):
+            if entry.is_required and name not in given and not self.file.is_cut and name not in meant:
                 self._error(f"{what} needs the key '{name}': {entry.meaning}", node)
         return given
 
@@ -192,8 +193,11 @@ def _empty(section: type[S], source: SourceRef) -> S:
     return section(source=source, is_sound=False, **_blanks(section, source))
 
 
-def _names(hints: list[str], name: str) -> bool:
-    return f"did you mean '{name}'?" in hints
+def _words_of_keys(section: type[Section]) -> str:
+    """The keys that a section needs, or those that it may have if it needs none."""
+    keys = keys_of(section)
+    required = [name for name, (_, entry) in keys.items() if entry.is_required]
+    return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
 
 
 def _section_type(entry: Key) -> type[Section]:

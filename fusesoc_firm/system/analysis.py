@@ -212,7 +212,8 @@ class _Analysis:
         # One that could not be read may be the one that is meant.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
-            self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, nearest(block.type, names))
+            hint = nearest(block.type, names) or "there is none under 'accelerators'"
+            self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, hint)
         for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source

@@ -118,6 +118,7 @@ class Wiring:
             self.faults.error(
                 f"'{block.name}' gives {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
                 outgoing.name.source,
+                _what_lacks(block, gives, "output") or _what_lacks(self.blocks[outgoing.name], takes, "input"),
             )
             return {}
         try:
@@ -230,6 +231,11 @@ def _names(frame: Frame) -> frozenset[Names]:
 
 def _messages(sides: Sequence[MessageSide]) -> str:
     return " and ".join(f"{side.frame.message} (ROS {int(side.frame.ros)})" for side in sides) or "no message"
+
+
+def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
+    """The key that an accelerator lacks which has no message at this side; empty if it has one."""
+    return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
 
 
 def _words(what: str, side: MessageSide) -> str:

@@ -175,7 +175,7 @@ class _Reader:
         if unit and self.clock is None:
             if not self.is_clock_given:
                 message = f"'{key}' is '{time}', but the clock's frequency is not given"
-                self.faults.error(message, time.source, "add 'clock' to the project, such as 'clock: 100 MHz'")
+                self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
             return None
         cycles = number if not unit else self._of_unit(number, unit)
         if not 1 <= cycles <= _LONGEST_TIME:
