@@ -37,6 +37,12 @@ class SourceRef:
         return f"{number} | {self.text}\n{' ' * len(number)} | {indent}{underline}"
 
 
+def byte_place(file: str, data: bytes, position: int) -> SourceRef:
+    """The place of a byte in a file that is no text; its column counts bytes."""
+    line_start = data.rfind(b"\n", 0, position) + 1
+    return SourceRef(file, data.count(b"\n", 0, position) + 1, position - line_start + 1)
+
+
 @dataclass(frozen=True)
 class Diagnostic:
     """One fault: a sentence, its place (None where the input has no lines) and, if known, what is legal."""

@@ -8,6 +8,7 @@ So all faults of a file come at once, and who works on it can tell a fault from 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -21,10 +22,16 @@ S = TypeVar("S", bound="Section")
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A mapping of the file. Its place and whether all of it could be read are no keys."""
+    """A mapping of the file. Its places, and whether all of it could be read, are no keys."""
 
     source: SourceRef
     is_sound: bool = True
+    # Where the value of each key stands that was given, by the field's name.
+    places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+
+    def place(self, field: str) -> SourceRef:
+        """Where the value of a field's key stands; of one that was not given, where the section does."""
+        return self.places.get(field, self.source)
 
 
 @dataclass(frozen=True)
@@ -97,7 +104,8 @@ class _Reader:
         blanks = _blanks(section, source)
         # What lies behind a fault of the file's form is not known.
         is_sound = len(self.faults.found) == before and blanks.keys() <= found.keys() and not self.file.is_cut
-        return section(source=source, is_sound=is_sound, **(blanks | found))
+        places = {known[name][0]: self.file.source(value) for name, value in given.items()}
+        return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
         """The nodes of the known keys that were given a value, by the key's own name."""
@@ -134,7 +142,7 @@ class _Reader:
                     self._error(f"'{name}' is an empty list", node, entry.meaning)
                 return None if None in texts else tuple(texts)
             case "integer":
-                return self._chosen(entry, self._integer(node, name), node, name)
+                return self._chosen(entry, self._integer(node, entry, name), node, name)
             case _:
                 return self._chosen(entry, self._text(node, entry, name), node, name)
 
@@ -152,10 +160,10 @@ class _Reader:
         self._error(f"'{name}' must be a word, not {kind(node)}", node, entry.meaning)
         return None
 
-    def _integer(self, node: yaml.Node, name: str) -> int | None:
+    def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
             return int(yaml.safe_load(node.value))
-        self._error(f"'{name}' must be an integer, not {kind(node)}", node)
+        self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
         return None
 
     def _chosen(self, entry: Key, value: Any, node: yaml.Node, name: str) -> Any:

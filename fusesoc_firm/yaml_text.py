@@ -14,7 +14,7 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
@@ -77,7 +77,7 @@ def read_yaml(path: Path, file: str | None = None, faults: Diagnostics | None = 
     except OSError as error:
         fail(f"cannot read {name}: {error.strerror}")
     except UnicodeDecodeError as error:
-        fail(f"{name} is not UTF-8: byte {error.start} is 0x{error.object[error.start]:02x}")
+        fail(f"byte 0x{error.object[error.start]:02x} is not UTF-8", byte_place(name, error.object, error.start))
     noted = Diagnostics() if faults is None else faults
     read = parse_yaml(text, name, noted)
     if faults is None:
@@ -180,12 +180,13 @@ def items(
     yaml_text: YamlText, node: yaml.MappingNode, faults: Diagnostics
 ) -> Iterator[tuple[Text, yaml.ScalarNode, yaml.Node]]:
     """Key text, key node and value node of each item; a key that is no scalar, or comes twice, is a fault."""
-    seen: set[str] = set()
+    seen: dict[str, SourceRef] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
             faults.error("a key must be a word", yaml_text.source(key))
         elif key.value in seen:
-            faults.error(f"key '{key.value}' is given twice", yaml_text.source(key))
+            first = f"the first is at {seen[key.value]}"
+            faults.error(f"key '{key.value}' is given twice", yaml_text.source(key), first)
         else:
-            seen.add(key.value)
+            seen[key.value] = yaml_text.source(key)
             yield yaml_text.text(key), key, value

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.dialect import dialect_of
 from fusesoc_firm.message.folders import InterfaceFiles, environment_folders, interface_files
@@ -233,9 +233,7 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as fault:
-        line_start = data.rfind(b"\n", 0, fault.start) + 1
-        place = SourceRef(str(first), data.count(b"\n", 0, fault.start) + 1, fault.start - line_start + 1)
-        faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", place)
+        faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", byte_place(str(first), data, fault.start))
         return ""
 
 

@@ -103,10 +103,12 @@ class Wiring:
             return False
         target = self.blocks[name]
         if block.type is None and block.mode == "publisher":
-            self.faults.error(f"'{block.name}' is a publisher; its message goes to the host", name.source)
+            message = f"'{block.name}' is a publisher; its message goes to the host"
+            self.faults.error(message, name.source, "'outgoing' belongs to subscribers and accelerators")
             return False
         if target.type is None and target.mode == "subscriber":
-            self.faults.error(f"'{name}' is a subscriber; its message comes from the host", name.source)
+            message = f"'{name}' is a subscriber; its message comes from the host"
+            self.faults.error(message, name.source, "'outgoing' names accelerators and publishers")
             return False
         return block.name in self.outputs and name in self.inputs
 
@@ -118,7 +120,9 @@ class Wiring:
             self.faults.error(
                 f"'{block.name}' gives {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
                 outgoing.name.source,
-                _what_lacks(block, gives, "output") or _what_lacks(self.blocks[outgoing.name], takes, "input"),
+                _what_lacks(block, gives, "output")
+                or _what_lacks(self.blocks[outgoing.name], takes, "input")
+                or "a connection is between blocks of the same message, in the same ROS version",
             )
             return {}
         try:

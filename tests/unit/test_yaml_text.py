@@ -149,7 +149,7 @@ def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (None, "error: cannot read a.yaml: No such file or directory"),
-        (b"a: \xff\n", "error: a.yaml is not UTF-8: byte 3 is 0xff"),
+        (b"a: \xff\n", "a.yaml:1:4: error: byte 0xff is not UTF-8"),
         (b"a: [\n", "a.yaml:1:4: error: this is not YAML"),
     ],
 )
