@@ -79,7 +79,7 @@ class RandomSystem:
 
 
 def random_system(chance: random.Random, blocks: int, messages: int) -> RandomSystem:
-    """A system of `blocks` blocks (at least 2), of `messages` types of message if so many find a place."""
+    """A system of `blocks` blocks, 2 or more, of `messages` types of message if so many find a place."""
     return _Maker(chance, blocks, messages).made()
 
 
@@ -114,7 +114,7 @@ class _Maker:
     def made(self) -> RandomSystem:
         while self._room() > 0:
             if not self._add_accelerator() and not self._add_subscriber():
-                break
+                self._add_publisher(self.chance.choice(list(self._whole())))
         for output in self.outputs:
             if not output.sinks:
                 self._add_publisher(output)
@@ -226,7 +226,7 @@ class _Maker:
         """A publisher of what goes nowhere, at times of its first field and the others of what goes somewhere."""
         message, name = source.message, self._name("pub")
         block: dict[str, Any] = {"name": name, **message.keys, "mode": "publisher"}
-        others = [output for output in self._whole() if output.message == message and output is not source]
+        others = [item for item in self._whole() if item.message == message and item is not source and item.sinks]
         if message.can_be_parted and not source.is_part and others and self._often():
             first, *rest = message.fields
             source.sinks.append({"name": name, "include": [first]})
