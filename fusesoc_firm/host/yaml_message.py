@@ -16,8 +16,9 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, nearest
-from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, Loop, Path, WireType, all_nodes
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, Loop, Path, all_nodes
 from fusesoc_firm.frame.values import CodecError, check_bound, units_of
+from fusesoc_firm.wire import WireType
 from fusesoc_firm.yaml_text import YamlText, is_null, items, kind
 
 _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)

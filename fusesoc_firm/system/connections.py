@@ -234,7 +234,7 @@ def _names(frame: Frame) -> frozenset[Names]:
 
 
 def _messages(sides: Sequence[MessageSide]) -> str:
-    return " and ".join(f"{side.frame.message} (ROS {int(side.frame.ros)})" for side in sides) or "no message"
+    return " and ".join(f"{side.frame.message} ({side.frame.ros.title})" for side in sides) or "no message"
 
 
 def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:

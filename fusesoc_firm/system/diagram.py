@@ -60,7 +60,7 @@ def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
 
 
 def _draw_converter(graph: Digraph, converter: Converter) -> None:
-    label = f"{converter.block}\n{converter.frame.message}\nROS {converter.frame.ros}"
+    label = f"{converter.block}\n{converter.frame.message}\n{converter.frame.ros.title}"
     graph.node(_node(converter.block), label, **_CONVERTER)
 
 

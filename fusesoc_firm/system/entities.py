@@ -25,7 +25,7 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     for entity, block, frame in _converters(system):
         if frames.setdefault(entity, frame) != frame:
             message = f"'{block}' and {owners[entity]} need the entity '{entity}' for different messages"
-            hint = f"one system has a message in one ROS version: here ROS {int(frames[entity].ros)}"
+            hint = f"one system has a message in one ROS version: here {frames[entity].ros.title}"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(entity, f"converter '{block}'")
         package = constants_package(frame.message)
