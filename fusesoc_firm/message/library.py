@@ -15,7 +15,7 @@ from pathlib import Path
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files
-from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.middleware import known_suffixes, middleware_of
 from fusesoc_firm.message.model import (
     InterfaceKind,
     MessageDefinition,
@@ -42,7 +42,7 @@ class MessageLibrary:
     `paths` are folders in order of precedence. `environment` is a mapping like `os.environ`; None leaves an installed
     ROS aside. `store` names the distribution behind all others (`noetic`, `jazzy`, ...). A message is taken from the
     first place that has it; in one place a `.msg` file goes before what a `.srv` or `.action` file implies. Raises
-    `InputError` for a folder that is missing or holds no such file.
+    `InputError` for a folder that is missing or holds no file that any middleware knows.
     """
 
     def __init__(
@@ -237,9 +237,13 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
 
 
 def _check_folders(empty: Iterable[Path]) -> None:
-    """Raise `InputError` that names every one of the user's folders that gave nothing."""
+    """Raise `InputError` that names every one of the user's folders that gave nothing, nor would to another library."""
     diagnostics = Diagnostics()
+    suffixes = known_suffixes()
+    *others, last = (f".{suffix}" for suffix in suffixes)
     for path in empty:
-        reason = "holds no .msg, .srv or .action file" if path.is_dir() else "is not a folder"
+        if any(interface_files(path, suffixes).values()):
+            continue
+        reason = f"holds no {', '.join(others)} or {last} file" if path.is_dir() else "is not a folder"
         diagnostics.error(f"message path '{path}' {reason}", hint="give a package, a workspace or a folder of packages")
     diagnostics.raise_if_any()

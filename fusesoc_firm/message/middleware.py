@@ -87,3 +87,8 @@ def register(middleware: Middleware) -> None:
 def middleware_of(ros: RosVersion) -> Middleware:
     """The middleware of a number; KeyError for one that is not registered."""
     return _registered[ros]
+
+
+def known_suffixes() -> dict[str, InterfaceKind]:
+    """The suffixes of the files that define messages, of whichever middleware."""
+    return {suffix: kind for middleware in _registered.values() for suffix, kind in middleware.suffixes.items()}
