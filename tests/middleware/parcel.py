@@ -104,7 +104,7 @@ def checksum(
     definitions: Mapping[MessageName, MessageDefinition],
     kind: InterfaceKind = InterfaceKind.MESSAGE,
 ) -> str:
-    """The signature: a CRC of the fields of a message and all within it. There are no services, so `kind` says nothing."""
+    """The signature: a CRC of the fields of a message and all within it; `kind` says nothing, there are no services."""
     fields = [f"{known} {field.name} {field.type}" for known in definitions for field in definitions[known].fields]
     return f"{zlib.crc32('; '.join([str(name), *fields]).encode()):08x}"
 
