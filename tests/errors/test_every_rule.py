@@ -20,12 +20,17 @@ PACKAGE = Path(sys.modules["fusesoc_firm"].__path__[0])
 # What a specification is read and judged by.
 SOURCES = (
     *sorted((PACKAGE / "system").glob("*.py")),
-    *(PACKAGE / name for name in ("yaml_text.py", "yaml_sections.py", "frame/select.py", "converter/limits.py")),
+    *(
+        PACKAGE / name
+        for name in ("yaml_text.py", "yaml_sections.py", "frame/select.py", "converter/limits.py", "message/library.py")
+    ),
 )
 # What notes a fault, and functions whose faults are of something else than the specification's text.
 NOTING_METHODS, NOTING_FUNCTIONS = ("error", "_error", "take"), ("fail", "InputError")
 OTHER_FAULTS = {
     ("system/diagram.py", "diagram"): "a program or package that is not installed",
+    ("message/library.py", "libraries"): "an option of the command line",
+    ("message/library.py", "_check_folders"): "an option of the command line",
     ("system/timing.py", "tasks_of"): "a question that a right specification does not answer",
 }
 
