@@ -8,7 +8,6 @@ from pathlib import Path, PurePosixPath
 from fusesoc_firm.diagnostics import SourceRef, fail
 from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.naming import identifier
-from fusesoc_firm.system.configuration import accelerator_entity
 from fusesoc_firm.system.derived import DerivedSystem
 from fusesoc_firm.system.specification import SOURCE_SUFFIXES
 
@@ -21,7 +20,7 @@ def environment_files(
     The last one is called after the entity that the test bench instantiates. Raises `InputError` for a file that cannot
     be one of them.
     """
-    taken = {system.entity, f"{system.entity}_tb", *(accelerator_entity(item) for item in system.accelerator_types)}
+    taken = {system.entity, f"{system.entity}_tb", *(item.entity for item in system.accelerator_types)}
     files: dict[PurePosixPath, GeneratedFile] = {}
     for path, source in paths.items():
         if not any(block.type.accelerator.pins for block in system.accelerators):

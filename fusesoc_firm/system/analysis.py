@@ -31,6 +31,7 @@ from fusesoc_firm.system.derived import (
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
+from fusesoc_firm.system.link import link_of
 from fusesoc_firm.system.pins import check_pins
 from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.specification import (
@@ -77,6 +78,7 @@ def derive(
         replace(item, buffer=buffers.get(item.block, 0)) for item in analysis.converters("publisher", connections)
     )
     scheduling = scheduling_of(project, analysis.blocks, publishers, faults)
+    link = link_of(project, scheduling, faults)
     faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
@@ -91,6 +93,7 @@ def derive(
             if block.type is not None
         ),
         connections=connections,
+        link=link,
     )
     check_entities(system, analysis.blocks, faults)
     faults.raise_if_any()

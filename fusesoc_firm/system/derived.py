@@ -10,6 +10,7 @@ from enum import Enum
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.specification import Accelerator
 
 
@@ -73,6 +74,12 @@ class AcceleratorType:
     inputs: tuple[MessageSide, ...]
     outputs: tuple[MessageSide, ...]
     has_width: bool = False
+
+    @property
+    def entity(self) -> str:
+        """The entity that the top level instantiates: the user's own, or the wrapper of a C++ function."""
+        name = identifier(self.accelerator.name)
+        return f"{name}_wrapper" if self.accelerator.type == "HLS" else name
 
 
 @dataclass(frozen=True)
@@ -138,9 +145,24 @@ class Scheduling:
     reasons: tuple[str, ...] = ()
 
 
+class LinkKind(Enum):
+    """What carries bytes between the host and a board without a processor."""
+
+    UART = "uart"
+    SPI = "spi"
+
+
+@dataclass(frozen=True)
+class Link:
+    """The link between the host and the system; one over UART knows the clock's frequency."""
+
+    kind: LinkKind
+    clock_hz: int | None
+
+
 @dataclass(frozen=True)
 class DerivedSystem:
-    """The whole system; `name` is an identifier, `width` the streams' bits."""
+    """The whole system; `name` is an identifier, `width` the streams' bits. Without a `link` its streams are ports."""
 
     name: str
     fpga_part: str
@@ -150,6 +172,7 @@ class DerivedSystem:
     publishers: tuple[Converter, ...]
     accelerators: tuple[AcceleratorBlock, ...]
     connections: tuple[Connection, ...]
+    link: Link | None = None
 
     @property
     def entity(self) -> str:

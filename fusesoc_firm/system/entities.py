@@ -11,7 +11,6 @@ from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.naming import identifier
-from fusesoc_firm.system.configuration import accelerator_entity
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import function_name
 from fusesoc_firm.system.specification import Block
@@ -57,6 +56,6 @@ def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
 
 
 def _entities(accelerator: AcceleratorType) -> Iterator[str]:
-    yield accelerator_entity(accelerator)
+    yield accelerator.entity
     if accelerator.accelerator.type == "HLS":
         yield function_name(accelerator)

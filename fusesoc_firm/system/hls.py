@@ -20,8 +20,8 @@ from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
 from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.naming import distinct_identifiers, identifier
-from fusesoc_firm.system.configuration import accelerator_entity, port_map
 from fusesoc_firm.system.derived import AcceleratorType, MessageSide
+from fusesoc_firm.system.maps import port_map
 from fusesoc_firm.system.sides import accelerator_ports
 
 Configuration = dict[str, Any]
@@ -135,7 +135,7 @@ def wrapper_configuration(accelerator: AcceleratorType, width: int) -> Configura
     names = [f"{prefix}{port.name}" for prefix, port in ports]
     column = max(len(name) for name in [*names, "rst_n"])
     return {
-        "entity": accelerator_entity(accelerator),
+        "entity": accelerator.entity,
         "kernel": function_name(accelerator),
         "clk": "clk".ljust(column),
         "rst_n": "rst_n".ljust(column),

@@ -8,7 +8,7 @@ from typing import Any
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.system.configuration import accelerator_entity, top_level_pins
+from fusesoc_firm.system.configuration import top_level_pins
 from fusesoc_firm.system.derived import (
     AcceleratorBlock,
     Connection,
@@ -19,6 +19,7 @@ from fusesoc_firm.system.derived import (
     Scheduling,
 )
 from fusesoc_firm.system.sides import side_ports
+from fusesoc_firm.system.specification import AXI_STREAM
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
@@ -29,6 +30,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "top": system.entity,
             "fpgaPart": system.fpga_part,
             "width": system.width,
+            "interconnect": system.link.kind.value if system.link else AXI_STREAM,
             **_scheduling(system.scheduling),
         },
         "Converters": {
@@ -45,7 +47,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
         "Accelerators": [
             {
                 "name": block.block,
-                "entity": accelerator_entity(block.type),
+                "entity": block.type.entity,
                 "type": str(block.type.accelerator.type),
                 "sources": [str(source) for source in block.type.accelerator.sources],
                 **_pins(block, top_level_pins(system)),

@@ -33,6 +33,9 @@ SCHEDULERS = (
 )
 # The smallest of these that holds all deadlines.
 AUTO_SCHEDULER = "auto"
+# How frames get between the host and the system: the top level's own streams, or a link of bytes (cores/board).
+AXI_STREAM = "axi_stream"
+LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 
@@ -57,6 +60,11 @@ class Project(Section):
         name="shortestRun",
         form="integer",
         default=16,
+    )
+    interconnect: Text = key(
+        "how frames get between the host and the system: as streams, for a DMA engine, or over a link of bytes",
+        choices=(AXI_STREAM, *LINKS),
+        default=Text(AXI_STREAM),
     )
     clock: Text | None = key("frequency of clk, such as 100 MHz, for times that are not in cycles")
 

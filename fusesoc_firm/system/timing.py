@@ -51,7 +51,7 @@ def scheduling_of(
     project: Project, blocks: Mapping[str, Block], publishers: Sequence[Converter], faults: Diagnostics
 ) -> Scheduling:
     """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted."""
-    reader = _Reader(project.clock is not None, _clock(project, faults), faults)
+    reader = _Reader(project.clock is not None, clock_frequency(project, faults), faults)
     times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
     policy, reasons = str(project.scheduler), tuple[str, ...]()
     _check_shortest_run(project, faults)
@@ -116,8 +116,8 @@ def _time_bits(times: Iterable[PublisherTimes]) -> int:
     return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
 
 
-def _clock(project: Project, faults: Diagnostics) -> Fraction | None:
-    """The clock's frequency in Hz."""
+def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
+    """The clock's frequency in Hz; None if it is not given, or wrong, which is noted."""
     if project.clock is None:
         return None
     found = _QUANTITY.fullmatch(project.clock)

@@ -12,7 +12,8 @@ from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.sim.schedulers import POLICY_CORES
 
 DATA = Path(__file__).parent / "data"
-RUNTIME = ("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES), "manager/manager", "sim/host")
+RUNTIME = ("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES), "manager/manager", "board/link")
+SIMULATION = ("sim/host", "sim/link")
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
     *kernels, bench = _write(simulation.generate(request), folder)
     # A kernel before the wrapper that instantiates it, the test bench last.
     vhdl = [*kernels, *_write(generator.generate(request), folder), bench]
-    Library("firm", folder).analyse(core_files(*RUNTIME, *cores))
+    Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
     Library("work", folder).analyse(vhdl)
     return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
 

@@ -133,8 +133,8 @@ def test_a_specification_that_is_there_is_extended(tmp_path: Path) -> None:
     [
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
-        (["robot", "", "", "", "", "", "no", "a", "b"], "answer 9: 'type' cannot be 'b'"),
-        (["robot", "", "", "", "", "", "no", "a", "", "ROS", "subscriber", ""], "answer 12: 'message' is needed"),
+        (["robot", "", "", "", "", "", "", "no", "a", "b"], "answer 10: 'type' cannot be 'b'"),
+        (["robot", "", "", "", "", "", "", "no", "a", "", "ROS", "subscriber", ""], "answer 13: 'message' is needed"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:
@@ -146,6 +146,6 @@ def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], messa
 
 def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
-    answers = ["robot", *[""] * 5, "no", "a", "", "ROS", "subscriber", POINT, "", "", "no", "yes", "a"]
-    with pytest.raises(InputError, match="answer 17: there is 'a' already"):
+    answers = ["robot", *[""] * 6, "no", "a", "", "ROS", "subscriber", POINT, "", "", "no", "yes", "a"]
+    with pytest.raises(InputError, match="answer 18: there is 'a' already"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)

@@ -1,0 +1,142 @@
+"""The connections of the top level as assignments between signals, as in the dissertation's listing 6.9.
+
+Between the signals stands what lets several blocks take a message, and what finds out the length of a payload.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fusesoc_firm.converter.payload_length import length_entity, length_ports
+from fusesoc_firm.converter.ports import field_ports, vhdl_type
+from fusesoc_firm.system.derived import Connection, DerivedSystem, End, LengthSource, PayloadLength
+from fusesoc_firm.system.maps import port_map
+from fusesoc_firm.system.names import Names, forked, is_found_out
+from fusesoc_firm.system.sides import PAYLOAD_LENGTH, Handshake, side_ports
+
+
+def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
+    """The assignments of every connection. A sink of several sources takes their parts of a message together."""
+    waiting: dict[End, list[str]] = {}
+    for connection in system.connections:
+        if connection.frame.is_fixed_size:
+            for sink, (valid, _) in zip(connection.sinks, _handshakes(names, connection), strict=True):
+                waiting.setdefault(sink, []).append(valid)
+    return [_connection(names, connection, system.width, waiting) for connection in system.connections]
+
+
+def _connection(names: Names, connection: Connection, width: int, waiting: Mapping[End, list[str]]) -> dict[str, Any]:
+    """The assignments of a connection; with several sinks, forks let each take the message in its own time.
+
+    `waiting` are the valids of all sources of each sink; what they make together is assigned with the last one.
+    """
+    length = connection.length
+    pairs: list[tuple[str, str]] = []
+    if _is(LengthSource.BUFFERED, length):
+        # As long as it gets.
+        pairs.append((names.length(connection), 'x"FFFFFFFF"'))
+    if connection.frame.is_fixed_size:
+        pairs += _fixed_pairs(names, connection, waiting)
+    else:
+        for number in range(len(connection.sinks)):
+            pairs += _pairs(names, connection, number, width)
+    column = max(len(target) for target, _ in pairs)
+    return {
+        "message": str(connection.frame.message),
+        "source": connection.source.block,
+        "sinks": ", ".join(sink.block for sink in connection.sinks),
+        "length_note": f"; its length is {length.source.value}" if length else "",
+        "length_signal": {"name": names.length(connection)} if is_found_out(connection) else None,
+        "length": _length(names, connection) if _is(LengthSource.COMPUTED, length) else None,
+        "forks": [_fork(names, connection, fork) for fork in forked(connection)],
+        "assignments": [{"target": target.ljust(column), "source": value} for target, value in pairs],
+    }
+
+
+def _fixed_pairs(names: Names, connection: Connection, waiting: Mapping[End, list[str]]) -> Iterator[tuple[str, str]]:
+    """The assignments of a message of fixed size."""
+    source = connection.source
+    handshakes = _handshakes(names, connection)
+    for sink, frame, (valid, ready) in zip(connection.sinks, connection.frames, handshakes, strict=True):
+        yield from ((names.at(sink, port.name), names.at(source, port.name)) for port in field_ports(frame))
+        sink_valid, sink_ready = f"{names.at(sink, 'segment_valid')}(0)", names.at(sink, "msg_ready")
+        if valid == waiting[sink][-1]:
+            whole = " and ".join(waiting[sink])
+            yield sink_valid, whole
+            if sink.prefix:
+                yield names.at(sink, "msg_valid"), whole
+        yield ready, sink_ready if len(waiting[sink]) == 1 else f"{sink_ready} and {sink_valid}"
+
+
+def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
+    """Where each sink of a message of fixed size has its valid from, and its ready goes to."""
+    source = connection.source
+    for fork in forked(connection):
+        valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
+        return [(f"{valid}({number})", f"{ready}({number})") for number in range(len(connection.sinks))]
+    return [(f"{names.at(source, 'segment_valid')}(0)", names.at(source, "msg_ready"))]
+
+
+def _pairs(names: Names, connection: Connection, number: int, width: int) -> list[tuple[str, str]]:
+    """The same of one of variable size between the source and a sink; a handshake that is forked goes by its fork."""
+    source, sink = connection.source, connection.sinks[number]
+    behind_fork: dict[str, str] = {}
+    for fork in forked(connection):
+        low, high = fork.segments * number, fork.segments * (number + 1) - 1
+        behind_fork[fork.valid] = f"{names.forked(source, fork, 'valid')}({number})"
+        behind_fork[fork.ready] = f"{names.forked(source, fork, 'ready')}({number})"
+        if fork.segment_valid is not None:
+            behind_fork[fork.segment_valid] = f"{names.forked(source, fork, 'segment_valid')}({high} downto {low})"
+    pairs = []
+    for port in side_ports(connection.frames[number], width, gives=True, has_valid=True):
+        at_source = behind_fork.get(port.name) or (
+            names.length(connection) if port.name == PAYLOAD_LENGTH else names.at(source, port.name)
+        )
+        at_sink = names.at(sink, port.name)
+        pairs.append((at_sink, at_source) if port.is_output else (at_source, at_sink))
+    return pairs
+
+
+def _length(names: Names, connection: Connection) -> dict[str, Any]:
+    """What computes the length of an accelerator's payloads."""
+    source = connection.source
+    inputs = ((formal, names.at(source, formal)) for formal in length_ports(connection.frame))
+    return {
+        "label": names.label(source.block, source.prefix, "length"),
+        "entity": length_entity(connection.frame, connection.length.suffix if connection.length else ""),
+        "ports": port_map([*inputs, (PAYLOAD_LENGTH, names.length(connection))]),
+    }
+
+
+def _fork(names: Names, connection: Connection, fork: Handshake) -> dict[str, Any]:
+    source, count = connection.source, len(connection.sinks)
+    valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
+    source_valid = names.at(source, fork.valid)
+    signals = [(valid, count), (ready, count)]
+    generics = [("SINKS", str(count))]
+    ports = [
+        ("clk", "clk"),
+        ("rst_n", "rst_n"),
+        ("source_valid", f"{source_valid}(0)" if connection.frame.is_fixed_size else source_valid),
+        ("source_ready", names.at(source, fork.ready)),
+        ("sink_valid", valid),
+        ("sink_ready", ready),
+    ]
+    if fork.segment_valid is not None:
+        segment_valid = names.forked(source, fork, "segment_valid")
+        signals.append((segment_valid, count * fork.segments))
+        generics.append(("SEGMENTS", str(fork.segments)))
+        ports.insert(4, ("source_segment_valid", names.at(source, fork.segment_valid)))
+        ports.append(("sink_segment_valid", segment_valid))
+    column = max(len(name) for name, _ in signals)
+    return {
+        "label": names.fork(source, fork),
+        "signals": [{"name": name.ljust(column), "type": vhdl_type(bits)} for name, bits in signals],
+        "generics": port_map(generics),
+        "ports": port_map(ports),
+    }
+
+
+def _is(source: LengthSource, length: PayloadLength | None) -> bool:
+    return length is not None and length.source is source
