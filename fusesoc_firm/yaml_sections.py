@@ -40,6 +40,7 @@ class Key:
 
     `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list), the last two of type
     `section`. `aliases` are other spellings of the key. `choices` are all legal values, if they can be listed.
+    A required key may be left out beside another one, by name, with a certain value: `unless`.
     `only_of` is the kind of thing that may have the key, where its section tells of several kinds.
     """
 
@@ -48,9 +49,14 @@ class Key:
     name: str = ""
     aliases: tuple[str, ...] = ()
     is_required: bool = False
+    unless: tuple[str, str] | None = None
     choices: tuple[str | int, ...] = ()
     section: type[Section] | None = None
     only_of: str = ""
+
+    def is_needed(self, others: Mapping[str, object]) -> bool:
+        """Whether the key must be there beside `others`, given as words."""
+        return self.is_required and (self.unless is None or others.get(self.unless[0]) != self.unless[1])
 
 
 def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
@@ -102,8 +108,9 @@ class _Reader:
         values = {known[name][0]: self._value(known[name][1], value, name) for name, value in given.items()}
         found = {field: value for field, value in values.items() if value is not None}
         blanks = _blanks(section, source)
+        needed = {known[name][0] for name in _needed(known, given)}
         # What lies behind a fault of the file's form is not known.
-        is_sound = len(self.faults.found) == before and blanks.keys() <= found.keys() and not self.file.is_cut
+        is_sound = len(self.faults.found) == before and needed <= found.keys() and not self.file.is_cut
         places = {known[name][0]: self.file.source(value) for name, value in given.items()}
         return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
@@ -122,11 +129,12 @@ class _Reader:
                 self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
             elif not is_null(value) or (known[name][1].is_required and not self.file.is_cut):
                 given[name] = value
-        for name, (_, entry) in known.items():
+        needed = _needed(known, given)
+        for name in needed:
             # A key that is only misspelt is no second fault.
-            if entry.is_required and name not in given and not self.file.is_cut and name not in meant:
-                self._error(f"{what} needs the key '{name}': {entry.meaning}", node)
-        return given
+            if name not in given and not self.file.is_cut and name not in meant:
+                self._error(f"{what} needs the key '{name}': {known[name][1].meaning}", node)
+        return {name: value for name, value in given.items() if not is_null(value) or name in needed}
 
     def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
         """The value of a key in its form, or None if it does not fit."""
@@ -176,6 +184,12 @@ class _Reader:
 
     def _error(self, message: str, node: yaml.Node, hint: str = "") -> None:
         self.faults.error(message, self.file.source(node), hint)
+
+
+def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:
+    """The names of the keys that must be there beside those that are given."""
+    words = {name: value.value for name, value in given.items()}
+    return [name for name, (_, entry) in known.items() if entry.is_needed(words)]
 
 
 def _blanks(section: type[Section], source: SourceRef) -> dict[str, Any]:

@@ -69,7 +69,10 @@ def _check_system(arguments: argparse.Namespace) -> None:
         (len(system.accelerators), "accelerator"),
         (len(system.publishers), "publisher"),
     ]
+    if system.software.blocks:
+        counts.append((len(system.software.blocks), "accelerator"))
     words = ", ".join(f"{count} {word}{'' if count == 1 else 's'}" for count, word in counts)
+    words += " in software" if system.software.blocks else ""
     print(f"{arguments.spec}: {system.name} is right: {words}")
 
 

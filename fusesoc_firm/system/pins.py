@@ -6,18 +6,20 @@ from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import AcceleratorType
 from fusesoc_firm.system.sides import accelerator_ports
-from fusesoc_firm.system.specification import Pin
+from fusesoc_firm.system.specification import SOFTWARE, Pin
 
 # As many as the largest array has that a port of a message holds.
 _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
+# What accelerators of some types lack.
+_WITHOUT_PINS = {"HLS": "ports but those of its messages", SOFTWARE: "ports"}
 
 
 def check_pins(type_: AcceleratorType, width: int, faults: Diagnostics) -> None:
     """Note every pin that cannot be a port of its accelerator; `width` is that of the project's streams."""
     accelerator = type_.accelerator
-    if accelerator.type == "HLS" and accelerator.pins:
-        message = f"'{accelerator.name}' is of type HLS, which has no ports but those of its messages"
+    if accelerator.type in _WITHOUT_PINS and accelerator.pins:
+        message = f"'{accelerator.name}' is of type {accelerator.type}, which has no {_WITHOUT_PINS[accelerator.type]}"
         faults.error(message, accelerator.pins[0].source, "write this accelerator in VHDL")
         return
     taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")

@@ -15,8 +15,14 @@ from fusesoc_firm.message.model import MIDDLEWARES
 from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
+# The type of an accelerator that is a function on the host.
+SOFTWARE = "ROS-SW"
 # The types of accelerators, each with the endings of its sources' names.
-SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
+SOURCE_SUFFIXES = {
+    "HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"),
+    "VHDL": (".vhd", ".vhdl"),
+    SOFTWARE: (".py",),
+}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
 # A block that is no accelerator.
@@ -109,9 +115,16 @@ class Accelerator(Section):
 
     name: Text = key("the type's name; for VHDL that of the entity", is_required=True)
     type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
-    sources: tuple[Text, ...] = key("its source files, relative to the specification", form="texts", is_required=True)
+    sources: tuple[Text, ...] = key(
+        "its source files, relative to the specification", form="texts", is_required=True, unless=("type", SOFTWARE)
+    )
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
     pins: tuple[Pin, ...] = key("its ports that lead out of the system", form="sections", section=Pin)
+
+    @property
+    def is_software(self) -> bool:
+        """Whether it runs on the host."""
+        return self.type == SOFTWARE
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,13 @@ class KeySite:
         return keys_of(self.section)[spellings_of(self.section)[self.name]][1]
 
     @property
+    def is_needed(self) -> bool:
+        """Whether it must be there beside the other keys of its section."""
+        names = spellings_of(self.section)
+        others = {names[key.value]: value.value for key, value in self.node.value if key is not self.key_node}
+        return self.entry.is_needed(others)
+
+    @property
     def line(self) -> int:
         """Its line, from 1."""
         return self.key_node.start_mark.line + 1

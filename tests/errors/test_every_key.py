@@ -155,7 +155,7 @@ def test_a_key_that_is_left_out(checker: Checker) -> None:
     for site in sites(checker):
         answer = checker.check(site.without())
         found = problem(checker, answer)
-        if not found and answer.code == 0 and site.entry.is_required:
+        if not found and answer.code == 0 and site.is_needed:
             found = "it is required, and nobody misses it"
         if not found and answer.code and not any(_names_what_lacks(fault, site) for fault in answer.faults):
             found = f"no fault names key and section: {answer.faults}"
@@ -168,7 +168,7 @@ def _names_what_lacks(fault: Fault, site: KeySite) -> bool:
     """A fault must name the key, and stand in its section or name that."""
     is_near = fault.line in site.lines or fault.line in site.parents.values()
     is_meant = any(f"'{word}'" in fault.words for word in site.parents)
-    if site.entry.is_required:
+    if site.is_needed:
         first = fault.line in (site.lines[0], *site.parents.values())
         return first and bool(re.search(rf"needs?\b.*\b{site.name}\b", fault.words))
     return (is_near or is_meant) and f"'{site.name}'" in fault.words

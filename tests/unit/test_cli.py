@@ -250,6 +250,12 @@ def test_a_right_specification(capsys: Captured) -> None:
     assert text == f"{SPEC}: quat2euler is right: 1 subscriber, 1 accelerator, 1 publisher\n"
 
 
+def test_software_is_counted_apart(capsys: Captured) -> None:
+    spec = SPEC.parents[1] / "image_pipeline" / "image_pipeline_software.yaml"
+    text = out(capsys, "system", "check", str(spec))
+    assert text.endswith(": 2 subscribers, 2 accelerators, 2 publishers, 1 accelerator in software\n")
+
+
 @pytest.mark.parametrize("distro", ["noetic", "humble"])
 def test_a_distribution_of_either_version_serves_a_specification(distro: str, capsys: Captured) -> None:
     assert "is right" in out(capsys, "system", "check", str(SPEC), "--distro", distro)

@@ -72,6 +72,28 @@ def test_a_new_specification(tmp_path: Path) -> None:
     assert system.scheduling.times[0].period == 500
 
 
+def test_software_may_have_no_sources(tmp_path: Path) -> None:
+    """`sources` is asked for all the same, and needed for any other type."""
+    for kind, sources in (("VHDL", ["acc.vhd"]), ("ROS-SW", [])):
+        answers = Answers(
+            name=["turn", "turner", "in", "out", "out"],
+            add_to_accelerators=["yes"],
+            type=[kind],
+            sources=sources,
+            add_to_input=["yes"],
+            middleware=["ROS", "ROS", "ROS"],
+            message=[POINT, POINT, POINT],
+            add_to_blocks=["yes"],
+            mode=["subscriber", "publisher"],
+            add_to_outgoing=["yes"],
+        )
+        text = run(tmp_path / f"{kind}.yaml", answers)
+        (question,) = (question for question in answers.asked if question.name == "sources")
+        assert question.is_required is (kind == "VHDL")
+        assert ("sources" in text) is (kind == "VHDL")
+        assert len(derived(tmp_path, text).subscribers) == 1
+
+
 def test_every_key_is_explained_once(tmp_path: Path) -> None:
     text = run(tmp_path / "robot.yaml", turner())
     assert text.count("# the system's name; the top level is <name>_system") == 1
