@@ -214,9 +214,8 @@ def _check_no_publisher_keys(block: Block, faults: Diagnostics) -> None:
     for key in keys_only_of(Block, PUBLISHER):
         if getattr(block, key) is not None:
             message = f"'{key}' belongs to a publisher, but no message leaves hardware for '{block.name}'"
-            faults.error(
-                message, block.place(key), "the key is for a message that a block in software takes from hardware"
-            )
+            hint = "the key is for a message that a block in software takes from hardware"
+            faults.error(message, block.place(key), hint)
 
 
 def _bare(side: MessageSide) -> MessageSide:
