@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, closest, nearest
 from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind
 
 S = TypeVar("S", bound="Section")
@@ -22,10 +22,16 @@ S = TypeVar("S", bound="Section")
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A mapping of the file. Its place and whether all of it could be read are no keys."""
+    """A mapping of the file. Its places, and whether all of it could be read, are no keys."""
 
     source: SourceRef
     is_sound: bool = True
+    # Where the value of each key stands that was given, by the field's name.
+    places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+
+    def place(self, field: str) -> SourceRef:
+        """Where the value of a field's key stands; of one that was not given, where the section does."""
+        return self.places.get(field, self.source)
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,7 @@ class _Reader:
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
-            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node)
+            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node, _words_of_keys(section))
             return _empty(section, source)
         known = keys_of(section)
         given = self._given(known, node, what)
@@ -105,18 +111,20 @@ class _Reader:
         needed = {known[name][0] for name in _needed(known, given)}
         # What lies behind a fault of the file's form is not known.
         is_sound = len(self.faults.found) == before and needed <= found.keys() and not self.file.is_cut
-        return section(source=source, is_sound=is_sound, **(blanks | found))
+        places = {known[name][0]: self.file.source(value) for name, value in given.items()}
+        return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
         """The nodes of the known keys that were given a value, by the key's own name."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
-        hints = []
+        meant: set[str] = set()
         for text, key_node, value in items(self.file, node, self.faults):
             name = spellings.get(text)
             if name is None:
-                hints.append(nearest(text, known))
-                self._error(f"{what} has no key '{text}'", key_node, hints[-1])
+                near = closest(text, spellings)
+                meant |= {spellings[near]} if near else set()
+                self._error(f"{what} has no key '{text}'", key_node, nearest(text, [near] if near else known))
             elif name in given:
                 self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
             elif not is_null(value) or (known[name][1].is_required and not self.file.is_cut):
@@ -124,7 +132,7 @@ class _Reader:
         needed = _needed(known, given)
         for name in needed:
             # A key that is only misspelt is no second fault.
-            if name not in given and not self.file.is_cut and not _names(hints, name):
+            if name not in given and not self.file.is_cut and name not in meant:
                 self._error(f"{what} needs the key '{name}': {known[name][1].meaning}", node)
         return {name: value for name, value in given.items() if not is_null(value) or name in needed}
 
@@ -142,7 +150,7 @@ class _Reader:
                     self._error(f"'{name}' is an empty list", node, entry.meaning)
                 return None if None in texts else tuple(texts)
             case "integer":
-                return self._chosen(entry, self._integer(node, name), node, name)
+                return self._chosen(entry, self._integer(node, entry, name), node, name)
             case _:
                 return self._chosen(entry, self._text(node, entry, name), node, name)
 
@@ -160,10 +168,10 @@ class _Reader:
         self._error(f"'{name}' must be a word, not {kind(node)}", node, entry.meaning)
         return None
 
-    def _integer(self, node: yaml.Node, name: str) -> int | None:
+    def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
             return int(yaml.safe_load(node.value))
-        self._error(f"'{name}' must be an integer, not {kind(node)}", node)
+        self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
         return None
 
     def _chosen(self, entry: Key, value: Any, node: yaml.Node, name: str) -> Any:
@@ -207,8 +215,11 @@ def _empty(section: type[S], source: SourceRef) -> S:
     return section(source=source, is_sound=False, **_blanks(section, source))
 
 
-def _names(hints: list[str], name: str) -> bool:
-    return f"did you mean '{name}'?" in hints
+def _words_of_keys(section: type[Section]) -> str:
+    """The keys that a section needs, or those that it may have if it needs none."""
+    keys = keys_of(section)
+    required = [name for name, (_, entry) in keys.items() if entry.is_required]
+    return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
 
 
 def _section_type(entry: Key) -> type[Section]:

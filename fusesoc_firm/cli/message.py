@@ -106,7 +106,7 @@ def _title(interface: Interface, definitions: dict[MessageName, MessageDefinitio
     """What stands above the messages of a service or an action."""
     from fusesoc_firm.message.signature import signature
 
-    title = f"# {interface} (ROS {interface.ros})"
+    title = f"# {interface} ({interface.ros.title})"
     if not interface.has_signature:
         return title
     return f"{title}\n# signature: {signature(interface.name, definitions, interface.kind)}"

@@ -72,8 +72,8 @@ def _routes(
         named = [item for item in speaking if item.block == connection.topic.strip("/").replace("/", "_")]
         chosen = named or speaking
         if fitting and not speaking:
-            block, spoken = fitting[0].block, int(fitting[0].frame.ros)
-            faults.error(f"topic {connection.topic} of {path} is of ROS {int(ros)}, but '{block}' speaks ROS {spoken}")
+            block, spoken = fitting[0].block, fitting[0].frame.ros.title
+            faults.error(f"topic {connection.topic} of {path} is of {ros.title}, but '{block}' speaks {spoken}")
         elif len(chosen) > 1:
             names = ", ".join(item.block for item in chosen)
             faults.error(

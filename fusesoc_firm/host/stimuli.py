@@ -3,6 +3,8 @@
 A YAML file is a list; each item names the subscriber's block and gives its message:
 
     - QuaternionToEuler_sub: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
+
+Fields that the subscriber has no port for may be left out; they are sent as their defaults, zero or empty.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, fail, nearest
 from fusesoc_firm.frame.codec import decode, encode
+from fusesoc_firm.frame.defaults import completed
 from fusesoc_firm.host.bags import read_bag
 from fusesoc_firm.host.yaml_message import read_message
 from fusesoc_firm.system.derived import Topic
@@ -79,5 +82,5 @@ def _item(text: YamlText, node: yaml.Node, known: dict[str, Topic], faults: Diag
     message = read_message(text, value, subscriber.frame, faults)
     if len(faults.found) > before:
         return None
-    payload = encode(subscriber.frame, message)
+    payload = encode(subscriber.frame, completed(subscriber.frame, message))
     return Stimulus(subscriber, payload, decode(subscriber.frame, payload))

@@ -54,6 +54,7 @@ from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text
 
 Libraries = Mapping[RosVersion, MessageLibrary]
+_KINDS_OF_BLOCKS = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
 
 
 def derive(
@@ -224,11 +225,13 @@ class _Analysis:
         # One that could not be read may be the one that is meant.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
-            self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, nearest(block.type, names))
+            hint = nearest(block.type, names) or "there is none under 'accelerators'"
+            self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, hint)
         for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
-                self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", source)
+                message = f"'{key}' belongs to a converter, but '{block.name}' has a type"
+                self.faults.error(message, source, _KINDS_OF_BLOCKS)
         if not any(item.is_software for item in self.specification.accelerators if item.name == block.type):
             self._check_no_publisher_keys(block)
         if found := self.types.get(block.type):
@@ -241,8 +244,7 @@ class _Analysis:
             # What is wrong with a block that could not be read is noted already.
             if block.is_sound:
                 words = ", ".join(f"'{key}'" for key in missing)
-                hint = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
-                self.faults.error(f"block '{block.name}' needs {words}", block.name.source, hint)
+                self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)
             return
         assert block.middleware is not None and block.message is not None
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)
@@ -257,14 +259,15 @@ class _Analysis:
         for key in keys_only_of(Block, PUBLISHER):
             if getattr(block, key) is not None:
                 message = f"'{key}' belongs to a publisher, but '{block.name}' is none"
-                self.faults.error(message, block.name.source)
+                self.faults.error(message, block.place(key), "a publisher is a block with 'mode: publisher'")
 
     def _check_count(self, mode: str) -> None:
         blocks = self.specification.blocks
         found = [block for block in blocks if block.type is None and block.mode == mode]
         are_known = blocks and all(block.is_sound and (block.type or block.mode) for block in blocks)
         if not found and are_known:
-            self.faults.error(f"the system has no {mode}; it needs at least one", blocks[0].name.source)
+            message = f"the system has no {mode}; it needs at least one"
+            self.faults.error(message, blocks[0].name.source, f"a {mode} is a block with 'mode: {mode}'")
         elif len(found) > MOST_CONVERTERS:
             self.faults.error(
                 f"the system has {len(found)} {mode}s; an id of one byte tells {MOST_CONVERTERS} apart",

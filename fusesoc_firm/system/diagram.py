@@ -50,7 +50,7 @@ def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
     graph.node(f"{_MANAGER}_in", "Manager", shape="box")
     graph.node(f"{_MANAGER}_out", f"Manager\n{system.scheduling.policy}", shape="box")
     for converter in (*system.subscribers, *system.publishers):
-        label = f"{converter.block}\n{converter.frame.message}\nROS {converter.frame.ros}"
+        label = f"{converter.block}\n{converter.frame.message}\n{converter.frame.ros.title}"
         graph.node(_node(converter.block), label, **_CONVERTER)
     for block in system.accelerators:
         graph.node(_node(block.block), _accelerator(block), **_ACCELERATOR)

@@ -30,12 +30,14 @@ def check_pins(type_: AcceleratorType, width: int, faults: Diagnostics) -> None:
 
 def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
     if pin.bits is not None and not 1 <= pin.bits <= _MOST_BITS:
-        faults.error(f"'bits' of pin '{pin.name}' cannot be {pin.bits}", pin.source, f"legal here: 1 to {_MOST_BITS}")
+        message = f"'bits' of pin '{pin.name}' cannot be {pin.bits}"
+        faults.error(message, pin.place("bits"), f"legal here: 1 to {_MOST_BITS}")
     if not pin.name:
         return
     if identifier(pin.name) != pin.name:
         hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
         faults.error(f"no port can be called '{pin.name}'", pin.name.source, hint)
     elif owner := taken.get(pin.name.lower()):
-        faults.error(f"a pin cannot be called '{pin.name}', which is {owner}", pin.name.source)
+        hint = "the ports of an entity have names of their own, whatever their capitals"
+        faults.error(f"a pin cannot be called '{pin.name}', which is {owner}", pin.name.source, hint)
     taken[pin.name.lower()] = f"the pin at {pin.name.source}"

@@ -56,7 +56,8 @@ class Parts:
         for mode in (SUBSCRIBER, PUBLISHER):
             found = [*self.of_mode(mode).values()]
             if not found:
-                faults.error(f"the hardware has no {mode}; it needs at least one", first)
+                hint = f"a {mode} is a block with 'mode: {mode}', or a message between hardware and software"
+                faults.error(f"the hardware has no {mode}; it needs at least one", first, hint)
             elif len(found) > MOST_CONVERTERS:
                 message = f"the hardware has {len(found)} {mode}s; an id of one byte tells {MOST_CONVERTERS} apart"
                 faults.error(message, found[MOST_CONVERTERS].name.source)
@@ -198,7 +199,7 @@ class Parting:
     def _converter(self, end: End, side: MessageSide) -> Block:
         """The block of a converter that stands for a side; a publisher has the block's keys of publishers."""
         block = self.blocks[end.block]
-        made = Block(name=Text(self.names[end], block.name.source), source=block.source)
+        made = Block(name=Text(self.names[end], block.name.source), source=block.source, places=block.places)
         if side in self.outputs[end.block]:
             return replace(made, mode=Text(SUBSCRIBER))
         keys = {key: getattr(block, key) for key in keys_only_of(Block, PUBLISHER)}
@@ -213,7 +214,8 @@ def _check_no_publisher_keys(block: Block, faults: Diagnostics) -> None:
     for key in keys_only_of(Block, PUBLISHER):
         if getattr(block, key) is not None:
             message = f"'{key}' belongs to a publisher, but no message leaves hardware for '{block.name}'"
-            faults.error(message, block.name.source)
+            hint = "the key is for a message that a block in software takes from hardware"
+            faults.error(message, block.place(key), hint)
 
 
 def _bare(side: MessageSide) -> MessageSide:

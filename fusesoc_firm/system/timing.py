@@ -40,6 +40,10 @@ _SECONDS = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1
 _HERTZ = {"Hz": 1, "kHz": 1000, "MHz": 10**6, "GHz": 10**9}
 _QUANTITY = re.compile(r"(\d+(?:\.\d+)?)\s*([A-Za-z]*)")
 
+# What to add to a publisher that lacks a time.
+_PERIOD = "add 'period: <cycles, a time, or a rate>', such as 'period: 100 Hz'"
+_WCET = "add 'wcet: <cycles or a time>', or 'buffer: <bytes of its longest payload>'"
+
 Rounding = Callable[[Fraction], int]
 
 
@@ -130,7 +134,8 @@ def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
 
 def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
     if project.shortest_run < 1:
-        faults.error(f"'shortestRun' cannot be {project.shortest_run}", project.source, "legal: 1 and more beats")
+        place = project.place("shortest_run")
+        faults.error(f"'shortestRun' cannot be {project.shortest_run}", place, "legal here: 1 and more beats")
 
 
 def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
@@ -138,13 +143,13 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
     for block, item in zip(blocks, times, strict=True):
         # What cannot be read is noted already.
         if policy == AUTO_SCHEDULER and item.period is None and block.period is None:
-            faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source)
+            faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
         if policy in WITH_DEADLINES and item.deadline is None and block.period is None and block.deadline is None:
-            faults.error(f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'", block.name.source)
+            message = f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'"
+            faults.error(message, block.name.source, _PERIOD)
         if policy in (*WITH_TRANSFER_TIMES, AUTO_SCHEDULER) and item.transfer_time is None and block.wcet is None:
-            faults.error(
-                f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound", block.name.source
-            )
+            message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound"
+            faults.error(message, block.name.source, _WCET)
 
 
 @dataclass(frozen=True)
@@ -178,12 +183,12 @@ class _Reader:
         if unit and self.clock is None:
             if not self.is_clock_given:
                 message = f"'{key}' is '{time}', but the clock's frequency is not given"
-                self.faults.error(message, time.source, "add 'clock' to the project, such as 'clock: 100 MHz'")
+                self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
             return None
         cycles = number if not unit else self._of_unit(number, unit)
         if not 1 <= cycles <= _LONGEST_TIME:
-            message = f"'{key}' is {floor(cycles)} cycles; legal: 1 to {_LONGEST_TIME}"
-            self.faults.error(message, time.source)
+            message = f"'{key}' is {floor(cycles)} cycles"
+            self.faults.error(message, time.source, f"legal here: 1 to {_LONGEST_TIME} cycles")
             return None
         return rounded(cycles)
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, images, manager, nextpnr, timing, yosys
+from tests.bench import area, cycles, fuzz, images, manager, nextpnr, systems, timing, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
@@ -22,6 +22,7 @@ _HEADINGS = {
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
     "images": "Images",
+    "systems": "Systems",
 }
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
@@ -35,12 +36,13 @@ _METHODS = {
     "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
     "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
+    "systems": "Time that a user waits for a large system.",
 }
 _INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`,
-    `cycles`, `fuzz`, `images`). 'not
-    converted' is a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand:
-    `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `cycles`,
+    `fuzz`, `images`, `systems`). 'not converted' is a message that no converter is made of yet, or, for FrankaState,
+    whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell
+    how a row stands to its bar.
     """
 
 
@@ -51,7 +53,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    return area.keys() | manager.keys() | timing.keys() | cycles.keys() | fuzz.keys() | images.keys()
+    return area.keys() | manager.keys() | timing.keys() | cycles.keys() | fuzz.keys() | images.keys() | systems.keys()
 
 
 def section(part: str, tables: Sequence[Table]) -> str:
@@ -74,6 +76,8 @@ def _section_of(text: str, heading: str) -> str:
 
 
 def _versions(part: str) -> str:
+    if part == "systems":
+        return f"With Python {platform.python_version()} and rosbags {metadata.version('rosbags')}."
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]

@@ -76,6 +76,12 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
     return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
 
 
+def generate_system(spec: Path, folder: Path) -> list[Path]:
+    """Generate a system without its simulation into `folder`: its VHDL, in order. Raises `InputError`."""
+    parameters: dict[str, Plain] = {"spec": spec.name, "product": "system", "paths": None, "distro": None}
+    return _write(generator.generate(Request("far", "test:sys:system:0", spec.parent, parameters)), folder)
+
+
 def _write(core: GeneratedCore, folder: Path) -> list[Path]:
     """Write a core's files; those in VHDL are returned, in order."""
     vhdl = []
