@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 
 from edalize.tools.edatool import Edatool
 from edalize.utils import EdaCommands
+
 from fusesoc_firm.netlist.translation import Translation, translator
 
 

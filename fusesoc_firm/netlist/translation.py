@@ -91,7 +91,9 @@ def translate(translation: Translation, folder: Path) -> str:
     netlist, warnings = ghdl.synthesise("verilog")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
-        raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"]))
+        raise NetlistError(
+            "\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"])
+        )
     black_boxes = _black_boxes(warnings, translation.verilog)
     vhdl, _ = ghdl.synthesise("vhdl")
     netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl) + _FOOTER

@@ -86,6 +86,8 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             "translated": translated_unit(system, has_environment=has_environment),
             "is_simulated": is_simulated,
             "is_vhdl": not any(item.is_component for item in system.accelerator_types),
+            # Only an HLS tool makes them, so there is no netlist of the whole.
+            "has_kernels": any(item.accelerator.type == "HLS" for item in system.accelerator_types),
         },
     )
 

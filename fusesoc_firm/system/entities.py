@@ -42,7 +42,9 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
         name = accelerator.accelerator.name
         if accelerator.accelerator.type != "HLS" and identifier(name) != name:
             hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
-            faults.error(f"no {'module' if accelerator.is_component else 'entity'} can be called '{name}'", name.source, hint)
+            faults.error(
+                f"no {'module' if accelerator.is_component else 'entity'} can be called '{name}'", name.source, hint
+            )
         for entity in _entities(accelerator):
             if owner := owners.get(entity.lower()):
                 faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source)

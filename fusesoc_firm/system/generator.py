@@ -26,7 +26,6 @@ from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, wrapper_configuration
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
 
-
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {
     ".vhd": VHDL,

@@ -16,7 +16,11 @@ from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
 # The types of accelerators, each with the endings of its sources' names.
-SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl"), "Verilog": (".v", ".sv", ".vh", ".svh")}
+SOURCE_SUFFIXES = {
+    "HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"),
+    "VHDL": (".vhd", ".vhdl"),
+    "Verilog": (".v", ".sv", ".vh", ".svh"),
+}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
 # A block that is no accelerator.
