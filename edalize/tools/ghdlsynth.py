@@ -48,6 +48,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
             verilog=[file["name"] for file in others if "erilogSource" in file.get("file_type", "")],
             std=self.tool_options.get("ghdlsynth_std") or "93",
             options=self.tool_options.get("ghdlsynth_options", []),
+            tool=edam.get("flow_options", {}).get("tool", ""),
         )
         output = self.translation.output
         self.commands = EdaCommands()

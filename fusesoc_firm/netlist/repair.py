@@ -1,7 +1,7 @@
 """Puts right what GHDL 2.0 writes wrongly in a Verilog netlist, without a word about it.
 
-* A `case` loses its `when others`, so that it keeps its old value: a latch. The netlist in VHDL, which GHDL makes of the
-  same nets with the same names, has it.
+* A `case` loses its `when others`, so that it keeps its old value: a latch. The netlist in VHDL, of the same nets with
+  the same names, has it.
 * Signed division, remainder and modulus are written as those of unsigned numbers.
 * An arithmetic shift to the right is written as a logical one.
 * First values are assigned as if in a clocked block, which linters dislike.
