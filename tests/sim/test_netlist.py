@@ -42,7 +42,7 @@ def operands() -> list[tuple[int, int]]:
 
 
 def bits(value: int, width: int) -> int:
-    return value % 2**width
+    return value & ((1 << width) - 1)
 
 
 def answers(pairs: list[tuple[int, int]]) -> Iterator[list[int]]:
@@ -145,7 +145,11 @@ end architecture;
 """
 
 
-COMPONENT = "component Inner is port (d : in std_logic_vector(7 downto 0); Q : out std_logic_vector(7 downto 0)); end component;"
+COMPONENT = """
+  component Inner is
+    port (d : in std_logic_vector(7 downto 0); Q : out std_logic_vector(7 downto 0));
+  end component;
+"""
 INSTANCE = "u : Inner port map (d => a, Q => q);"
 
 
@@ -153,7 +157,7 @@ INSTANCE = "u : Inner port map (d => a, Q => q);"
     ("text", "message"),
     [
         (entity("process (a, enable) begin if enable = '1' then q <= a; end if; end process;"), "latch"),
-        (entity("q <= a and b;"), "no declaration for \"b\""),
+        (entity("q <= a and b;"), 'no declaration for "b"'),
         (entity("q <= a;").replace("entity top", "entity other").replace("of top", "of other"), "top"),
         (entity(INSTANCE, COMPONENT), "'inner', which is neither an entity of this build's VHDL nor a module"),
         (entity("q(6 downto 0) <= a(6 downto 0);"), "no assignment for"),

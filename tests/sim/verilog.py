@@ -23,7 +23,7 @@ class Icarus:
 
     program: Path
 
-    def run(self, directory: Path, timeout: float = 120, **options: Generic) -> RunResult:
+    def run(self, directory: Path, /, **options: Generic) -> RunResult:
         """Simulate in `directory`; options are those of the host, which the report repeats."""
         plusargs = [f"+{name}={value}" for name, value in options.items()]
         done = subprocess.run(
@@ -33,7 +33,7 @@ class Icarus:
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            timeout=timeout,
+            timeout=120,
             check=False,
         )
         return RunResult(done.returncode, done.stdout)
