@@ -37,8 +37,8 @@ _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned
 class Translation:
     """What to translate: VHDL files by library in any order, the unit on top, `[library.]unit`, and its generics.
 
-    `verilog` are the sources that may hold the modules of components without an entity; they are linked later. `tool` is
-    what takes the netlist, if that is known. All paths are relative to the current folder.
+    `verilog` are the sources that may hold the modules of components without an entity; they are linked later. `tool`
+    takes the netlist, if it is known. All paths are relative to the current folder.
     """
 
     top: str

@@ -86,6 +86,11 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             "translated": translated_unit(system, has_environment=has_environment),
             "is_simulated": is_simulated,
             "is_vhdl": not any(item.is_component for item in system.accelerator_types),
+            "is_system_verilog": any(
+                source.lower().endswith((".sv", ".svh"))
+                for item in system.accelerator_types
+                for source in item.accelerator.sources
+            ),
             # Only an HLS tool makes them, so there is no netlist of the whole.
             "has_kernels": any(item.accelerator.type == "HLS" for item in system.accelerator_types),
         },

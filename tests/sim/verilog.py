@@ -45,6 +45,7 @@ def compile_verilog(
     """Compile for the module `top`, with its `parameters`."""
     program = folder / f"{top}.vvp"
     options = [f"-P{top}.{name}={value}" for name, value in (parameters or {}).items()]
+    options += ["-g2012"] if any(path.suffix == ".sv" for path in files) else []
     command = ["iverilog", "-s", top, *options, "-o", program, *(f"-I{path.parent}" for path in files), *files]
     done = subprocess.run(
         [str(word) for word in dict.fromkeys(command)],
