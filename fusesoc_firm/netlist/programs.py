@@ -14,7 +14,7 @@ _PROGRAMS: dict[str, tuple[str, ...]] = {
 
 
 def missing_programs(tool: str) -> list[str]:
-    """The programs that Edalize's tool needs after a translation, GHDL's among them, and that are not installed."""
+    """The programs that Edalize's tool needs beside GHDL, and it too, which are not installed."""
     return [name for name in ("ghdl", *_PROGRAMS.get(tool, ())) if shutil.which(name) is None]
 
 

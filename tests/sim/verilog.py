@@ -84,6 +84,12 @@ def build(request: Request, folder: Path, *cores: str) -> Icarus:
 
     Raises `InputError` and `NetlistError`.
     """
+    top, files = translated(request, folder, *cores)
+    return compile_verilog(top, files, folder)
+
+
+def translated(request: Request, folder: Path, *cores: str) -> tuple[str, list[Path]]:
+    """A system with its simulation in Verilog alone: the test bench's name, and all files."""
     request = Request(request.command, request.vlnv, request.files_root, {**request.parameters, "simulator": "icarus"})
     work: list[Path] = []
     verilog: list[Path] = []
@@ -96,9 +102,8 @@ def build(request: Request, folder: Path, *cores: str) -> Icarus:
                 work.append(path)
             elif "erilogSource" in file.file_type and not file.is_include_file:
                 verilog.append(path)
-    bench = verilog[-1]
-    system = bench.stem.removesuffix("_tb")
+    bench = verilog[-1].stem
+    system = bench.removesuffix("_tb")
     tops = [path.stem for path in work if path.stem == f"{system}_in_environment"] or [system]
     runtime = [path for path in core_files(*RUNTIME, *cores) if path.parent.parent.name != "sim"]
-    made = netlist(tops[0], folder, work, runtime, verilog)
-    return compile_verilog(bench.stem, [made, *verilog, *HOST], folder)
+    return bench, [netlist(tops[0], folder, work, runtime, verilog), *verilog, *HOST]
