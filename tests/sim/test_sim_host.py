@@ -89,6 +89,21 @@ def test_a_run_repeats_with_its_seed(host: Bench, tmp_path: Path) -> None:
     assert runs[0].splitlines()[1:] != runs[2].splitlines()[1:]
 
 
+def test_both_hosts_do_the_same_in_every_cycle(tmp_path: Path) -> None:
+    frames = random_frames(range(4), 40, 60, SEED)
+    write_stimulus(tmp_path / "stimulus.txt", (frame.to_bytes() for frame in frames))
+    write_expected(tmp_path / "expected.txt", ((n, frame.to_bytes()) for n, frame in enumerate(frames)))
+    reports = []
+    for simulator in SIMULATORS:
+        (tmp_path / simulator).mkdir()
+        host = bench(simulator, "firm_sim_host_tb", ("axis/axis", "sim/host"), tmp_path / simulator)
+        seeds = (1, SEED, 2147483562)
+        outputs = [host.run(tmp_path, SEED=seed, STALL_PERCENT=47, WIDTH=16, SHOWN=40).output for seed in seeds]
+        reports.append([output.splitlines()[1:] for output in outputs])
+    assert reports[0] == reports[1]
+    assert len({tuple(report) for report in reports[0]}) == len(seeds)
+
+
 def test_files_of_dos_and_empty_expectations(host: Bench, tmp_path: Path) -> None:
     result = _run(host, tmp_path, STIMULUS.replace("\n", "\r\n"), EXPECTED.replace("\n", "\r\n"))
     assert result.exit_code == 0, result.output
