@@ -4,6 +4,7 @@
   the same names, has it.
 * Signed division, remainder and modulus are written as those of unsigned numbers.
 * An arithmetic shift to the right is written as a logical one.
+* A signal with a first value that something else drives for ever keeps the first value: no event starts its block.
 * First values are assigned as if in a clocked block, which linters dislike.
 * `abs` is copied over as VHDL, and constants of more than 64 bits as strings.
 
@@ -25,6 +26,10 @@ _DIVISION = re.compile(r"^(\s*assign \S+ = )(\S+) ([/%]) (\S+);( // (?:sdiv|srem
 _SHIFT = re.compile(r"^(\s*assign \S+ = \$signed\(\S+\)) >> (?=\S+;)", re.MULTILINE)
 _ABSOLUTE = re.compile(r"^(\s*)(\S+) <= std_logic_vector\(abs \$signed\((\S+)\)\);", re.MULTILINE)
 _INITIAL = re.compile(r"^(\s*initial\n\s*\S+) <= ", re.MULTILINE)
+_CONSTANT_SIGNAL = re.compile(
+    r"^ *always @\*\n +(?P<signal>\S+) = (?P<value>\d+'b\w+); // \(isignal\)\n *initial\n +(?P=signal) = \S+;",
+    re.MULTILINE,
+)
 _STRING = re.compile(r'"([01XZUWLH-]+)"')
 _LEVELS = str.maketrans("UWLH-XZ", "xx01xxz")
 
@@ -49,6 +54,7 @@ def repair(verilog: str, vhdl: str) -> str:
     verilog = _ABSOLUTE.sub(r"\1assign \2 = $signed(\3) < 0 ? -\3 : \3;", verilog)
     verilog = _INITIAL.sub(r"\1 = ", verilog)
     verilog = _STRING.sub(lambda found: _constant(found[1]), verilog)
+    verilog = _CONSTANT_SIGNAL.sub(r"  initial\n    \g<signal> = \g<value>;", verilog)
     verilog = _MODULE.sub(lambda found: _with_defaults(found, architectures), verilog)
     check(verilog)
     return verilog

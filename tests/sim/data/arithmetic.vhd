@@ -1,5 +1,5 @@
 -- All that GHDL 2.0 writes wrongly in Verilog: division of signed numbers, arithmetic shifts, `abs`, wide constants,
--- and a `case` whose last choice is `others`.
+-- a `case` whose last choice is `others`, and a signal that does not keep its first value.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -20,7 +20,8 @@ entity arithmetic is
     wide     : out std_logic_vector(79 downto 0);
     by_bits  : out std_logic_vector(15 downto 0);
     by_bit   : out std_logic;
-    turn     : out std_logic_vector(15 downto 0));
+    turn     : out std_logic_vector(15 downto 0);
+    driven   : out std_logic_vector(3 downto 0));
 end entity arithmetic;
 
 architecture rtl of arithmetic is
@@ -28,9 +29,12 @@ architecture rtl of arithmetic is
   type turn_t is (FIRST, SECOND, THIRD);
 
   signal turn_r : turn_t := FIRST;
+  signal fixed  : std_logic_vector(3 downto 0) := "0011";
 
 begin
 
+  fixed    <= "0101";
+  driven   <= fixed;
   quotient <= std_logic_vector(signed(a) / signed(b));
   modulus  <= std_logic_vector(signed(a) mod signed(b));
   rest     <= std_logic_vector(signed(a) rem signed(b));
