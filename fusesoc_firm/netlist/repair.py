@@ -43,12 +43,14 @@ class NetlistError(Exception):
     """A netlist that is not what the VHDL says; the text is what to tell the user."""
 
 
-def repair(verilog: str, vhdl: str) -> str:
-    """The Verilog netlist as it should be; `vhdl` is the netlist of the same design in VHDL.
+def repair(verilog: str, vhdl: str, top: str) -> str:
+    """The Verilog netlist of `top` as it should be; `vhdl` is the netlist of the same design in VHDL.
 
     Raises `NetlistError` for what cannot be put right.
     """
     architectures = {name.lower(): text for name, text in _ARCHITECTURE.findall(vhdl)}
+    # In VHDL, the top level has a net beside each of its ports.
+    architectures[top.lower()] = re.sub(r"\bwrap_(?=\w)", "", architectures.get(top.lower(), ""))
     verilog = _DIVISION.sub(_division, verilog)
     verilog = _SHIFT.sub(r"\1 >>> ", verilog)
     verilog = _ABSOLUTE.sub(r"\1assign \2 = $signed(\3) < 0 ? -\3 : \3;", verilog)
@@ -116,8 +118,7 @@ def _expression(text: str) -> str:
         return _constant(found[1])
     if found := re.fullmatch(r"\((\d+) downto 0 => '(.)'\)", text):
         return _constant(found[2] * (int(found[1]) + 1))
-    # The top level has a net beside each of its ports.
-    return text.removeprefix("wrap_")
+    return text
 
 
 def _target(case: re.Match[str]) -> str:

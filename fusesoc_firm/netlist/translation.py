@@ -100,7 +100,7 @@ def translate(translation: Translation, folder: Path) -> str:
         )
     black_boxes = _black_boxes(warnings, translation.verilog)
     vhdl, _ = ghdl.synthesise("vhdl")
-    netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl) + _FOOTER
+    netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl, translation.unit) + _FOOTER
     part = output.with_name(f"{output.name}.part")
     part.write_text(netlist, encoding="utf-8")
     part.replace(output)

@@ -172,3 +172,11 @@ def test_the_top_level_may_be_in_a_library(tmp_path: Path, option: str) -> None:
     if option:
         build.edam["files"][0]["logical_name"] = "base"
     assert "sum 39 0" in build.run().stdout
+
+
+def test_a_file_of_vhdl_2008_is_read_as_such(tmp_path: Path) -> None:
+    build = Build(tmp_path)
+    build.edit("adder.vhd", "add : process (a)", "add : process (all)")
+    assert build.run().returncode != 0
+    build.edam["files"][0]["file_type"] = "vhdlSource-2008"
+    assert "sum 39 0" in build.run().stdout
