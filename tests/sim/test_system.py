@@ -363,10 +363,10 @@ def test_every_vhdl_file_of_the_house_is_vhdl_93(tmp_path: Path) -> None:
     analysed: set[Path] = set()
     for fileset in ("rtl", "tb"):
         for core, filesets in cores_in_order():
-            if fileset in filesets:
-                if files := [path for path in core_files(core, fileset=fileset) if path.suffix == ".vhd"]:
-                    library.analyse(files)
-                    analysed |= set(files)
+            named = core_files(core, fileset=fileset) if fileset in filesets else []
+            if files := [path for path in named if path.suffix == ".vhd"]:
+                library.analyse(files)
+                analysed |= set(files)
     # Benches that are in no .core file, accelerators, and those of these tests, in folders' order: rtl before tb.
     others = {path for folder in (CORES, REPOSITORY / "specs", DATA) for path in folder.rglob("*.vhd")} - analysed
     assert REPOSITORY / "specs" / "quat2euler" / "rtl" / "quat2euler.vhd" in others
