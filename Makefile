@@ -17,18 +17,22 @@ SEED ?=
 WAVES ?=
 # Further options for the simulator.
 SIM_OPTIONS ?=
+# The system's target: sim, sim_icarus, sim_verilator.
+TARGET ?= sim
 # Programs that a target needs beside those of all.
 TOOLS :=
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
-# Parts of the bench, all if empty: BENCH='area manager timing cycles fuzz images systems'.
+# Parts of the bench, all if empty: BENCH='area manager timing cycles fuzz images systems simulators'.
 BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
-# With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core.
+# With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core, which are GHDL's.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
+# A host in Verilog takes its seed from FuseSoC.
+RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 is for GHDL, TARGET=sim))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
 
 .PHONY: help sim test bitstream bench proofs corpus lint setup tools clean distclean
 
@@ -37,9 +41,10 @@ help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # Without what make and Edalize say about folders, the result is the last line.
-sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); SEED=N, WAVES=1, SIM_OPTIONS='...'
+sim: TOOLS = $(if $(filter sim,$(TARGET)),,$(patsubst icarus,iverilog,$(TARGET:sim_%=%)))
+sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED=N, WAVES=1, SIM_OPTIONS='...'
 	@MAKEFLAGS=--no-print-directory PYTHONUNBUFFERED=1 \
-	  $(BIN)/fusesoc run --target=sim $(SYSTEM) $(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)") 2>&1 | \
+	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
 test: TOOLS = iverilog verilator yosys dot:graphviz
@@ -59,8 +64,8 @@ else
 	done; exit $$status
 endif
 
-bench: TOOLS = verilator
-bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing cycles fuzz images systems'
+bench: TOOLS = iverilog verilator
+bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing cycles fuzz images systems simulators'
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean

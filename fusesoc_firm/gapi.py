@@ -18,6 +18,7 @@ import yaml
 
 from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
+from fusesoc_firm.netlist.programs import explanation, missing_programs
 from fusesoc_firm.parameters import Parameter, check_parameters
 from fusesoc_firm.render import write_if_changed
 from fusesoc_firm.requesting_core import find_requesting_core
@@ -29,15 +30,16 @@ _LARGEST_SEED = 2147483562
 
 @dataclass(frozen=True)
 class Generator:
-    """A generator: its parameters, the files whose content it depends on, and what it makes of them.
+    """A generator: its parameters, the files whose content it depends on, what it makes of them, and what that needs.
 
     `inputs` is cheap, since it is asked on every run; a path in it need not exist. `generate` raises `InputError` for
-    what its user did wrong.
+    what its user did wrong. `missing_programs` are those without which what was made cannot be run.
     """
 
     parameters: tuple[Parameter, ...]
     inputs: Callable[[Request], list[Path]]
     generate: Callable[[Request], GeneratedCore]
+    missing_programs: Callable[[Request], list[str]] = lambda _: []
 
 
 def _converter_inputs(request: Request) -> list[Path]:
@@ -64,6 +66,10 @@ def _generate_system(request: Request) -> GeneratedCore:
     from fusesoc_firm.system import generator
 
     return simulation.generate(request) if _is_simulation(request) else generator.generate(request)
+
+
+def _simulator_programs(request: Request) -> list[str]:
+    return missing_programs(str(request.parameters["simulator"])) if _is_simulation(request) else []
 
 
 def _is_simulation(request: Request) -> bool:
@@ -120,6 +126,7 @@ GENERATORS: Mapping[str, Generator] = {
         ),
         _system_inputs,
         _generate_system,
+        _simulator_programs,
     ),
 }
 
@@ -135,6 +142,9 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+    # It can be generated and not be run.
+    if missing := generators[command].missing_programs(request):
+        print(f"{command}: {explanation(missing)}", flush=True)
     origin = "from store" if is_from_store else "generated"
     print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
     return 0

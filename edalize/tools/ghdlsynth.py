@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -27,7 +28,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
 
     TOOL_OPTIONS: ClassVar[dict[str, dict[str, Any]]] = {
         "ghdlsynth_top": {"type": "str", "desc": "VHDL unit to translate, [library.]unit (default: the toplevel)"},
-        "ghdlsynth_std": {"type": "str", "desc": "VHDL standard (default: 93)"},
+        "ghdlsynth_std": {"type": "str", "desc": "VHDL standard (default: 08 if a file has it, else 93)"},
         "ghdlsynth_options": {"type": "str", "desc": "Additional options of ghdl --synth", "list": True},
     }
 
@@ -46,8 +47,9 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
             libraries=libraries,
             generics={name: self._param_value_str(value, bool_is_str=True) for name, value in self.generic.items()},
             verilog=[file["name"] for file in others if "erilogSource" in file.get("file_type", "")],
-            std=self.tool_options.get("ghdlsynth_std") or "93",
+            std=self.tool_options.get("ghdlsynth_std") or _standard(sources),
             options=self.tool_options.get("ghdlsynth_options", []),
+            tool=edam.get("flow_options", {}).get("tool", ""),
         )
         output = self.translation.output
         self.commands = EdaCommands()
@@ -67,6 +69,11 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
     @property
     def _request(self) -> str:
         return f"{self.name}.ghdlsynth"
+
+
+def _standard(files: Sequence[dict[str, Any]]) -> str:
+    """GHDL reads all files by one standard."""
+    return "08" if any(file["file_type"].endswith("-2008") for file in files) else "93"
 
 
 def _prerequisite(path: Path) -> str:

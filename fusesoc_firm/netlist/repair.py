@@ -1,9 +1,10 @@
 """Puts right what GHDL 2.0 writes wrongly in a Verilog netlist, without a word about it.
 
-* A `case` loses its `when others`, so that it keeps its old value: a latch. The netlist in VHDL, which GHDL makes of the
-  same nets with the same names, has it.
+* A `case` loses its `when others`, so that it keeps its old value: a latch. The netlist in VHDL, of the same nets with
+  the same names, has it.
 * Signed division, remainder and modulus are written as those of unsigned numbers.
 * An arithmetic shift to the right is written as a logical one.
+* A signal with a first value that something else drives for ever keeps the first value: no event starts its block.
 * First values are assigned as if in a clocked block, which linters dislike.
 * `abs` is copied over as VHDL, and constants of more than 64 bits as strings.
 
@@ -25,6 +26,10 @@ _DIVISION = re.compile(r"^(\s*assign \S+ = )(\S+) ([/%]) (\S+);( // (?:sdiv|srem
 _SHIFT = re.compile(r"^(\s*assign \S+ = \$signed\(\S+\)) >> (?=\S+;)", re.MULTILINE)
 _ABSOLUTE = re.compile(r"^(\s*)(\S+) <= std_logic_vector\(abs \$signed\((\S+)\)\);", re.MULTILINE)
 _INITIAL = re.compile(r"^(\s*initial\n\s*\S+) <= ", re.MULTILINE)
+_CONSTANT_SIGNAL = re.compile(
+    r"^ *always @\*\n +(?P<signal>\S+) = (?P<value>\d+'b\w+); // \(isignal\)\n *initial\n +(?P=signal) = \S+;",
+    re.MULTILINE,
+)
 _STRING = re.compile(r'"([01XZUWLH-]+)"')
 _LEVELS = str.maketrans("UWLH-XZ", "xx01xxz")
 
@@ -38,17 +43,20 @@ class NetlistError(Exception):
     """A netlist that is not what the VHDL says; the text is what to tell the user."""
 
 
-def repair(verilog: str, vhdl: str) -> str:
-    """The Verilog netlist as it should be; `vhdl` is the netlist of the same design in VHDL.
+def repair(verilog: str, vhdl: str, top: str) -> str:
+    """The Verilog netlist of `top` as it should be; `vhdl` is the netlist of the same design in VHDL.
 
     Raises `NetlistError` for what cannot be put right.
     """
     architectures = {name.lower(): text for name, text in _ARCHITECTURE.findall(vhdl)}
+    # In VHDL, the top level has a net beside each of its ports.
+    architectures[top.lower()] = re.sub(r"\bwrap_(?=\w)", "", architectures.get(top.lower(), ""))
     verilog = _DIVISION.sub(_division, verilog)
     verilog = _SHIFT.sub(r"\1 >>> ", verilog)
     verilog = _ABSOLUTE.sub(r"\1assign \2 = $signed(\3) < 0 ? -\3 : \3;", verilog)
     verilog = _INITIAL.sub(r"\1 = ", verilog)
     verilog = _STRING.sub(lambda found: _constant(found[1]), verilog)
+    verilog = _CONSTANT_SIGNAL.sub(r"  initial\n    \g<signal> = \g<value>;", verilog)
     verilog = _MODULE.sub(lambda found: _with_defaults(found, architectures), verilog)
     check(verilog)
     return verilog
@@ -110,8 +118,7 @@ def _expression(text: str) -> str:
         return _constant(found[1])
     if found := re.fullmatch(r"\((\d+) downto 0 => '(.)'\)", text):
         return _constant(found[2] * (int(found[1]) + 1))
-    # The top level has a net beside each of its ports.
-    return text.removeprefix("wrap_")
+    return text
 
 
 def _target(case: re.Match[str]) -> str:

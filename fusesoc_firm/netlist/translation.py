@@ -16,6 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.netlist.programs import explanation, missing_programs
 from fusesoc_firm.netlist.repair import NetlistError, repair
 
 _UNBOUND = re.compile(r'instance "(.*?)" of component "(.*?)" is not bound')
@@ -36,8 +37,8 @@ _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned
 class Translation:
     """What to translate: VHDL files by library in any order, the unit on top, `[library.]unit`, and its generics.
 
-    `verilog` are the sources that may hold the modules of components without an entity; they are linked later. All
-    paths are relative to the current folder.
+    `verilog` are the sources that may hold the modules of components without an entity; they are linked later. `tool`
+    takes the netlist, if it is known. All paths are relative to the current folder.
     """
 
     top: str
@@ -47,6 +48,7 @@ class Translation:
     verilog: Sequence[str] = ()
     std: str = "93"
     options: Sequence[str] = ()
+    tool: str = ""
 
     def to_json(self) -> str:
         """A text that `from_json` reads."""
@@ -79,6 +81,8 @@ def translate(translation: Translation, folder: Path) -> str:
 
     Raises `NetlistError`; then there is no netlist.
     """
+    if missing := missing_programs(translation.tool):
+        raise NetlistError(explanation(missing))
     output = Path(translation.output)
     output.unlink(missing_ok=True)
     shutil.rmtree(folder, ignore_errors=True)
@@ -96,7 +100,7 @@ def translate(translation: Translation, folder: Path) -> str:
         )
     black_boxes = _black_boxes(warnings, translation.verilog)
     vhdl, _ = ghdl.synthesise("vhdl")
-    netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl) + _FOOTER
+    netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl, translation.unit) + _FOOTER
     part = output.with_name(f"{output.name}.part")
     part.write_text(netlist, encoding="utf-8")
     part.replace(output)
@@ -113,12 +117,9 @@ class _Ghdl:
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
         """What it prints on its two streams."""
         options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
-        try:
-            done = subprocess.run(
-                ["ghdl", command, *options, *arguments], capture_output=True, text=True, errors="replace", check=False
-            )
-        except FileNotFoundError:
-            raise NetlistError("error: 'ghdl' is not installed; Debian's package is called ghdl") from None
+        done = subprocess.run(
+            ["ghdl", command, *options, *arguments], capture_output=True, text=True, errors="replace", check=False
+        )
         if done.returncode:
             raise NetlistError((done.stdout + done.stderr).rstrip())
         return done.stdout, done.stderr

@@ -87,6 +87,7 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
 
 
 def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool) -> str:
+    has_kernels = any(item.accelerator.type == "HLS" for item in system.accelerator_types)
     return render(
         TARGETS_TEMPLATE,
         {
@@ -94,15 +95,17 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             "translated": translated_unit(system, has_environment=has_environment),
             "is_simulated": is_simulated,
             "is_vhdl": not any(item.is_component for item in system.accelerator_types),
-            # What a C++ function becomes is known to Vitis alone.
-            "families": [] if _has_kernels(system) else list(_FAMILIES),
-            "boards": [] if _has_kernels(system) else [_board(system, name) for name in boards()],
+            "is_system_verilog": any(
+                source.lower().endswith((".sv", ".svh"))
+                for item in system.accelerator_types
+                for source in item.accelerator.sources
+            ),
+            # Only an HLS tool makes them, so there is no netlist of the whole.
+            "has_kernels": has_kernels,
+            "families": [] if has_kernels else list(_FAMILIES),
+            "boards": [] if has_kernels else [_board(system, name) for name in boards()],
         },
     )
-
-
-def _has_kernels(system: DerivedSystem) -> bool:
-    return any(item.accelerator.type == "HLS" for item in system.accelerator_types)
 
 
 def _board(system: DerivedSystem, name: str) -> dict[str, object]:

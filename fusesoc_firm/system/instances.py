@@ -126,7 +126,7 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, width: int) -> d
 
 def component(type_: AcceleratorType, width: int) -> dict[str, Any]:
     """The declaration of an accelerator that is no entity."""
-    ports = [("clk", False, None), ("rst_n", False, None)]
+    ports: list[tuple[str, bool, int | None]] = [("clk", False, None), ("rst_n", False, None)]
     ports += [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_, width)]
     ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
     column = max(len(name) for name, *_ in ports)

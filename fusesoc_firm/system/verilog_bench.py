@@ -12,7 +12,7 @@ VERILOG_BENCH_TEMPLATE = "verilog/test_bench.v"
 ENVIRONMENT_TEMPLATE = "vhdl/in_environment.vhd"
 
 # Room for files of the user's own, beside the generated ones.
-_LEAST_FRAMES = 1024
+_LEAST_FRAMES = 65536
 
 
 def translated_unit(system: DerivedSystem, *, has_environment: bool) -> str:

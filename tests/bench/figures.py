@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, images, manager, nextpnr, systems, timing, yosys
+from tests.bench import area, cycles, fuzz, images, manager, nextpnr, simulators, systems, timing, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
@@ -23,6 +23,7 @@ _HEADINGS = {
     "fuzz": "Fuzzing",
     "images": "Images",
     "systems": "Systems",
+    "simulators": "Simulators",
 }
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
@@ -37,12 +38,14 @@ _METHODS = {
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
     "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
     "systems": "Time that a user waits for a large system.",
+    "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
+        same frames and stalls in every simulator, and the same bytes back.""",
 }
 _INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `cycles`,
-    `fuzz`, `images`, `systems`). 'not converted' is a message that no converter is made of yet, or, for FrankaState,
-    whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell
-    how a row stands to its bar.
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
+    `cycles`, `fuzz`, `images`, `systems`, `simulators`). 'not converted' is a message that no converter is made of yet,
+    or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`.
+    'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -53,7 +56,16 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    return area.keys() | manager.keys() | timing.keys() | cycles.keys() | fuzz.keys() | images.keys() | systems.keys()
+    return (
+        area.keys()
+        | manager.keys()
+        | timing.keys()
+        | cycles.keys()
+        | fuzz.keys()
+        | images.keys()
+        | systems.keys()
+        | simulators.keys()
+    )
 
 
 def section(part: str, tables: Sequence[Table]) -> str:
@@ -81,6 +93,8 @@ def _versions(part: str) -> str:
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
+    elif part == "simulators":
+        tools += [_first_line("verilator"), *simulators.versions()]
     elif part in ("area", "manager", "timing"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
         tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []

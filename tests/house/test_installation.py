@@ -194,6 +194,18 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
     assert not any(core.startswith("robot:sim:") for core in cores)
 
 
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+def test_another_projects_core_becomes_a_netlist(installation: Installation, project: Path) -> None:
+    """Edalize finds the tool `ghdlsynth` where this package is installed, and runs it there."""
+    text = PROJECT_CORE.format(ros="ros: 1").replace("flow: generic", "flow: lint")
+    text = text.replace("{tool: ghdl}", "{tool: verilator, frontends: [ghdlsynth]}")
+    (project / "robot" / "robot.core").write_text(text)
+    done = installation.fusesoc("run", "me:proj:robot", cwd=project)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (netlist,) = project.glob("build/me_proj_robot_1.0/default/*_netlist.v")
+    assert "module axis_to_geometry_msgs_quaternion\n" in netlist.read_text()
+
+
 def test_another_projects_core_simulates_converters_of_a_message_and_of_a_configuration(
     installation: Installation, project: Path
 ) -> None:

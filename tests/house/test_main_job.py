@@ -26,6 +26,7 @@ def run(
     project: Path = ROOT,
     is_activated: bool = True,
     environment: Mapping[str, str] = MappingProxyType({}),
+    target: str = "sim",
 ) -> subprocess.CompletedProcess[str]:
     """FuseSoC in the folder of `project`, with the store beside `build_root`."""
     variables = {
@@ -37,7 +38,7 @@ def run(
         "FUSESOC_FIRM_CACHE": str(build_root.parent / "store"),
         **environment,
     }
-    command = ["fusesoc" if is_activated else str(FUSESOC), "run", f"--build-root={build_root}", "--target=sim"]
+    command = ["fusesoc" if is_activated else str(FUSESOC), "run", f"--build-root={build_root}", f"--target={target}"]
     return subprocess.run(
         # The command is looked up on the PATH of the child, by env.
         ["/usr/bin/env", *command, f"robot:sys:{core}", *options],

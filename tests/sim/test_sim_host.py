@@ -1,4 +1,4 @@
-"""The simulation host: what it accepts, what it finds, what it prints, how it ends."""
+"""The simulation host in VHDL and in Verilog: what it accepts, what it finds, what it prints, how it ends."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.sim.benches import SIMULATORS, Bench, bench
 from tests.sim.frames import random_frames, traffic, write_expected, write_stimulus
-from tests.sim.ghdl import Library, RunResult, core_files
+from tests.sim.ghdl import Generic, RunResult
 
 SEED = 20240504
-BENCH = "firm_sim_host_tb"
 
 STIMULUS = """\
 # A comment, and a label without text.
@@ -29,27 +29,24 @@ EXPECTED = """\
 """
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    library = Library("firm", tmp_path_factory.mktemp("host"))
-    library.analyse(core_files("axis/axis", "sim/host"))
-    library.analyse(core_files("sim/host", fileset="tb"))
-    return library
+@pytest.fixture(scope="module", params=SIMULATORS)
+def host(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    return bench(request.param, "firm_sim_host_tb", ("axis/axis", "sim/host"), tmp_path_factory.mktemp("host"))
 
 
 def _run(
-    library: Library, directory: Path, stimulus: str = STIMULUS, expected: str = EXPECTED, **generics: int | str
+    host: Bench, directory: Path, stimulus: str = STIMULUS, expected: str = EXPECTED, **generics: Generic
 ) -> RunResult:
     (directory / "stimulus.txt").write_text(stimulus, encoding="latin-1", newline="")
     (directory / "expected.txt").write_text(expected, encoding="latin-1", newline="")
-    return library.run(BENCH, generics, directory=directory)
+    return host.run(directory, **generics)
 
 
-def test_the_report_of_a_good_run(library: Library, tmp_path: Path) -> None:
-    result = _run(library, tmp_path)
+def test_the_report_of_a_good_run(host: Bench, tmp_path: Path) -> None:
+    result = _run(host, tmp_path)
     assert result.exit_code == 0
     assert result.output.splitlines() == [
-        "seed 1, stalls 0 %, 8 bits; to repeat: -gSEED=1 -gSTALL_PERCENT=0",
+        f"seed 1, stalls 0 %, 8 bits; to repeat: {host.repeat(1, 0)}",
         "  0 > first x=1",
         "    < answer to first",
         "    6 cycles first beat in to last beat out, -6 last beat in to first beat out",
@@ -62,35 +59,75 @@ def test_the_report_of_a_good_run(library: Library, tmp_path: Path) -> None:
     ]
 
 
-def test_only_so_many_frames_are_shown(library: Library, tmp_path: Path) -> None:
-    assert "first" in _run(library, tmp_path, SHOWN=1).output
-    assert "  1 >" not in _run(library, tmp_path, SHOWN=1).output
-    assert "first x" not in _run(library, tmp_path, SHOWN=0).output
+def test_what_came_is_written_and_can_be_expected(host: Bench, tmp_path: Path) -> None:
+    long = "> long\n  02 50000000" + "5a" * 80
+    assert _run(host, tmp_path, f"{STIMULUS}{long}", f"{EXPECTED}{long.replace('>', '<')}").exit_code == 0
+    received = (tmp_path / "received.txt").read_text()
+    assert received.splitlines() == [
+        "< id 00",
+        "  0002000000aabb",
+        "< id 01",
+        "  01030000000a0b0c",
+        "< id 02",
+        "  0250000000" + "5a" * 59,
+        "  " + "5a" * 21,
+    ]
+    result = _run(host, tmp_path, f"{STIMULUS}{long}", received, RECEIVED_FILE="again.txt", STALL_PERCENT=40)
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "again.txt").read_text() == received
 
 
-def test_a_run_repeats_with_its_seed(library: Library, tmp_path: Path) -> None:
-    runs = [_run(library, tmp_path, SEED=seed, STALL_PERCENT=50).output for seed in (SEED, SEED, SEED + 1)]
+def test_only_so_many_frames_are_shown(host: Bench, tmp_path: Path) -> None:
+    assert "first" in _run(host, tmp_path, SHOWN=1).output
+    assert "  1 >" not in _run(host, tmp_path, SHOWN=1).output
+    assert "first x" not in _run(host, tmp_path, SHOWN=0).output
+
+
+def test_a_run_repeats_with_its_seed(host: Bench, tmp_path: Path) -> None:
+    runs = [_run(host, tmp_path, SEED=seed, STALL_PERCENT=50).output for seed in (SEED, SEED, SEED + 1)]
     assert runs[0] == runs[1]
     assert runs[0].splitlines()[1:] != runs[2].splitlines()[1:]
 
 
-def test_files_of_dos_and_empty_expectations(library: Library, tmp_path: Path) -> None:
-    result = _run(library, tmp_path, STIMULUS.replace("\n", "\r\n"), EXPECTED.replace("\n", "\r\n"))
+def test_both_hosts_do_the_same_in_every_cycle(tmp_path: Path) -> None:
+    frames = random_frames(range(4), 40, 60, SEED)
+    write_stimulus(tmp_path / "stimulus.txt", (frame.to_bytes() for frame in frames))
+    write_expected(tmp_path / "expected.txt", ((n, frame.to_bytes()) for n, frame in enumerate(frames)))
+    reports = []
+    for simulator in SIMULATORS:
+        (tmp_path / simulator).mkdir()
+        host = bench(simulator, "firm_sim_host_tb", ("axis/axis", "sim/host"), tmp_path / simulator)
+        seeds = (1, SEED, 2147483562)
+        outputs = [host.run(tmp_path, SEED=seed, STALL_PERCENT=47, WIDTH=16, SHOWN=40).output for seed in seeds]
+        reports.append([output.splitlines()[1:] for output in outputs])
+    assert reports[0] == reports[1]
+    assert len({tuple(report) for report in reports[0]}) == len(seeds)
+
+
+def test_files_of_dos_and_empty_expectations(host: Bench, tmp_path: Path) -> None:
+    result = _run(host, tmp_path, STIMULUS.replace("\n", "\r\n"), EXPECTED.replace("\n", "\r\n"))
     assert result.exit_code == 0, result.output
-    result = _run(library, tmp_path, expected="", FAULT="mute")
+    result = _run(host, tmp_path, expected="", FAULT="mute")
     assert result.output.splitlines()[-1] == "PASS 0/0"
 
 
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
 @pytest.mark.parametrize("stall", [0, 30, 90])
-def test_all_lengths_and_widths(library: Library, tmp_path: Path, width: int, stall: int) -> None:
+def test_all_lengths_and_widths(host: Bench, tmp_path: Path, width: int, stall: int) -> None:
     frames = random_frames(range(4), 60, 100, SEED)
     write_stimulus(tmp_path / "stimulus.txt", (frame.to_bytes() for frame in frames))
     # In another order than they come, as long as that of each id stays.
     by_id = sorted(enumerate(frames), key=lambda item: item[1].id)
     write_expected(tmp_path / "expected.txt", ((n, frame.to_bytes()) for n, frame in by_id))
-    generics = {"WIDTH": width, "STALL_PERCENT": stall, "SEED": SEED, "SHOWN": 0, "QUIET": 500, "WATCHDOG": 500}
-    result = library.run(BENCH, generics, directory=tmp_path)
+    generics: dict[str, Generic] = {
+        "WIDTH": width,
+        "STALL_PERCENT": stall,
+        "SEED": SEED,
+        "SHOWN": 0,
+        "QUIET": 500,
+        "WATCHDOG": 500,
+    }
+    result = host.run(tmp_path, **generics)
     assert result.exit_code == 0, result.output
     found = traffic(result.output)
     beats = sum(frame.beats(width) for frame in frames)
@@ -99,11 +136,11 @@ def test_all_lengths_and_widths(library: Library, tmp_path: Path, width: int, st
         assert found.cycles == beats
 
 
-def test_a_long_frame(library: Library, tmp_path: Path) -> None:
+def test_a_long_frame(host: Bench, tmp_path: Path) -> None:
     image = b"\x00" + (300_000).to_bytes(4, "little") + bytes(range(250)) * 1200
     write_stimulus(tmp_path / "stimulus.txt", [image])
     write_expected(tmp_path / "expected.txt", [(0, image)])
-    result = library.run(BENCH, {"WIDTH": 512}, directory=tmp_path)
+    result = host.run(tmp_path, WIDTH=512)
     assert result.exit_code == 0, result.output
 
 
@@ -128,13 +165,13 @@ def test_a_long_frame(library: Library, tmp_path: Path) -> None:
         ("mute", "missing: 'answer to first'"),
         ("id_pulse", "id_error pulses, announced: 0"),
         ("frame_pulse", "frame_error(0) pulses, announced: 0"),
-        ("unknown_pulse", "id_error is 'U'"),
+        ("unknown_pulse", "id_error is '{unknown}'"),
     ],
 )
-def test_a_broken_system_fails(library: Library, tmp_path: Path, fault: str, message: str) -> None:
-    result = _run(library, tmp_path, WIDTH=16, FAULT=fault, STALL_PERCENT=60, SEED=3)
+def test_a_broken_system_fails(host: Bench, tmp_path: Path, fault: str, message: str) -> None:
+    result = _run(host, tmp_path, WIDTH=16, FAULT=fault, STALL_PERCENT=60, SEED=3)
     assert result.exit_code != 0
-    assert message in result.output
+    assert message.format(unknown=host.unknown) in result.output
     assert any(line.startswith("FAIL ") for line in result.output.splitlines())
 
 
@@ -151,29 +188,29 @@ def test_a_broken_system_fails(library: Library, tmp_path: Path, fault: str, mes
         (EXPECTED + "! frame_error 2\n", "frame_error pulsed 0 times, announced: 2"),
     ],
 )
-def test_another_answer_than_expected_fails(library: Library, tmp_path: Path, expected: str, message: str) -> None:
-    result = _run(library, tmp_path, expected=expected, STALL_PERCENT=20, SEED=SEED)
+def test_another_answer_than_expected_fails(host: Bench, tmp_path: Path, expected: str, message: str) -> None:
+    result = _run(host, tmp_path, expected=expected, STALL_PERCENT=20, SEED=SEED)
     assert result.exit_code != 0
     assert message in result.output
 
 
-def test_a_surplus_frame_that_comes_late_fails(library: Library, tmp_path: Path) -> None:
-    result = _run(library, tmp_path, FAULT="late_surplus")
+def test_a_surplus_frame_that_comes_late_fails(host: Bench, tmp_path: Path) -> None:
+    result = _run(host, tmp_path, FAULT="late_surplus")
     assert result.exit_code != 0
     assert "frame of id 0: nobody expects it" in result.output
     assert "FAIL 2/2" in result.output.splitlines()
 
 
-def test_announced_errors_are_no_faults(library: Library, tmp_path: Path) -> None:
+def test_announced_errors_are_no_faults(host: Bench, tmp_path: Path) -> None:
     for fault, name in (("id_pulse", "id_error"), ("frame_pulse", "frame_error")):
-        assert _run(library, tmp_path, expected=f"{EXPECTED}! {name} 1\n", FAULT=fault).exit_code == 0
-        assert _run(library, tmp_path, expected=f"{EXPECTED}! {name} 2\n", FAULT=fault).exit_code != 0
+        assert _run(host, tmp_path, expected=f"{EXPECTED}! {name} 1\n", FAULT=fault).exit_code == 0
+        assert _run(host, tmp_path, expected=f"{EXPECTED}! {name} 2\n", FAULT=fault).exit_code != 0
 
 
-def test_ten_faults_are_printed_and_the_rest_counted(library: Library, tmp_path: Path) -> None:
+def test_ten_faults_are_printed_and_the_rest_counted(host: Bench, tmp_path: Path) -> None:
     stimulus = "> a\n  00 14000000" + "00" * 20
     expected = "< @0 a\n  00 14000000" + "01" * 20
-    output = _run(library, tmp_path, stimulus, expected).output
+    output = _run(host, tmp_path, stimulus, expected).output
     assert output.count("expected 01, got 00") == 10
     assert "and 10 faults more" in output
     assert "FAIL 0/1" in output.splitlines()
@@ -192,8 +229,8 @@ def test_ten_faults_are_printed_and_the_rest_counted(library: Library, tmp_path:
         (">a\n  00\n", "stimulus.txt:1: a blank is missing behind the first character"),
     ],
 )
-def test_an_ill_formed_stimulus_file_is_refused(library: Library, tmp_path: Path, stimulus: str, message: str) -> None:
-    result = _run(library, tmp_path, stimulus=stimulus)
+def test_an_ill_formed_stimulus_file_is_refused(host: Bench, tmp_path: Path, stimulus: str, message: str) -> None:
+    result = _run(host, tmp_path, stimulus=stimulus)
     assert result.exit_code != 0
     assert result.output.splitlines()[0] == message
 
@@ -213,14 +250,14 @@ def test_an_ill_formed_stimulus_file_is_refused(library: Library, tmp_path: Path
         ("! id_error -1\n", "expected.txt:1: expected '! id_error <pulses>' or '! frame_error <pulses>'"),
     ],
 )
-def test_an_ill_formed_expected_file_is_refused(library: Library, tmp_path: Path, expected: str, message: str) -> None:
-    result = _run(library, tmp_path, expected=expected)
+def test_an_ill_formed_expected_file_is_refused(host: Bench, tmp_path: Path, expected: str, message: str) -> None:
+    result = _run(host, tmp_path, expected=expected)
     assert result.exit_code != 0
     assert result.output.splitlines()[0] == message
 
 
-def test_a_missing_file_is_named(library: Library, tmp_path: Path) -> None:
-    result = _run(library, tmp_path, EXPECTED_FILE="absent.txt")
+def test_a_missing_file_is_named(host: Bench, tmp_path: Path) -> None:
+    result = _run(host, tmp_path, EXPECTED_FILE="absent.txt")
     assert result.exit_code != 0
     assert result.output.splitlines()[0] == "absent.txt:1: the file cannot be opened"
 
@@ -237,7 +274,7 @@ def test_a_missing_file_is_named(library: Library, tmp_path: Path) -> None:
         ("QUIET", 0),
     ],
 )
-def test_illegal_generics_are_named(library: Library, tmp_path: Path, generic: str, value: int) -> None:
-    result = library.run(BENCH, {generic: value}, directory=tmp_path)
+def test_illegal_generics_are_named(host: Bench, tmp_path: Path, generic: str, value: int) -> None:
+    result = host.run(tmp_path, **{generic: value})
     assert result.exit_code != 0
     assert f"firm_sim_host: {generic} is {value}; legal: " in result.output

@@ -8,19 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.sim.benches import SIMULATORS, Bench, bench
 from tests.sim.frames import Frame, random_frames, write_expected, write_stimulus
-from tests.sim.ghdl import Library, core_files
 
-BENCH = "firm_sim_join_tb"
 SEED = 20240719
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    library = Library("firm", tmp_path_factory.mktemp("join"))
-    library.analyse(core_files("axis/axis", "sim/host", "sim/parts"))
-    library.analyse(core_files("sim/parts", fileset="tb"))
-    return library
+@pytest.fixture(scope="module", params=SIMULATORS)
+def joiner(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    cores = ("axis/axis", "sim/host", "sim/parts")
+    return bench(request.param, "firm_sim_join_tb", cores, tmp_path_factory.mktemp("join"))
 
 
 def bursts_of(frame: Frame, width: int, source: random.Random) -> list[bytes]:
@@ -53,25 +50,25 @@ def mixed(frames: list[Frame], width: int, seed: int) -> tuple[list[bytes], list
     return bursts, whole
 
 
-def run(library: Library, folder: Path, bursts: list[bytes], whole: list[tuple[int, bytes]], **generics: int) -> str:
+def run(joiner: Bench, folder: Path, bursts: list[bytes], whole: list[tuple[int, bytes]], **generics: int) -> str:
     write_stimulus(folder / "stimulus.txt", bursts)
     write_expected(folder / "expected.txt", whole)
-    return library.run(BENCH, {"SEED": SEED, **generics}, directory=folder).output
+    return joiner.run(folder, **{"SEED": SEED, **generics}).output
 
 
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
 @pytest.mark.parametrize("stall", [0, 50])
-def test_frames_come_out_whole(library: Library, tmp_path: Path, width: int, stall: int) -> None:
+def test_frames_come_out_whole(joiner: Bench, tmp_path: Path, width: int, stall: int) -> None:
     frames = random_frames([0, 1, 7, 255], 60, 3 * width // 8 + 9, SEED)
     bursts, whole = mixed(frames, width, SEED)
     assert len(bursts) > 1.5 * len(frames)
-    output = run(library, tmp_path, bursts, whole, WIDTH=width, STALL_PERCENT=stall)
+    output = run(joiner, tmp_path, bursts, whole, WIDTH=width, STALL_PERCENT=stall)
     assert output.splitlines()[-1] == "PASS 60/60", output
 
 
-def test_a_lost_byte_is_seen(library: Library, tmp_path: Path) -> None:
+def test_a_lost_byte_is_seen(joiner: Bench, tmp_path: Path) -> None:
     bursts, whole = mixed([Frame(1, b"abcdefgh"), Frame(2, b"ijkl")], 8, SEED)
-    assert "FAIL" in run(library, tmp_path, [*bursts[:-1], bursts[-1][:-1]], whole)
+    assert "FAIL" in run(joiner, tmp_path, [*bursts[:-1], bursts[-1][:-1]], whole)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +78,12 @@ def test_a_lost_byte_is_seen(library: Library, tmp_path: Path) -> None:
         ([b"\x01\x02\0\0", b"\x01"], "burst of id 1 resumes a frame without a beat of it"),
     ],
 )
-def test_a_burst_that_does_not_fit_is_named(
-    library: Library, tmp_path: Path, bursts: list[bytes], message: str
-) -> None:
-    assert message in run(library, tmp_path, bursts, [(0, b"\x01\x02\0\0\0ab")])
+def test_a_burst_that_does_not_fit_is_named(joiner: Bench, tmp_path: Path, bursts: list[bytes], message: str) -> None:
+    assert message in run(joiner, tmp_path, bursts, [(0, b"\x01\x02\0\0\0ab")])
+
+
+def test_more_than_verilog_has_room_for_is_named(tmp_path: Path) -> None:
+    joiner = bench("icarus", "firm_sim_join_tb", (), tmp_path)
+    bursts, whole = mixed([Frame(1, bytes(20))], 8, SEED)
+    assert "PASS 1/1" in run(joiner, tmp_path, bursts, whole, BEATS=25)
+    assert "firm_sim_join: more than BEATS, 24, beats wait" in run(joiner, tmp_path, bursts, whole, BEATS=24)

@@ -55,6 +55,7 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         self.echo = Echo()
+        self.missing: list[str] = []
         self.project = folder / "project"
         self.work = folder / "work"
         self.project.mkdir()
@@ -76,7 +77,8 @@ class Bench:
             Parameter("paths", "list", "folders"),
             Parameter("file", "str", "a file that says it all", replaces=("spec", "width")),
         )
-        return main("echo", ["system_input.yml"], {"echo": Generator(known, self.echo.inputs, self.echo.generate)})
+        generator = Generator(known, self.echo.inputs, self.echo.generate, lambda _: self.missing)
+        return main("echo", ["system_input.yml"], {"echo": generator})
 
 
 @pytest.fixture
@@ -224,3 +226,25 @@ def test_the_usage_text_lists_just_the_parameters(command: str) -> None:
     usage = yaml.safe_load(path.read_text())["generators"][command]["usage"]
     listed = usage.partition("Parameters:\n")[2].splitlines()
     assert [line.strip() for line in listed] == [parameter.usage() for parameter in GENERATORS[command].parameters]
+
+
+def test_a_program_that_is_missing_is_named_with_its_package(
+    bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    far = GENERATORS["far"].missing_programs
+    found = {
+        simulator: far(Request("far", "a:b:c:1", tmp_path, {"product": "simulation", "simulator": simulator}))
+        for simulator in ("ghdl", "icarus", "verilator")
+    }
+    assert found == {
+        "ghdl": ["ghdl"],
+        "icarus": ["ghdl", "iverilog"],
+        "verilator": ["ghdl", "verilator", "g++", "make"],
+    }
+    assert far(Request("far", "a:b:c:1", tmp_path, {"product": "system", "simulator": "icarus"})) == []
+    bench.missing = ["iverilog"]
+    assert bench.run(spec="spec.yaml") == 0
+    output = capsys.readouterr().out
+    assert "echo: error: not installed: iverilog" in output
+    assert "apt-get install --no-install-recommends iverilog" in output

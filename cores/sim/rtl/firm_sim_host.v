@@ -377,7 +377,8 @@ module firm_sim_host #(
         if (char == NEWLINE) begin
           char        = $fgetc(file);
           line_number = line_number + 1;
-        end
+        end else if (char < 0)
+          line_number = line_number + 1;
       end
       close_frame;
       if (mark == ">" && frame_count == 0) begin

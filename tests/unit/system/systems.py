@@ -48,7 +48,7 @@ def specification(blocks: str, accelerators: str = "", project: str = "{name: ro
 def read(folder: Path, text: str) -> tuple[Specification, Diagnostics]:
     path = folder / "spec.yaml"
     path.write_text(text, encoding="utf-8")
-    for name in ("acc.vhd", "acc.cpp"):
+    for name in ("acc.vhd", "acc.cpp", "acc.v"):
         (folder / name).touch()
     faults = Diagnostics()
     return read_specification(path, "spec.yaml", faults), faults

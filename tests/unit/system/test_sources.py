@@ -1,4 +1,4 @@
-"""Whether an accelerator's entity is told the width, by what its source declares."""
+"""Whether an accelerator's entity or module is told the width, by what its source declares."""
 
 from __future__ import annotations
 
@@ -58,3 +58,61 @@ def test_others_do_not(tmp_path: Path, source: str) -> None:
     text = top_level(tmp_path, source)
     start = text.index("u_a : entity work.mix")
     assert text[start:].split("\n")[1].strip() == "port map ("
+
+
+def verilog_top_level(folder: Path, source: str) -> str:
+    text = specification(BLOCKS, accelerator("mix", "Point", "Point", "Verilog", "acc.v"), "{name: robot, width: 64}")
+    found, faults = read(folder, text)
+    (folder / "acc.v").write_text(source, encoding="utf-8")
+    return render(SYSTEM_TEMPLATE, system_configuration(derive(found, folder, LIBRARIES, faults)))
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "module mix #(parameter WIDTH = 8) (input clk); endmodule",
+        "module other; endmodule\nmodule mix #(\n  parameter A = 4, // of it\n  WIDTH = 8)\n (input clk);\nendmodule",
+        "module mix(clk); parameter A = 1, WIDTH = 8; input clk; endmodule",
+    ],
+)
+def test_a_parameter_gets_the_width(tmp_path: Path, source: str) -> None:
+    text = verilog_top_level(tmp_path, source)
+    start = text.index("u_a : component mix")
+    assert GENERIC in text[start : text.index("port map", start)]
+    declaration = text[text.index("component mix is") : text.index("end component;")]
+    assert "generic (\n      WIDTH : integer\n    );" in declaration
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "module mix (input clk); localparam WIDTH = 8; endmodule",
+        "module mix /* #(parameter WIDTH = 8) */ (input clk); // parameter WIDTH = 8;\nendmodule",
+        "module mix #(parameter MAX_WIDTH = 8, DEPTH = WIDTH == 8) (input clk); endmodule",
+        "module other #(parameter WIDTH = 8) (); endmodule module mix (input clk); endmodule",
+        "module Mix #(parameter WIDTH = 8) (input clk); endmodule",
+    ],
+)
+def test_other_modules_do_not(tmp_path: Path, source: str) -> None:
+    text = verilog_top_level(tmp_path, source)
+    start = text.index("u_a : component mix")
+    assert text[start:].split("\n")[1].strip() == "port map ("
+
+
+def test_a_component_has_the_ports_of_an_entity(tmp_path: Path) -> None:
+    text = verilog_top_level(tmp_path, "")
+    declaration = text[text.index("component mix is") : text.index("end component;")]
+    ports = [line.replace(" ", "").rstrip(";") for line in declaration.split("port (")[1].splitlines() if ":" in line]
+    vector = "std_logic_vector(63downto0)"
+    assert ports == [
+        "clk:instd_logic",
+        "rst_n:instd_logic",
+        *(f"in_{name}:in{vector}" for name in "xyz"),
+        "in_segment_valid:instd_logic_vector(0downto0)",
+        "in_msg_valid:instd_logic",
+        "in_msg_ready:outstd_logic",
+        *(f"out_{name}:out{vector}" for name in "xyz"),
+        "out_segment_valid:outstd_logic_vector(0downto0)",
+        "out_msg_ready:instd_logic",
+    ]
+    assert "entity work.mix" not in text

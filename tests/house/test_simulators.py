@@ -1,0 +1,83 @@
+"""By its target's name alone a system runs in any simulator, and each receives the same bytes in the same cycles."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.house.test_main_job import run
+
+pytestmark = pytest.mark.skipif(
+    not all(map(shutil.which, ("iverilog", "verilator"))), reason="Icarus Verilog or Verilator is not installed"
+)
+TARGETS = ("sim", "sim_icarus", "sim_verilator")
+# With the messages of each: variable size and bursts, pins with motors, accelerators in Verilog.
+SYSTEMS = {"quat2euler": 100, "image_pipeline": 7, "multi_type": 19, "mobile_robot": 40, "multi_type_verilog": 19}
+
+
+def report(done: subprocess.CompletedProcess[str]) -> list[str]:
+    """The lines of the host, but for how it is started again."""
+    lines = done.stdout.splitlines()
+    start = next(number for number, line in enumerate(lines) if line.startswith("seed "))
+    end = next(number for number, line in enumerate(lines) if re.match("PASS|FAIL", line))
+    return [lines[start].partition(";")[0], *lines[start + 1 : end + 1]]
+
+
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_all_simulators_receive_the_same(system: str, tmp_path: Path) -> None:
+    reports, received = [], []
+    for target in TARGETS:
+        done = run(system, tmp_path / "build", target=target)
+        print(done.stdout)
+        assert done.returncode == 0
+        reports.append(report(done))
+        received.append((tmp_path / "build" / f"robot_sys_{system}_0.1.0" / target / "received.txt").read_bytes())
+    assert reports[0][-1] == f"PASS {SYSTEMS[system]}/{SYSTEMS[system]}"
+    assert received[0].count(b"< id ") == SYSTEMS[system]
+    assert received[1:] == received[:1] * 2
+    assert reports[1:] == reports[:1] * 2
+
+
+@pytest.fixture(scope="module")
+def build_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("simulators") / "build"
+
+
+def test_another_seed(build_root: Path) -> None:
+    first = run("quat2euler", build_root, "--SEED=7", "--STALL_PERCENT=60", target="sim_icarus")
+    assert "seed 7, stalls 60 %, 8 bits; to repeat: +SEED=7 +STALL_PERCENT=60" in first.stdout
+    assert "PASS 100/100" in first.stdout
+    ghdl = run("quat2euler", build_root, "--sim_options=-gSEED=7 -gSTALL_PERCENT=60")
+    assert report(first) == report(ghdl)
+
+
+def test_a_wrong_answer_fails_by_exit_status(build_root: Path, tmp_path: Path) -> None:
+    expected = build_root / "robot_sys_sobel_0.1.0" / "sim_icarus" / "expected.txt"
+    assert run("sobel", build_root, target="sim_icarus").returncode == 0
+    text = expected.read_text()
+    frame = text.index("\n  ") + len("\n  00 ")
+    wrong = tmp_path / "wrong.txt"
+    # A byte of the first frame's payload.
+    place = frame + len("00 00 00 00 ")
+    wrong.write_text(f"{text[:place]}{'00' if text[place : place + 2] != '00' else '11'}{text[place + 2 :]}")
+    for target in ("sim_icarus", "sim_verilator"):
+        done = run("sobel", build_root, f"--EXPECTED_FILE={wrong}", target=target)
+        assert done.returncode != 0
+        assert "FAIL 6/7" in done.stdout.splitlines()
+
+
+@pytest.mark.parametrize("system", [*SYSTEMS, "sobel", "robotic_arm"])
+def test_lint_is_clean(system: str, build_root: Path) -> None:
+    done = run(system, build_root, target="lint")
+    assert done.returncode == 0, done.stdout
+
+
+def test_what_a_simulator_cannot_do_is_said(build_root: Path) -> None:
+    done = run("quat2euler_hls", build_root, target="sim_icarus")
+    assert done.returncode != 0
+    assert "icarus cannot simulate 'QuaternionToEuler_type' of type HLS" in done.stdout
+    assert "--target=sim" in done.stdout
