@@ -63,7 +63,6 @@ architecture rtl of firm_sched_engine is
   subtype key_t is std_logic_vector(KEY_BITS-1 downto 0);
 
   -- The first task of the arrivals, A.
-  signal accept     : std_logic;
   signal a_valid    : std_logic;
   signal a_id       : id_t;
   signal a_key      : key_t;
@@ -116,7 +115,6 @@ begin
     port map (
       clk            => clk,
       rst_n          => rst_n,
-      enable         => accept,
       request        => request,
       valid          => a_valid,
       id             => a_id,
@@ -150,7 +148,6 @@ begin
   begin
     a_key     <= std_logic_vector(unsigned(time_r) + unsigned(OFFSET_OF(to_integer(unsigned(a_id)))));
     key_ready <= '1';
-    accept    <= '1';
 
     -- The heap after reset; B may wait for it.
     is_clearing   <= empty and not insert_ready;
@@ -171,8 +168,6 @@ begin
   end generate timed;
 
   stamped : if HAS_STAMPS generate
-    signal initialised : std_logic;
-  begin
     u_stamps : entity firm.firm_sched_stamps
       generic map (
         REQUESTERS => REQUESTERS,
@@ -180,7 +175,6 @@ begin
       port map (
         clk          => clk,
         rst_n        => rst_n,
-        initialised  => initialised,
         completed    => finished,
         completed_id => grant_select_r,
         read         => a_valid,
@@ -188,7 +182,6 @@ begin
         read_ready   => key_ready,
         stamp        => a_key);
 
-    accept  <= initialised;
     advance <= '0';
   end generate stamped;
 

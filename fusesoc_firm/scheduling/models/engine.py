@@ -22,14 +22,19 @@ def index_bits(requesters: int) -> int:
     return max(1, (requesters - 1).bit_length())
 
 
+def rows_and_columns(requesters: int) -> tuple[int, int]:
+    """How many rows the requesters stand in, and columns, as the functions in firm_sched_queue_pkg."""
+    bits = index_bits(requesters)
+    column_bits = max(1, bits // 2)
+    rows: int = 2 ** max(1, bits - column_bits)
+    return rows, 2**column_bits
+
+
 class Arrivals:
     """firm_sched_arrivals: accepts tasks row by row. `valid` and `first` (B,) are the one that leaves next."""
 
     def __init__(self, batch: int, requesters: int) -> None:
-        bits = index_bits(requesters)
-        column_bits = max(1, bits // 2)
-        self._columns: int = 2**column_bits
-        self._rows: int = 2 ** max(1, bits - column_bits)
+        self._rows, self._columns = rows_and_columns(requesters)
         self._requesters = requesters
         self._members = np.arange(batch)
         # Bits of a row's columns, the lowest column lowest.
@@ -53,7 +58,7 @@ class Arrivals:
         first: Ints = np.where(self.valid, self._row * self._columns + self._lowest[self._accepted], 0)
         return first
 
-    def step(self, enable: bool, request: Bools, leaves: Bools, finished: Bools, finished_id: Ints) -> None:
+    def step(self, request: Bools, leaves: Bools, finished: Bools, finished_id: Ints) -> None:
         """A rising edge. A task of `finished_id` that is known is not any more where `finished` is true."""
         finished_row = finished_id // self._columns
         finished_bit = np.where(finished, 1 << (finished_id % self._columns), 0)
@@ -63,7 +68,7 @@ class Arrivals:
         self._known[self._members, finished_row] &= ~finished_bit
         if self._clearing:
             self._clearing -= 1
-        elif enable:
+        else:
             self._accept(request, self._accepted == 0, accepted, finished_row, finished_bit)
         self._accepted = accepted
 
@@ -215,11 +220,6 @@ class SortedQueue(Queue):
 class Keys(ABC):
     """Where the keys of tasks come from."""
 
-    @property
-    @abstractmethod
-    def initialised(self) -> bool:
-        """Whether tasks may be accepted."""
-
     @abstractmethod
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
         """The keys of tasks that leave the arrivals in this cycle, and where they are there."""
@@ -253,11 +253,6 @@ class Times(Keys):
         self._members = np.arange(len(offsets))
         self._time: Ints = np.zeros(len(offsets), np.int64)
         self._eighth = None if time_bits is None else time_bits - 3
-
-    @property
-    def initialised(self) -> bool:
-        """See `Keys`."""
-        return True
 
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
         """See `Keys`."""
@@ -332,7 +327,7 @@ class Engine(Scheduler):
         next_key = self._key + (beat & advance) if self._rules.sends_own_time else self._key
 
         queue.step(insert, self._b_id, self._b_key, pop)
-        arrivals.step(keys.initialised, request, take_a | get_key | a_enters_b, finished, self.grant_select)
+        arrivals.step(request, take_a | get_key | a_enters_b, finished, self.grant_select)
         keys.step(advance, a_valid, finished, self.grant_select)
 
         b_id, b_key = self._b_id, self._b_key
