@@ -9,7 +9,8 @@
 --
 -- When a task finishes, the next is the queue's root; if the queue is empty B, else who arrives. If there is
 -- nobody, the grant stays where it is, parked: its requester may begin a task before that is accepted, which then
--- has no key yet and keeps the grant until it has. While the queue fills its root, nobody is granted.
+-- has no key yet and keeps the grant until it has. While the queue has no root for it fills it, B or who arrives goes
+-- first where the root can preempt it (EDF, LST); else nobody is granted.
 -- A task with a smaller key (EDF, LST) takes the grant; the one that had it goes back into the queue through B.
 --
 -- Keys are compared as numbers that wrap around. So that they stay less than half their range apart whatever the
@@ -82,6 +83,9 @@ architecture rtl of firm_sched_engine is
   signal root_valid   : std_logic;
   signal root_id      : id_t;
   signal root_key     : key_t;
+  signal first_valid  : std_logic;
+  signal first_id     : id_t;
+  signal first_key    : key_t;
   signal pop          : std_logic;
   signal empty        : std_logic;
 
@@ -94,6 +98,7 @@ architecture rtl of firm_sched_engine is
 
   signal finished  : std_logic;
   signal choose    : std_logic;  -- nobody has the grant in the next cycle by right
+  signal gives_way : std_logic;  -- the queue, to who is on the way to it
   signal take_root : std_logic;
   signal take_b    : std_logic;
   signal take_a    : std_logic;
@@ -205,6 +210,9 @@ begin
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
+        first_valid  => first_valid,
+        first_id     => first_id,
+        first_key    => first_key,
         pop          => pop,
         empty        => empty);
   end generate of_few_luts;
@@ -224,6 +232,9 @@ begin
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
+        first_valid  => first_valid,
+        first_id     => first_id,
+        first_key    => first_key,
         pop          => pop,
         empty        => empty);
   end generate of_few_cycles;
@@ -231,9 +242,9 @@ begin
   -- Who is granted next.
 
   choose    <= finished or not (running_r or beat);
-  take_root <= choose and root_valid;
-  take_b    <= choose and empty and b_valid_r;
-  take_a    <= choose and empty and not b_valid_r and a_valid and not (finished and a_is_own);
+  take_root <= choose and first_valid;
+  take_b    <= choose and gives_way and b_valid_r;
+  take_a    <= choose and gives_way and not b_valid_r and a_valid and not (finished and a_is_own);
   get_key   <= a_valid and a_is_own and not choose;
 
   preemptive : if not HAS_STAMPS generate
@@ -242,10 +253,13 @@ begin
   begin
     root_is_before <= root_valid and is_before(root_key, key_r);
     b_has_room     <= '1' when IS_SORTED else not b_valid_r;
+    -- Better who may come first than nobody: who should have will preempt it.
+    gives_way      <= not first_valid;
     preempt        <= running_r and keyed_r and root_is_before and b_has_room and may_leave and not finished;
   end generate preemptive;
   non_preemptive : if HAS_STAMPS generate
-    preempt <= '0';
+    gives_way <= empty;
+    preempt   <= '0';
   end generate non_preemptive;
 
   runs_of_one : if SHORTEST_RUN <= 1 generate
@@ -297,7 +311,10 @@ begin
   end process hold_b;
 
   sends_own_time : if POLICY = LST generate
-    next_key <= std_logic_vector(unsigned(key_r) + 1) when beat = '1' and advance = '1' else key_r;
+    signal step : unsigned(0 downto 0);
+  begin
+    step(0)  <= beat and advance;
+    next_key <= std_logic_vector(unsigned(key_r) + step);
   end generate sends_own_time;
   keeps_key : if POLICY /= LST generate
     next_key <= key_r;
@@ -313,7 +330,7 @@ begin
         keyed_r        <= '0';
       else
         if pop = '1' then
-          grant_select_r <= root_id;
+          grant_select_r <= first_id;
         elsif take_b = '1' then
           grant_select_r <= b_id_r;
         elsif take_a = '1' then
@@ -328,7 +345,7 @@ begin
         keyed_r   <= take_root or take_b or take_a or (not choose and (keyed_r or get_key));
       end if;
       if pop = '1' then
-        key_r <= root_key;
+        key_r <= first_key;
       elsif take_b = '1' then
         key_r <= b_key_r;
       elsif take_a = '1' or get_key = '1' then

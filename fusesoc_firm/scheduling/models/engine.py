@@ -93,6 +93,9 @@ class Arrivals:
 class Queue(ABC):
     """A priority queue of items that each have an index of their own. `root_*` and `ready` are as in the current cycle.
 
+    The root may be on its way; then `root_id` and `root_key` tell already what it will be, as the core's first_id and
+    first_key, and what `pop` takes.
+
     Entries are ranks, key * size + index, so that the smallest is the smallest key and of equal ones the lowest index.
     """
 
@@ -115,6 +118,11 @@ class Queue(ABC):
 
     @property
     @abstractmethod
+    def first_valid(self) -> Bools:
+        """Where an item can be popped: a root, or what becomes one in this cycle."""
+
+    @property
+    @abstractmethod
     def empty(self) -> Bools:
         """Whether nothing is inside, not even a root that is about to come."""
 
@@ -134,7 +142,7 @@ class Queue(ABC):
 
     @abstractmethod
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
-        """A rising edge. `insert` only where it is ready, `pop` only where the root is valid."""
+        """A rising edge. `insert` only where it is ready, `pop` only where `first_valid` is true."""
 
     def _insert(self, insert: Bools, index: Ints, key: Ints) -> None:
         rank = key * self._size + index
@@ -142,24 +150,31 @@ class Queue(ABC):
         self._root = np.where(insert, np.minimum(self._root, rank), self._root)
 
     def _pop(self, pop: Bools) -> None:
-        self._ranks[self._members[pop], self.root_id[pop]] = _NOBODY
-
-    def _fill(self, where: Bools) -> None:
-        self._root[where] = self._ranks[where].min(axis=1)
+        if pop.any():
+            self._ranks[self._members[pop], self.root_id[pop]] = _NOBODY
+            self._root[pop] = self._ranks[pop].min(axis=1)
 
 
 class Heap(Queue):
-    """firm_sched_heap: the root is filled anew in the cycle behind a pop."""
+    """firm_sched_heap: the root is filled anew in the cycle behind a pop, or two cycles behind two in a row."""
 
     def __init__(self, batch: int, items: int) -> None:
         super().__init__(batch, items)
         self._filling: Bools = np.zeros(batch, np.bool_)
+        # What would have filled the root was popped in the last cycle.
+        self._owing: Bools = np.zeros(batch, np.bool_)
         self._clearing: int = 2 ** (index_bits(items) - 1)
+
+    @property
+    def first_valid(self) -> Bools:
+        """See `Queue`."""
+        first_valid: Bools = self.root_valid | (self._filling & (self._root != _NOBODY))
+        return first_valid
 
     @property
     def empty(self) -> Bools:
         """See `Queue`."""
-        return ~(self.root_valid | self._filling)
+        return ~(self.root_valid | self._filling | self._owing)
 
     @property
     def clearing(self) -> bool:
@@ -173,21 +188,26 @@ class Heap(Queue):
 
     def ready(self, pop: Bools) -> Bools:
         """See `Queue`."""
-        return ~(pop | self._filling | self.clearing)
+        return ~(pop | self._filling | self._owing | self.clearing)
 
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
         """See `Queue`."""
         self._insert(insert, index, key)
-        if self._filling.any():
-            self._fill(self._filling)
         self._pop(pop)
-        self.root_valid = ~pop & (self._root != _NOBODY)
-        self._filling = pop
+        fill = (pop & ~self._filling) | self._owing
+        self._owing = pop & self._filling
+        self._filling = fill
+        self.root_valid = ~(fill | self._owing) & (self._root != _NOBODY)
         self._clearing = max(0, self._clearing - 1)
 
 
 class SortedQueue(Queue):
     """firm_sched_sorted_queue: the next root is there in the next cycle."""
+
+    @property
+    def first_valid(self) -> Bools:
+        """See `Queue`."""
+        return self.root_valid
 
     @property
     def empty(self) -> Bools:
@@ -211,8 +231,6 @@ class SortedQueue(Queue):
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
         """See `Queue`."""
         self._pop(pop)
-        if pop.any():
-            self._fill(pop)
         self._insert(insert, index, key)
         self.root_valid = self._root != _NOBODY
 
@@ -314,9 +332,11 @@ class Engine(Scheduler):
         advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
 
         choose = finished | ~(self._running | beat)
-        take_root = choose & root_valid
-        take_b = choose & empty & self._b_valid
-        take_a = choose & empty & ~self._b_valid & a_valid & ~(finished & a_is_own)
+        # A task that can be preempted need not wait for a root that is on its way.
+        gives_way = ~queue.first_valid if self._is_preemptive else empty
+        take_root = choose & queue.first_valid
+        take_b = choose & gives_way & self._b_valid
+        take_a = choose & gives_way & ~self._b_valid & a_valid & ~(finished & a_is_own)
         get_key = a_valid & a_is_own & ~choose
         preempt = self._preempt(request, beat, finished, root_valid, root_key)
 
