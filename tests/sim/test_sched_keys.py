@@ -9,7 +9,16 @@ import pytest
 
 from tests.sim.ghdl import Library
 from tests.sim.sched_trace import Trace, first_difference, most_overtaken
-from tests.sim.schedulers import ENTITIES, analyse_bench, analysed, model_of, trace_of, wrapper
+from tests.sim.schedulers import (
+    ENTITIES,
+    aggregate,
+    analyse_bench,
+    analysed,
+    model_of,
+    timed_generics,
+    trace_of,
+    wrapper,
+)
 
 TIMED = [policy for policy, entity in ENTITIES.items() if entity.has_times]
 # Each policy with each way to keep its tasks: in a heap, in a sorted queue, all at once.
@@ -151,8 +160,8 @@ def test_tasks_follow_each_other(library: Library, tmp_path: Path, policy: str, 
         library, tmp_path, POLICY=policy, REQUESTERS=requesters, SATURATED=True, TASK_BEATS=beats, CYCLES=2000
     )
     share = float(trace.beat[:, RESET_CYCLES:].mean())
-    # LST interrupts tasks, so that what is left of one may be a single beat, too short for the heap to be ready again.
-    assert share >= 0.95 if policy == "lst" and requesters == LST_IN_HEAP else share == 1
+    # LST interrupts tasks, so that what is left of several may be single beats, more than the heap hands over in a row.
+    assert share >= 0.995 if policy == "lst" and requesters == LST_IN_HEAP else share == 1
 
 
 @pytest.mark.parametrize("shortest_run", [1, 3])
@@ -180,17 +189,11 @@ def test_the_netlist_does_the_same(
 
 def _generics(trace: Trace, policy: str) -> dict[str, str]:
     """The generics of a policy's entity as they are in the trace's bench."""
-
-    def times(name: str) -> str:
-        return "(" + ", ".join(f"{place} => {time}" for place, time in enumerate(trace.head[name])) + ")"
-
     generics = {"REQUESTERS": str(trace.requesters)}
     if policy in TIMED:
-        generics["PERIODS"] = times("periods")
-        generics["DEADLINES"] = "IMPLICIT" if trace.head["deadlines"] == [0] else times("deadlines")
-        generics["SHORTEST_RUN"] = str(trace.head["shortest_run"][0])
+        generics |= timed_generics(trace)
     if policy == "lst":
-        generics["TRANSFER_TIMES"] = times("transfer_times")
+        generics["TRANSFER_TIMES"] = aggregate(trace.head["transfer_times"])
     return generics
 
 
