@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fusesoc_firm.scheduling.models.engine import rows_and_columns
 from tests.sim.ghdl import Library
 from tests.sim.sched_trace import Trace, first_difference, most_overtaken
 from tests.sim.schedulers import (
@@ -34,7 +35,7 @@ SIZES = [
     ("lst", LST_IN_HEAP),
     ("lru", 20),
 ]
-# After reset the heap is cleared and stamps are written.
+# After reset the heap is cleared.
 RESET_CYCLES = 300
 
 
@@ -126,6 +127,27 @@ def test_each_other_goes_first_once_at_most(
         library, tmp_path, POLICY="lru", REQUESTERS=requesters, SATURATED=saturated, TASK_BEATS=beats, CYCLES=4000
     )
     assert 0 < most_overtaken(trace) <= requesters - 1
+
+
+@pytest.mark.parametrize("beats", [1, 2, 3])
+@pytest.mark.parametrize("saturated", [False, True])
+@pytest.mark.parametrize("requesters", [20, 100])
+def test_short_tasks_pass_by_few(
+    library: Library, tmp_path: Path, requesters: int, saturated: bool, beats: int
+) -> None:
+    trace = trace_of(
+        library, tmp_path, POLICY="lru", REQUESTERS=requesters, SATURATED=saturated, TASK_BEATS=beats, CYCLES=4000
+    )
+    # The heap is busy with tasks as short as these, so that some wait outside, where there is no order of use.
+    assert 0 < most_overtaken(trace) <= (1.2 if beats == 3 else 2) * requesters
+
+
+@pytest.mark.parametrize(("policy", "requesters"), [("lru", 20), ("lru", 256), ("edf_resources", 256)])
+def test_reset_is_over_soon(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
+    trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters, SATURATED=True, CYCLES=200)
+    # Rows of requesters are cleared, one a cycle; then the first of them is accepted and granted.
+    rows, _ = rows_and_columns(requesters)
+    assert (trace.grant_valid.argmax(axis=1) == rows + 2).all()
 
 
 @pytest.mark.parametrize(("policy", "requesters"), [*SIZES, ("edf_resources", 256), ("edf_latency", 256), ("lru", 256)])
