@@ -10,7 +10,7 @@
 -- When a task finishes, the next is the queue's root; if the queue is empty B, else who arrives. If there is
 -- nobody, the grant stays where it is, parked: its requester may begin a task before that is accepted, which then
 -- has no key yet and keeps the grant until it has. While the queue has no root for it fills it, B or who arrives goes
--- first where the root can preempt it (EDF, LST); else nobody is granted.
+-- first where the root can preempt it after a beat; else nobody is granted.
 -- A task with a smaller key (EDF, LST) takes the grant; the one that had it goes back into the queue through B.
 --
 -- Keys are compared as numbers that wrap around. So that they stay less than half their range apart whatever the
@@ -253,8 +253,8 @@ begin
   begin
     root_is_before <= root_valid and is_before(root_key, key_r);
     b_has_room     <= '1' when IS_SORTED else not b_valid_r;
-    -- Better who may come first than nobody: who should have will preempt it.
-    gives_way      <= not first_valid;
+    -- Better who may come first than nobody, since who should have takes the grant from it after a beat.
+    gives_way      <= not first_valid when SHORTEST_RUN <= 1 else empty;
     preempt        <= running_r and keyed_r and root_is_before and b_has_room and may_leave and not finished;
   end generate preemptive;
   non_preemptive : if HAS_STAMPS generate

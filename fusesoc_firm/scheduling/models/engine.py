@@ -332,8 +332,8 @@ class Engine(Scheduler):
         advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
 
         choose = finished | ~(self._running | beat)
-        # A task that can be preempted need not wait for a root that is on its way.
-        gives_way = ~queue.first_valid if self._is_preemptive else empty
+        # A task that can be preempted after a beat need not wait for a root that is on its way.
+        gives_way = ~queue.first_valid if self._is_preemptive and self._rules.shortest_run == 1 else empty
         take_root = choose & queue.first_valid
         take_b = choose & gives_way & self._b_valid
         take_a = choose & gives_way & ~self._b_valid & a_valid & ~(finished & a_is_own)
