@@ -92,7 +92,7 @@ def _generics(trace: Trace, top: str, groups: str) -> dict[str, str]:
 def test_illegal_times_are_named(tmp_path: Path, generics: Mapping[str, str], message: str) -> None:
     library = analysed(tmp_path)
     groups = {"REQUESTERS": "5", "SIZES": "(2, 3)", "POLICIES": "(LRU, LST)"}
-    _put(library, "refused", ENTITY, 5, groups | generics)
+    _put(library, "refused", ENTITY, 5, {**groups, **generics})
     result = library.run("refused")
     assert result.exit_code != 0
     assert f"{ENTITY}: {message}" in result.output
