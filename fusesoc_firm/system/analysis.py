@@ -18,6 +18,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MIDDLEWARES, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.system.clocks import clocks_of
 from fusesoc_firm.system.connections import Wiring, places
 from fusesoc_firm.system.derived import (
     AcceleratorBlock,
@@ -67,6 +68,7 @@ def derive(
     analysis.check_names()
     analysis.resolve_accelerators()
     analysis.resolve_blocks()
+    clocks = clocks_of(specification, faults)
     connections = with_lengths(analysis.wiring().connect(), analysis.outputs, analysis.blocks, faults)
     faults.raise_if_any()
     buffers = publisher_buffers(connections, analysis.publishers(), faults)
@@ -85,11 +87,12 @@ def derive(
         subscribers=analysis.converters("subscriber", connections),
         publishers=publishers,
         accelerators=tuple(
-            AcceleratorBlock(str(block.name), analysis.types[block.type])
+            AcceleratorBlock(str(block.name), analysis.types[block.type], str(block.clock or ""))
             for block in specification.blocks
             if block.type is not None
         ),
         connections=connections,
+        clocks=clocks,
     )
     check_entities(system, analysis.blocks, faults)
     faults.raise_if_any()
@@ -149,11 +152,12 @@ class _Analysis:
             if inputs is None or outputs is None or not accelerator.interface.is_sound or not accelerator.name:
                 continue
             sources = [self.folder / source for source in accelerator.sources]
-            found = AcceleratorType(accelerator, inputs, outputs, declares_width(accelerator, sources))
+            width = accelerator.width or self.specification.project.width
+            found = AcceleratorType(accelerator, inputs, outputs, width, declares_width(accelerator, sources))
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
                 check_kernel(found, self.faults)
-            check_pins(found, self.specification.project.width, self.faults)
+            check_pins(found, self.faults)
 
     def _check_sources(self, accelerator: Accelerator) -> None:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())

@@ -122,7 +122,7 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
     for type_ in system.accelerator_types:
         if type_.accelerator.type == "HLS":
-            configuration = wrapper_configuration(type_, system.width)
+            configuration = wrapper_configuration(type_)
             yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
     yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
 

@@ -13,15 +13,15 @@ _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
 
 
-def check_pins(type_: AcceleratorType, width: int, faults: Diagnostics) -> None:
-    """Note every pin that cannot be a port of its accelerator; `width` is that of the project's streams."""
+def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:
+    """Note every pin that cannot be a port of its accelerator."""
     accelerator = type_.accelerator
     if accelerator.type == "HLS" and accelerator.pins:
         message = f"'{accelerator.name}' is of type HLS, which has no ports but those of its messages"
         faults.error(message, accelerator.pins[0].source, "write this accelerator in VHDL")
         return
     taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")
-    taken |= {f"{prefix}{port.name}".lower(): "a port of a message" for prefix, port in accelerator_ports(type_, width)}
+    taken |= {f"{prefix}{port.name}".lower(): "a port of a message" for prefix, port in accelerator_ports(type_)}
     for pin in accelerator.pins:
         _check_pin(pin, taken, faults)
 

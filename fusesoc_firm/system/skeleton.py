@@ -25,14 +25,14 @@ def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
     for type_ in system.accelerator_types:
         paths = [folder / source for source in type_.accelerator.sources]
         if not any(path.exists() for path in paths):
-            texts[paths[0]] = skeleton(type_, system.width)
+            texts[paths[0]] = skeleton(type_)
     return texts
 
 
-def skeleton(type_: AcceleratorType, width: int) -> str:
-    """The text of an accelerator's source; streams have `width` bits."""
+def skeleton(type_: AcceleratorType) -> str:
+    """The text of an accelerator's source."""
     language = str(type_.accelerator.type)
-    configuration = _function(type_) if language == "HLS" else _entity(type_, width)
+    configuration = _function(type_) if language == "HLS" else _entity(type_)
     return render(_TEMPLATES[language], {**configuration, "purpose": _purpose(type_)})
 
 
@@ -53,8 +53,8 @@ def _function(type_: AcceleratorType) -> Configuration:
     }
 
 
-def _entity(type_: AcceleratorType, width: int) -> Configuration:
-    ports = accelerator_ports(type_, width)
+def _entity(type_: AcceleratorType) -> Configuration:
+    ports = accelerator_ports(type_)
     of_side = {
         side.prefix: [port for prefix, port in ports if prefix == side.prefix]
         for side in (*type_.inputs, *type_.outputs)

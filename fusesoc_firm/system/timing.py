@@ -47,7 +47,8 @@ def scheduling_of(
     project: Project, blocks: Mapping[str, Block], publishers: Sequence[Converter], faults: Diagnostics
 ) -> Scheduling:
     """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted."""
-    reader = _Reader(project.clock is not None, _clock(project, faults), faults)
+    clock = frequency("clock", project.clock, faults) if project.clock else None
+    reader = _Reader(project.clock is not None, clock, faults)
     times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
     policy, reasons = str(project.scheduler), tuple[str, ...]()
     _check_shortest_run(project, faults)
@@ -112,15 +113,11 @@ def _time_bits(times: Iterable[PublisherTimes]) -> int:
     return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
 
 
-def _clock(project: Project, faults: Diagnostics) -> Fraction | None:
-    """The clock's frequency in Hz."""
-    if project.clock is None:
-        return None
-    found = _QUANTITY.fullmatch(project.clock)
+def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
+    """A frequency in Hz, or None if what stands at `key` is none, which is noted."""
+    found = _QUANTITY.fullmatch(text)
     if not found or found[2] not in _HERTZ or not Fraction(found[1]):
-        faults.error(
-            f"'clock' cannot be '{project.clock}'", project.clock.source, "a frequency, such as 100 MHz or 12.5 MHz"
-        )
+        faults.error(f"'{key}' cannot be '{text}'", text.source, "a frequency, such as 100 MHz or 12.5 MHz")
         return None
     return Fraction(found[1]) * _HERTZ[found[2]]
 

@@ -16,6 +16,7 @@ from ruamel.yaml.comments import CommentedMap
 
 from fusesoc_firm.prompts import Asker, Question
 from fusesoc_firm.system.specification import (
+    ACCELERATOR,
     CONVERTER,
     PUBLISHER,
     Accelerator,
@@ -175,7 +176,7 @@ class _Draft:
             return True
         if entry.only_of == PUBLISHER:
             return bool(self.made.get("mode") == PUBLISHER)
-        return "type" not in self.made
+        return ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, entry: Key) -> bool:
         """Whether a key must be there: a converter has all of one word that the grammar leaves open to a block."""

@@ -76,7 +76,7 @@ begin
 
   u_clock : entity firm.firm_sim_clock
     generic map (
-      PERIOD_FS => M_PERIOD_PS * 1000,
+      PERIOD_PS => M_PERIOD_PS,
       SEED      => SEED)
     port map (
       reference => tick,

@@ -7,8 +7,8 @@ use ieee.math_real.all;
 
 entity firm_sim_clock is
   generic (
-    -- Period in femtoseconds, 2 and more.
-    PERIOD_FS : integer := 10000000;
+    -- Period in picoseconds, 2 and more.
+    PERIOD_PS : integer := 10000;
     -- Different for each instance, 1 and more: the phase, and by how much the period is off.
     SEED : integer := 1);
   port (
@@ -26,8 +26,8 @@ architecture simulation of firm_sim_clock is
 
 begin
 
-  assert PERIOD_FS >= 2
-    report "firm_sim_clock: PERIOD_FS is " & integer'image(PERIOD_FS) & "; legal: 2 and more"
+  assert PERIOD_PS >= 2
+    report "firm_sim_clock: PERIOD_PS is " & integer'image(PERIOD_PS) & "; legal: 2 and more"
     severity failure;
   assert SEED >= 1
     report "firm_sim_clock: SEED is " & integer'image(SEED) & "; legal: 1 and more"
@@ -44,9 +44,9 @@ begin
     clk <= '0';
     uniform(random_1, random_2, draw);  -- the first number of neighbouring seeds is much the same
     uniform(random_1, random_2, draw);
-    half := integer(real(PERIOD_FS) / 2.0 * (1.0 + DRIFT * (2.0 * draw - 1.0))) * 1 fs;
+    half := 500.0 * real(PERIOD_PS) * (1.0 + DRIFT * (2.0 * draw - 1.0)) * 1 fs;
     uniform(random_1, random_2, draw);
-    wait for integer(draw * real(PERIOD_FS)) * 1 fs;
+    wait for 1000.0 * draw * real(PERIOD_PS) * 1 fs;
     while edges < LAST_EDGES loop
       level := not level;
       clk   <= level;
