@@ -59,7 +59,12 @@ def test_bench_configuration(
     That is an entity with `clk`, `rst_n` and the pins, each in the other direction.
     """
     pins = _pins(Names(system), system)
-    formals = ["clk", "rst_n", *(clock.port for clock in system.clocks), *(str(port["formal"]) for group in pins for port in group["ports"])]
+    formals = [
+        "clk",
+        "rst_n",
+        *(clock.port for clock in system.clocks),
+        *(str(port["formal"]) for group in pins for port in group["ports"]),
+    ]
     return {
         "pins": pins,
         "clocks": [
@@ -92,7 +97,7 @@ def _clocks(system: DerivedSystem) -> list[Configuration]:
 
 
 def _resets(system: DerivedSystem) -> Configuration | None:
-    """The resets of further clocks: each domain sees it, one after the other, then the system's own; then all let go."""
+    """The resets of further clocks: each domain sees it, one after the other, and clk's; then all let go."""
     if not system.clocks:
         return None
     before: list[tuple[str, str]] = []

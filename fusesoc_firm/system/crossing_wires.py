@@ -93,9 +93,7 @@ def _message(names: Names, crossing: Crossing, scope: Scope, source: SourceSide)
         "label": names.crossing_label(crossing, word(scope.handshake.part, "crossing")),
         "entity": "firm_cdc_message",
         "generics": {"lines": port_map(generics)} if generics else None,
-        "ports": port_map(
-            [*_domain("s", crossing.source_clock), *s_side, *_domain("m", crossing.sink_clock), *m_side]
-        ),
+        "ports": port_map([*_domain("s", crossing.source_clock), *s_side, *_domain("m", crossing.sink_clock), *m_side]),
     }
 
 

@@ -1,8 +1,8 @@
 """Where the two ends of a connection differ, in their clocks or in the widths of their streams, and what stands there.
 
 A message and each of its elements is a scope: a handshake, fields that hold while it lasts, and streams and elements
-within. A handshake and its fields cross in a `firm_cdc_message`, a stream in a `firm_cdc_stream`. Where only widths differ,
-streams pass a `firm_axis_resize`, which holds nothing back, and all else is wired.
+within. A handshake and its fields cross in a `firm_cdc_message`, a stream in a `firm_cdc_stream`. Where only widths
+differ, streams pass a `firm_axis_resize`, which holds nothing back, and all else is wired.
 """
 
 from __future__ import annotations
@@ -125,14 +125,16 @@ def all_crossings(system: DerivedSystem) -> list[Crossing]:
 
 
 def _crossing(system: DerivedSystem, connection: Connection, sink: End) -> Crossing | None:
-    ends = (connection.source.block, sink.block)
+    source, target = connection.source.block, sink.block
     found = Crossing(
         connection.source,
         sink,
         # The parts of a message of variable size are the same for all sinks.
         connection.frame,
-        *(system.clock_of(block) for block in ends),
-        *(system.width_of(block) for block in ends),
+        system.clock_of(source),
+        system.clock_of(target),
+        system.width_of(source),
+        system.width_of(target),
     )
     return found if found.clocks or found.widths else None
 
@@ -153,7 +155,9 @@ def _collect(side: MessageSide, nodes: Sequence[Node], scope: Scope) -> Iterator
             case Fixed():
                 ports = (side.field(leaf) for leaf in node.fields if leaf.count and leaf.is_used)
                 # Padding may part the elements of a leaf.
-                scope.fields.extend(dict.fromkeys((p.name, p.width) for p in ports if (p.name, p.width) not in scope.fields))
+                scope.fields.extend(
+                    dict.fromkeys((p.name, p.width) for p in ports if (p.name, p.width) not in scope.fields)
+                )
             case Data() if node.is_used:
                 stream = side.stream(node)
                 scope.fields.append((stream.length, LENGTH_BITS))

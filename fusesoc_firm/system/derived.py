@@ -69,7 +69,7 @@ class MessageSide:
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with its messages resolved; its streams have `width` bits, which its entity is told if `has_width`."""
+    """An accelerator with its messages resolved; its streams have `width` bits, which it is told if `has_width`."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
@@ -150,7 +150,7 @@ class Scheduling:
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock beside that of the system; `frequency` in Hz, `ratio` is how many edges it has for each of the system's."""
+    """A clock beside that of the system: its `frequency` in Hz, and `ratio` of its edges to those of clk."""
 
     name: str
     frequency: Fraction
@@ -169,7 +169,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class DerivedSystem:
-    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` those beside that of the system."""
+    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` those beside clk."""
 
     name: str
     fpga_part: str

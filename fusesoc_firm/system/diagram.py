@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.system.derived import Connection, Converter, DerivedSystem
+from fusesoc_firm.system.crossings import crossings
+from fusesoc_firm.system.derived import AcceleratorBlock, Connection, Converter, DerivedSystem
 from fusesoc_firm.system.sides import side_ports
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ _HOST, _MANAGER = "host", "manager"
 _CONVERTER = {"shape": "box", "style": "filled", "fillcolor": "#dae8fc"}
 _ACCELERATOR = {"shape": "box", "style": "filled,rounded", "fillcolor": "#d5e8d4"}
 _STREAM = {"penwidth": "2"}
+_CROSSING = {"style": "dashed"}
 
 
 def diagram(system: DerivedSystem, output_format: str) -> str:
@@ -32,9 +34,10 @@ def diagram(system: DerivedSystem, output_format: str) -> str:
     _draw_streams(graph, system)
     for block in system.accelerators:
         accelerator = block.type.accelerator
-        graph.node(_node(block.block), f"{block.block}\n{accelerator.name} ({accelerator.type})", **_ACCELERATOR)
+        label = f"{block.block}\n{accelerator.name} ({accelerator.type}){_differences(system, block)}"
+        graph.node(_node(block.block), label, **_ACCELERATOR)
     for connection in system.connections:
-        _draw_connection(graph, connection, system.width)
+        _draw_connection(graph, connection, system)
     if output_format == "dot":
         return str(graph.source)
     try:
@@ -64,13 +67,22 @@ def _draw_converter(graph: Digraph, converter: Converter) -> None:
     graph.node(_node(converter.block), label, **_CONVERTER)
 
 
-def _draw_connection(graph: Digraph, connection: Connection, width: int) -> None:
-    for sink, frame in zip(connection.sinks, connection.frames, strict=True):
-        ports = side_ports(frame, width, gives=True, has_valid=False)
+def _differences(system: DerivedSystem, block: AcceleratorBlock) -> str:
+    """In what a block is not as the system, a line each."""
+    clock = system.clock_of(block.block)
+    at_clock = f"\n{clock.port}: {float(clock.frequency / 10**6):g} MHz" if clock else ""
+    return at_clock + (f"\n{block.type.width} bits" if block.type.width != system.width else "")
+
+
+def _draw_connection(graph: Digraph, connection: Connection, system: DerivedSystem) -> None:
+    for sink, frame, crossing in zip(connection.sinks, connection.frames, crossings(system, connection), strict=True):
+        ports = side_ports(frame, system.width, gives=True, has_valid=False)
         streams = [port.name.removesuffix("_axis_tdata") for port in ports if port.name.endswith("_axis_tdata")]
         bits = sum(port.width or 1 for port in ports if "_axis_t" not in port.name and not _is_handshake(port.name))
         label = f"{frame.message}\n{bits} bits{_with(streams)}"
-        graph.edge(_node(connection.source.block), _node(sink.block), label=label)
+        way = "".join(f"\n{words}" for words in (crossing.clocks, crossing.widths) if words) if crossing else ""
+        style = _CROSSING if crossing else {}
+        graph.edge(_node(connection.source.block), _node(sink.block), label=f"{label}{way}", **style)
 
 
 def _is_handshake(port: str) -> bool:

@@ -59,7 +59,9 @@ class Names:
         reserved = {*_TAKEN, system.entity, *entities, *label_names, *clock_names(system)}
         # What stands between blocks has keys of three parts, so no field of a message can have the same.
         ports = [(block, f"{prefix}{port.name}") for block, sides in found for prefix, port in sides]
-        signals = [_fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)]
+        signals: list[tuple[str, ...]] = [
+            _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
+        ]
         signals += [(block, "", word) for block in buffered for word in FRAME_SIGNALS]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
         signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]

@@ -9,11 +9,13 @@ from fusesoc_firm.converter.configuration import publisher_entity, subscriber_en
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.system.configuration import top_level_pins
+from fusesoc_firm.system.crossings import all_crossings
 from fusesoc_firm.system.derived import (
     AcceleratorBlock,
     Connection,
     Converter,
     DerivedSystem,
+    End,
     PayloadLength,
     PublisherTimes,
     Scheduling,
@@ -30,6 +32,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "fpgaPart": system.fpga_part,
             "width": system.width,
             **_scheduling(system.scheduling),
+            **_clocks(system),
         },
         "Converters": {
             "AXIS_to_msg": [
@@ -48,12 +51,40 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
                 "entity": block.type.entity,
                 "type": str(block.type.accelerator.type),
                 "sources": [str(source) for source in block.type.accelerator.sources],
+                **_domain(system, block),
                 **_pins(block, top_level_pins(system)),
             }
             for block in system.accelerators
         ],
         "Connections": list(_connections(system.connections, system.width)),
+        **_crossings(system),
     }
+
+
+def _clocks(system: DerivedSystem) -> dict[str, Any]:
+    """The further clocks, each with its port and its frequency in Hz."""
+    clocks = [{"name": item.name, "port": item.port, "hertz": float(item.frequency)} for item in system.clocks]
+    return {"clocks": clocks} if clocks else {}
+
+
+def _domain(system: DerivedSystem, block: AcceleratorBlock) -> dict[str, Any]:
+    """In what a block is not as the system: its clock, and the width of its streams."""
+    clock = system.clock_of(block.block)
+    shown: dict[str, Any] = {"clock": clock.port} if clock else {}
+    return shown | ({"width": block.type.width} if block.type.width != system.width else {})
+
+
+def _crossings(system: DerivedSystem) -> dict[str, Any]:
+    """Where the ends of a connection differ."""
+    found = []
+    for item in all_crossings(system):
+        ends = {"from": _side(item.source), "to": _side(item.sink)}
+        found.append(ends | {name: words for name in ("clocks", "widths") if (words := getattr(item, name))})
+    return {"Crossings": found} if found else {}
+
+
+def _side(end: End) -> str:
+    return f"{end.block}/{end.prefix.rstrip('_')}".rstrip("/")
 
 
 def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict[str, Any]:

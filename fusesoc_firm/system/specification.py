@@ -131,7 +131,9 @@ class Block(Section):
 
     name: Text = key("the block's name", is_required=True)
     type: Text | None = key("the accelerator it is an instance of; empty for a converter")
-    clock: Text | None = key("which of the project's clocks an accelerator runs at; clk unless given", only_of=ACCELERATOR)
+    clock: Text | None = key(
+        "which of the project's clocks an accelerator runs at; clk unless given", only_of=ACCELERATOR
+    )
     middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES), only_of=CONVERTER)
     mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
     message: Text | None = key("a converter's message", only_of=CONVERTER)

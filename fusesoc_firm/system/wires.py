@@ -84,9 +84,7 @@ def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> li
     """Where each sink of a message of fixed size has its valid from, and its ready goes to."""
     return [
         (names.crossing(crossing, "valid"), names.crossing(crossing, "ready")) if crossing else handshake
-        for crossing, handshake in zip(
-            crossings(system, connection), _handshakes(names, connection), strict=True
-        )
+        for crossing, handshake in zip(crossings(system, connection), _handshakes(names, connection), strict=True)
     ]
 
 

@@ -143,13 +143,14 @@ begin
       synced => requested);
 
   -- Levels that rise or fall together may arrive one after the other, in any order: each is shown behind those before
-  -- it, and none any more when the first of them has fallen.
+  -- it, and none any more when the first of them has fallen. In a reset, which the sink may be through with already, they
+  -- are those from before it.
   is_fallen <= '1' when (answer_r(SEGMENTS downto 0) and not requested) /= NONE else '0';
 
-  order : process (requested, m_enable, answer_r, is_fallen)
+  order : process (requested, m_rst_n, m_enable, answer_r, is_fallen)
     variable before : std_logic;
   begin
-    before := m_enable and not answer_r(SEGMENTS+1) and not is_fallen;
+    before := m_rst_n and m_enable and not answer_r(SEGMENTS+1) and not is_fallen;
     for place in 0 to SEGMENTS loop
       before         := before and requested(place);
       visible(place) <= before;

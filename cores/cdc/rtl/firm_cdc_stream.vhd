@@ -183,7 +183,7 @@ begin
 
   has_beat    <= '1' when read_gray_r /= write_seen else '0';
   word        <= memory(to_integer(read_r(INDEX_BITS-1 downto 0)));
-  word_tvalid <= has_beat and m_open;
+  word_tvalid <= has_beat and m_open and m_rst_n;
   read        <= has_beat and (word_tready or not m_open);
 
   advance_read : process (m_clk)

@@ -549,6 +549,8 @@ begin
         end if;
         is_shown := m_segment_valid(0) = '1';
       else
+        check(m_segment_valid = "000" and m_valid = '0' and m_element_segment = "0" and m_element_valid = '0'
+              and m_tvalid = "00", "something in a reset");
         is_shown  := false;
         was_taken := false;
       end if;
