@@ -70,7 +70,7 @@ def _check_uses(specification: Specification, faults: Diagnostics) -> None:
     for block in blocks:
         if block.clock is None:
             continue
-        used.add(str(block.clock))
+        used.add(block.clock.lower())
         if block.type is None and block.mode is not None:
             message = f"'clock' belongs to an accelerator, but '{block.name}' is a {block.mode}"
             faults.error(message, block.clock.source)
@@ -79,6 +79,6 @@ def _check_uses(specification: Specification, faults: Diagnostics) -> None:
             faults.error(f"no clock is called '{block.clock}'", block.clock.source, hint)
     are_known = not specification.is_cut and all(block.is_sound for block in blocks)
     for clock in project.clocks:
-        if are_known and clock.name and clock.name not in used:
+        if are_known and clock.name and clock.name.lower() not in used:
             message = f"no block runs at clock '{clock.name}'"
             faults.error(message, clock.name.source, f"'clock: {clock.name}' at a block of an accelerator")

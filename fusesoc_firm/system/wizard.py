@@ -144,6 +144,9 @@ class _Wizard:
             return self.message_names()
         if section is Block and name == "type":
             return self._names("accelerators")
+        if section is Block and name == "clock":
+            project = self.content.get("project") or {}
+            return [str(clock["name"]) for clock in project.get("clocks") or []]
         if section is Outgoing and name == "name":
             return self._names("blocks")
         return ()

@@ -121,7 +121,7 @@ def test_an_image_streams_through(tmp_path: Path, own: str, other: str, width: i
 
 @pytest.mark.parametrize("width", [8, 64])
 def test_an_image_goes_to_several_domains(tmp_path: Path, width: int) -> None:
-    """A fork with sinks in three domains; behind it two accelerators of one domain and of two widths, and a way back."""
+    """A fork with sinks in two domains; behind it two accelerators of one domain and of two widths."""
     source = (DATA / "invert.vhd").read_text(encoding="ascii")
     (tmp_path / "invert.vhd").write_text(source, encoding="ascii")
     (tmp_path / "invert_wide.vhd").write_text(re.sub(r"\binvert\b", "invert_wide", source), encoding="ascii")

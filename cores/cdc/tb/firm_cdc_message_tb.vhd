@@ -448,12 +448,13 @@ begin
     variable is_element : boolean  := false;   -- it is shown
     variable in_element : natural;             -- bytes of its stream
 
+    -- Without a message the sink takes nothing.
     procedure draw_ready(signal ready : out std_logic) is
       variable draw : real;
     begin
       uniform(random_1, random_2, draw);
       ready <= '1';
-      if draw * 100.0 < real(STALL_PERCENT) then
+      if draw * 100.0 < real(STALL_PERCENT) or not is_shown then
         ready <= '0';
       end if;
     end procedure draw_ready;
