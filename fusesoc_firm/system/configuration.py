@@ -13,7 +13,7 @@ from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.system.derived import DerivedSystem
 from fusesoc_firm.system.instances import ERROR_CODE_BITS, accelerator_instance, publisher_instance, subscriber_instance
 from fusesoc_firm.system.maps import port_map
-from fusesoc_firm.system.names import RELEASED, Names, blocks, seen_reset
+from fusesoc_firm.system.names import RELEASED, Names, blocks, reset_label, seen_reset
 from fusesoc_firm.system.scheduler import scheduler_configuration
 from fusesoc_firm.system.sides import SidePort
 from fusesoc_firm.system.specification import DIRECTIONS
@@ -114,7 +114,7 @@ def _resets(system: DerivedSystem) -> Configuration | None:
 
 def _reset(clock: str, release: list[tuple[str, str]], reset: str) -> Configuration:
     return {
-        "label": f"u_{reset.removesuffix('_n')}",
+        "label": reset_label(reset),
         "ports": port_map([("clk", clock), ("rst_n", "rst_n"), *release, ("synced_rst_n", reset)]),
     }
 

@@ -28,7 +28,7 @@ _TAKEN = """
 """.split()
 AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
 # Low until every clock domain has been reset.
-RELEASED = "rst_released_n"
+RELEASED = "domains_rst_n"
 # Between a publisher and its buffer.
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in (*AXIS, "error", "error_code"))
 
@@ -141,15 +141,18 @@ def clock_names(system: DerivedSystem) -> list[str]:
     """What the top level has for further clocks: ports, resets, and the labels of what makes these."""
     if not system.clocks:
         return []
-    names = [RELEASED, "u_rst_released"]
-    for clock in system.clocks:
-        names += [clock.port, clock.reset, seen_reset(clock), f"u_rst_{clock.name}", f"u_rst_{clock.name}_seen"]
-    return names
+    resets = [RELEASED, *(name for clock in system.clocks for name in (clock.reset, seen_reset(clock)))]
+    return [*(clock.port for clock in system.clocks), *resets, *map(reset_label, resets)]
+
+
+def reset_label(reset: str) -> str:
+    """The label of what makes a reset."""
+    return f"u_{reset.removesuffix('_n')}"
 
 
 def seen_reset(clock: Clock) -> str:
     """Low until a clock domain, and those before it, have been reset."""
-    return f"rst_{clock.name}_seen_n"
+    return f"seen_{clock.name}_n"
 
 
 def _crossing_key(crossing: Crossing, word: str) -> tuple[str, ...]:

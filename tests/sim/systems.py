@@ -14,12 +14,12 @@ from tests.sim.schedulers import POLICY_CORES
 DATA = Path(__file__).parent / "data"
 RUNTIME = (
     "axis/axis",
+    "sim/sync",
     "cdc/cdc",
     "sched/package",
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
     "sim/host",
-    "sim/clocks",
 )
 
 

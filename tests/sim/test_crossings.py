@@ -30,11 +30,13 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 def _library(directory: Path, *, is_sure: bool = False) -> Library:
     """All cores; with the synchronisers of the hardware if they are to be `is_sure`."""
     library = Library("firm", directory)
-    library.analyse(core_files("axis/axis", "cdc/cdc"))
-    clocks = core_files("sim/clocks")
-    library.analyse(path for path in clocks if not is_sure or path.stem == "firm_sim_clock")
+    library.analyse(core_files(*_cores(is_sure=is_sure)))
     library.analyse(core_files("cdc/cdc", fileset="tb"))
     return library
+
+
+def _cores(*, is_sure: bool) -> tuple[str, ...]:
+    return ("axis/axis", "cdc/sync" if is_sure else "sim/sync", "cdc/cdc", "sim/host")
 
 
 def periods(ratio: float, source: random.Random) -> dict[str, Generic]:
@@ -186,7 +188,7 @@ IN_MESSAGES: dict[str, Fault] = {
 def broken(directory: Path, fault: Fault, *, is_sure: bool = False) -> Library:
     """All cores, one of them with a fault."""
     part, changes = fault
-    (path,) = CORES.glob(f"*/rtl/{part}.vhd")
+    (path,) = (file for file in core_files(*_cores(is_sure=is_sure)) if file.stem == part)
     text = path.read_text(encoding="utf-8")
     for old, new in changes:
         assert old in text, old
@@ -195,8 +197,7 @@ def broken(directory: Path, fault: Fault, *, is_sure: bool = False) -> Library:
     changed = directory / f"{part}.vhd"
     changed.write_text(text, encoding="utf-8")
     library = Library("firm", directory)
-    files = [changed if file == path else file for file in core_files("axis/axis", "cdc/cdc")]
-    library.analyse([*files, *(file for file in core_files("sim/clocks") if not is_sure or "clock" in file.stem)])
+    library.analyse(changed if file == path else file for file in core_files(*_cores(is_sure=is_sure)))
     library.analyse(core_files("cdc/cdc", fileset="tb"))
     return library
 

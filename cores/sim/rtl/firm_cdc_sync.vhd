@@ -1,12 +1,23 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The synchroniser as simulation should have it: what changed last before an edge may be seen now or an edge later, each bit
--- for itself, as a metastable register decides. It takes the place of the other architecture, as it is analysed later.
+-- for itself, as a metastable register decides. A library has it in place of that of robot:cdc:sync.
 -- Earlier changes have settled: bits that change one after the other are never seen in another order, as in a wire each.
 -- What it draws follows from where it stands and from when its input changes first: another phase gives other numbers.
 library ieee;
+use ieee.std_logic_1164.all;
 use ieee.math_real.all;
 
-architecture metastable of firm_cdc_sync is
+entity firm_cdc_sync is
+  generic (
+    BITS   : integer := 1;
+    STAGES : integer := 2);
+  port (
+    clk    : in  std_logic;
+    level  : in  std_logic_vector(BITS-1 downto 0);
+    synced : out std_logic_vector(BITS-1 downto 0));
+end entity firm_cdc_sync;
+
+architecture simulation of firm_cdc_sync is
 
   constant HIGHEST_SEED : positive := 2147483398;
 
@@ -38,7 +49,7 @@ begin
     severity failure;
 
   pass_on : process (clk, level)
-    variable random_1 : positive := hash(metastable'path_name);
+    variable random_1 : positive := hash(simulation'path_name);
     variable random_2 : positive := 1;
     variable current  : std_logic_vector(BITS-1 downto 0);
     variable before   : std_logic_vector(BITS-1 downto 0);  -- the last change
@@ -71,4 +82,4 @@ begin
 
   synced <= stages_r(STAGES*BITS-1 downto (STAGES-1)*BITS);
 
-end architecture metastable;
+end architecture simulation;
