@@ -112,6 +112,15 @@ def test_messages_cross_in_their_order(library: Library, s_width: int, m_width: 
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
+def test_messages_of_fixed_size_follow_each_other(library: Library, ratio: float) -> None:
+    """Seven cycles of each clock at most, on average."""
+    source = random.Random(SEED + 6)
+    clocks = periods(ratio, source)
+    most = 7 * sum(period for period in clocks.values() if isinstance(period, int))
+    assert passes(library, "firm_cdc_rate_tb", **clocks, SEED=source.randrange(1, 10**6), MOST_PS=most)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
 def test_a_withdrawn_message_leaves_nothing_behind(library: Library, ratio: float) -> None:
     source = random.Random(SEED + 3)
     for width, percent in ((8, 0), (64, 40)):
