@@ -6,6 +6,7 @@ import random
 import re
 import shutil
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ import yaml
 
 from fusesoc_firm.system.generator import load_system
 from fusesoc_firm.system.sides import accelerator_ports
+from tests.sim.crossing_paths import Domains, unsynchronised
+from tests.sim.ghdl import Library, core_files
 from tests.sim.images import Message, copied, fed, image, odd_images, random_images
 from tests.sim.systems import DATA, GeneratedSystem, build, call
 from tests.sim.test_variable_system import ALL, COPIES, IMAGE, INVERT, bag, converter, image_accelerator, values
@@ -23,6 +26,7 @@ SEED = 20240921
 # Of clk and of another clock; no edge of one has a fixed place in the other's period (firm_sim_clock).
 CLOCKS = [("100 MHz", "11 MHz"), ("100 MHz", "97 MHz"), ("50 MHz", "333.3 MHz")]
 SAME = "the system's"
+TWICE = INVERT.replace("inverted)]", 'inverted), ("copy", inverted)]')
 
 
 def system(
@@ -139,6 +143,36 @@ def test_an_image_goes_to_several_domains(tmp_path: Path, width: int) -> None:
     assert entities(made, "firm_cdc_message") == 3
     assert entities(made, "firm_axis_resize") == 3
     check(made, 0, 60)
+
+
+@pytest.mark.parametrize("width", [8, 16])
+def test_every_path_between_the_clocks_of_a_system_is_synchronised(tmp_path: Path, width: int) -> None:
+    """The top level with all that it holds, as a netlist; that does the same, too."""
+    shutil.copy(DATA / "invert.vhd", tmp_path)
+    blocks = [
+        converter("sub", "subscriber", IMAGE, "acc", "other"),
+        block("acc", "invert", "pub", clock="fast"),
+        block("other", "invert", "copy", clock="slow"),
+        *(converter(name, "publisher", IMAGE, buffer=500) for name in ("pub", "copy")),
+    ]
+    stimuli = bag(tmp_path, IMAGE, values(IMAGE, 4))
+    clocks = project(8, "100 MHz", fast="270 MHz", slow="31 MHz")
+    accelerator = {**image_accelerator(length="given"), "width": width}
+    made = system(tmp_path, stimuli, TWICE, clocks, [accelerator], blocks)
+    check(made, 20)
+    # What synthesis has in place of the synchronisers of simulation.
+    Library("firm", made.folder).analyse(core_files("cdc/sync", "cdc/cdc"))
+    made.work.analyse(made.folder / f"{made.entity}{end}.vhd" for end in ("", "_tb"))
+    assert made.work.latches(made.entity) == []
+    sides = {"clk": "clk", "clk_fast": "fast", "clk_slow": "slow"}
+    domains = Domains(sides, lambda port: "clk", held=("fields_r",))
+    verilog = made.work.synthesise(made.entity, language="verilog")
+    assert unsynchronised(verilog, made.entity, tmp_path, domains) == []
+    # It sees all of them: with the fields there is something.
+    assert unsynchronised(verilog, made.entity, tmp_path, replace(domains, held=()))
+    if width == 8:
+        made.replace_by_netlist()
+        check(made, 20)
 
 
 def pass_through(folder: Path, name: str, message: str, width: int) -> dict[str, Any]:
