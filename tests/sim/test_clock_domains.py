@@ -204,13 +204,19 @@ def pass_through(folder: Path, name: str, message: str, width: int) -> dict[str,
     return accelerator
 
 
-@pytest.mark.parametrize(("own", "other"), [CLOCKS[0], CLOCKS[2]])
-@pytest.mark.parametrize(("width", "other_width"), [(8, 32), (64, 16)])
-@pytest.mark.parametrize(
-    "message", ["sensor_msgs/PointCloud2", "geometry_msgs/PolygonStamped", "diagnostic_msgs/DiagnosticArray"]
+# Elements with fields only, with a string each, with strings and elements of their own, and arrays of all kinds.
+ELEMENTS = (
+    "geometry_msgs/PolygonStamped",
+    "sensor_msgs/PointCloud2",
+    "diagnostic_msgs/DiagnosticArray",
+    "trajectory_msgs/JointTrajectory",
+    "rcl_interfaces/ParameterEvent",
 )
+
+
+@pytest.mark.parametrize(("width", "other_width", "own", "other"), [(8, 32, *CLOCKS[0]), (64, 16, *CLOCKS[2])])
+@pytest.mark.parametrize("message", ELEMENTS)
 def test_elements_go_through(tmp_path: Path, message: str, width: int, other_width: int, own: str, other: str) -> None:
-    """Elements with fields only, with a string each, and with strings and elements of their own."""
     accelerator = pass_through(tmp_path, "way", message, other_width)
     blocks = [
         converter("sub", "subscriber", message, "left", "middle", "right"),
