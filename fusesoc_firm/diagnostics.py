@@ -37,6 +37,12 @@ class SourceRef:
         return f"{number} | {self.text}\n{' ' * len(number)} | {indent}{underline}"
 
 
+def byte_place(file: str, data: bytes, position: int) -> SourceRef:
+    """The place of a byte in a file that is no text; its column counts bytes."""
+    line_start = data.rfind(b"\n", 0, position) + 1
+    return SourceRef(file, data.count(b"\n", 0, position) + 1, position - line_start + 1)
+
+
 @dataclass(frozen=True)
 class Diagnostic:
     """One fault: a sentence, its place (None where the input has no lines) and, if known, what is legal."""
@@ -99,11 +105,18 @@ def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoRet
 def nearest(word: str, choices: Iterable[str]) -> str:
     """A hint for an unknown word: the nearest legal one, or the legal ones if none is near."""
     legal = sorted(set(choices))
-    lowered = {choice.lower(): choice for choice in legal}
-    close = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
-    if close:
-        return f"did you mean '{lowered[close[0]]}'?"
+    if near := closest(word, legal):
+        return f"did you mean '{near}'?"
     if not legal:
         return ""
     shown = ", ".join(legal[:20]) + (", ..." if len(legal) > 20 else "")
     return f"legal here: {shown}"
+
+
+def closest(word: str, choices: Iterable[str]) -> str | None:
+    """The word that was probably meant, whichever letters are capitals; None if none is near."""
+    lowered = {choice.lower(): choice for choice in sorted(set(choices))}
+    # Two letters exchanged are nearer than a letter lost: `clocsk` is `clocks`, not `clock`.
+    close = [choice for choice in lowered if sorted(choice) == sorted(word.lower())]
+    close = close or difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    return lowered[close[0]] if close else None

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, TypeVar
 
+from fusesoc_firm import __version__
 from fusesoc_firm.diagnostics import fail
 
 Task = TypeVar("Task")
@@ -61,12 +63,17 @@ def local_workers(jobs: int | None = None) -> Iterator[Workers]:
 
 @contextmanager
 def cluster_workers(address: str) -> Iterator[Workers]:
-    """The workers of the Dask cluster whose scheduler is at `address`. Raises `InputError` if there is none."""
+    """The workers of the Dask cluster whose scheduler is at `address`, such as tcp://10.0.0.1:8786.
+
+    Raises `InputError` if none answers, if it has no workers or its workers cannot do our tasks, and if it is lost.
+    """
     try:
         # Its types are partial.
         distributed: Any = import_module("distributed")
     except ImportError:
         fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
+    # What is lost is told here, once and in a sentence.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         client = distributed.Client(address, timeout=_CONNECT_SECONDS)
     except (OSError, ValueError) as error:
@@ -75,11 +82,32 @@ def cluster_workers(address: str) -> Iterator[Workers]:
         count = sum(client.ncores().values())
         if not count:
             fail(f"the Dask cluster at '{address}' has no workers", hint=f"start some: dask worker {address}")
+        _check_versions(client, address)
         executor = client.get_executor(pure=False)
         try:
             yield Workers(executor, count)
+        except (CancelledError, distributed.KilledWorker) as error:
+            fail(
+                f"the Dask cluster at '{address}' was lost", hint=" ".join(str(error).split()) or "its scheduler ended"
+            )
         finally:
             executor.shutdown(wait=False)
+
+
+def _check_versions(client: Any, address: str) -> None:
+    """The workers must have what we have: results are to be the same wherever they come from."""
+    found = client.run(_version, on_error="return")
+    for worker, version in sorted(found.items()):
+        if version != __version__:
+            has = f"has {version}" if isinstance(version, str) else "cannot import it"
+            fail(
+                f"the Dask cluster at '{address}' cannot do this: its worker {worker} {has}",
+                hint=f"all workers need fusesoc-firm {__version__}",
+            )
+
+
+def _version() -> str:
+    return __version__
 
 
 def _leave_interrupts_to_the_parent() -> None:

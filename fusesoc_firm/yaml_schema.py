@@ -49,7 +49,11 @@ def _define(section: type[Section], definitions: dict[str, Schema]) -> None:
 def _spelt(name: str, entry: Key) -> Schema:
     """That a key is there, in one of its spellings."""
     ways = [{"required": [spelling]} for spelling in (name, *entry.aliases)]
-    return ways[0] if len(ways) == 1 else {"oneOf": ways}
+    found = ways[0] if len(ways) == 1 else {"oneOf": ways}
+    if entry.unless is None:
+        return found
+    other, value = entry.unless
+    return {"anyOf": [{"properties": {other: {"const": value}}, "required": [other]}, found]}
 
 
 def _property(entry: Key) -> Schema:

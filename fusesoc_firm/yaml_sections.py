@@ -8,12 +8,13 @@ So all faults of a file come at once, and who works on it can tell a fault from 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import yaml
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, closest, nearest
 from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind
 
 S = TypeVar("S", bound="Section")
@@ -21,10 +22,16 @@ S = TypeVar("S", bound="Section")
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A mapping of the file. Its place and whether all of it could be read are no keys."""
+    """A mapping of the file. Its places, and whether all of it could be read, are no keys."""
 
     source: SourceRef
     is_sound: bool = True
+    # Where the value of each key stands that was given, by the field's name.
+    places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+
+    def place(self, field: str) -> SourceRef:
+        """Where the value of a field's key stands; of one that was not given, where the section does."""
+        return self.places.get(field, self.source)
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,7 @@ class Key:
 
     `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list), the last two of type
     `section`. `aliases` are other spellings of the key. `choices` are all legal values, if they can be listed.
+    A required key may be left out beside another one, by name, with a certain value: `unless`.
     `only_of` is the kind of thing that may have the key, where its section tells of several kinds.
     """
 
@@ -41,9 +49,14 @@ class Key:
     name: str = ""
     aliases: tuple[str, ...] = ()
     is_required: bool = False
+    unless: tuple[str, str] | None = None
     choices: tuple[str | int, ...] = ()
     section: type[Section] | None = None
     only_of: str = ""
+
+    def is_needed(self, others: Mapping[str, object]) -> bool:
+        """Whether the key must be there beside `others`, given as words."""
+        return self.is_required and (self.unless is None or others.get(self.unless[0]) != self.unless[1])
 
 
 def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
@@ -88,36 +101,40 @@ class _Reader:
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
-            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node)
+            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node, _words_of_keys(section))
             return _empty(section, source)
         known = keys_of(section)
         given = self._given(known, node, what)
         values = {known[name][0]: self._value(known[name][1], value, name) for name, value in given.items()}
         found = {field: value for field, value in values.items() if value is not None}
         blanks = _blanks(section, source)
+        needed = {known[name][0] for name in _needed(known, given)}
         # What lies behind a fault of the file's form is not known.
-        is_sound = len(self.faults.found) == before and blanks.keys() <= found.keys() and not self.file.is_cut
-        return section(source=source, is_sound=is_sound, **(blanks | found))
+        is_sound = len(self.faults.found) == before and needed <= found.keys() and not self.file.is_cut
+        places = {known[name][0]: self.file.source(value) for name, value in given.items()}
+        return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
         """The nodes of the known keys that were given a value, by the key's own name."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
-        hints = []
+        meant: set[str] = set()
         for text, key_node, value in items(self.file, node, self.faults):
             name = spellings.get(text)
             if name is None:
-                hints.append(nearest(text, known))
-                self._error(f"{what} has no key '{text}'", key_node, hints[-1])
+                near = closest(text, spellings)
+                meant |= {spellings[near]} if near else set()
+                self._error(f"{what} has no key '{text}'", key_node, nearest(text, [near] if near else known))
             elif name in given:
                 self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
             elif not is_null(value) or (known[name][1].is_required and not self.file.is_cut):
                 given[name] = value
-        for name, (_, entry) in known.items():
+        needed = _needed(known, given)
+        for name in needed:
             # A key that is only misspelt is no second fault.
-            if entry.is_required and name not in given and not self.file.is_cut and not _names(hints, name):
-                self._error(f"{what} needs the key '{name}': {entry.meaning}", node)
-        return given
+            if name not in given and not self.file.is_cut and name not in meant:
+                self._error(f"{what} needs the key '{name}': {known[name][1].meaning}", node)
+        return {name: value for name, value in given.items() if not is_null(value) or name in needed}
 
     def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
         """The value of a key in its form, or None if it does not fit."""
@@ -133,7 +150,7 @@ class _Reader:
                     self._error(f"'{name}' is an empty list", node, entry.meaning)
                 return None if None in texts else tuple(texts)
             case "integer":
-                return self._chosen(entry, self._integer(node, name), node, name)
+                return self._chosen(entry, self._integer(node, entry, name), node, name)
             case _:
                 return self._chosen(entry, self._text(node, entry, name), node, name)
 
@@ -151,10 +168,10 @@ class _Reader:
         self._error(f"'{name}' must be a word, not {kind(node)}", node, entry.meaning)
         return None
 
-    def _integer(self, node: yaml.Node, name: str) -> int | None:
+    def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
             return int(yaml.safe_load(node.value))
-        self._error(f"'{name}' must be an integer, not {kind(node)}", node)
+        self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
         return None
 
     def _chosen(self, entry: Key, value: Any, node: yaml.Node, name: str) -> Any:
@@ -167,6 +184,12 @@ class _Reader:
 
     def _error(self, message: str, node: yaml.Node, hint: str = "") -> None:
         self.faults.error(message, self.file.source(node), hint)
+
+
+def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:
+    """The names of the keys that must be there beside those that are given."""
+    words = {name: value.value for name, value in given.items()}
+    return [name for name, (_, entry) in known.items() if entry.is_needed(words)]
 
 
 def _blanks(section: type[Section], source: SourceRef) -> dict[str, Any]:
@@ -192,8 +215,11 @@ def _empty(section: type[S], source: SourceRef) -> S:
     return section(source=source, is_sound=False, **_blanks(section, source))
 
 
-def _names(hints: list[str], name: str) -> bool:
-    return f"did you mean '{name}'?" in hints
+def _words_of_keys(section: type[Section]) -> str:
+    """The keys that a section needs, or those that it may have if it needs none."""
+    keys = keys_of(section)
+    required = [name for name, (_, entry) in keys.items() if entry.is_required]
+    return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
 
 
 def _section_type(entry: Key) -> type[Section]:

@@ -14,10 +14,14 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
+# What PyYAML finds where a line's indentation fits none of those above it.
+_INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", "mapping values are not allowed here")
+# What a block may begin with: the dash of a list's item, or the first word of a line that is no comment.
+_BLOCK_BEGIN = re.compile(r" *(-(?= )|[^\s#:-][^\s:]*)")
 # The ends of lines that PyYAML counts.
 _LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 
@@ -73,7 +77,7 @@ def read_yaml(path: Path, file: str | None = None, faults: Diagnostics | None = 
     except OSError as error:
         fail(f"cannot read {name}: {error.strerror}")
     except UnicodeDecodeError as error:
-        fail(f"{name} is not UTF-8: byte {error.start} is 0x{error.object[error.start]:02x}")
+        fail(f"byte 0x{error.object[error.start]:02x} is not UTF-8", byte_place(name, error.object, error.start))
     noted = Diagnostics() if faults is None else faults
     read = parse_yaml(text, name, noted)
     if faults is None:
@@ -119,7 +123,34 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
     line, column = len(lines) - 1, max(0, len(lines[-1]) - 1)
     if mark is not None and mark.line < len(lines):
         line, column = mark.line, mark.column
+        if problem.startswith(_INDENTATION_PROBLEMS):
+            hint = _indentation_hint(lines, line) or hint
     faults.error(f"this is not YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
+
+
+def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
+    """How far a line is indented, and how far what is still open above it; empty if it fits one of these."""
+    indent = len(lines[number]) - len(lines[number].lstrip(" "))
+    # What each open block begins with, by the blanks in front of it, the outermost first.
+    open_blocks: dict[int, str] = {}
+    for above, line in enumerate(lines[:number]):
+        for start, word in _block_begins(line):
+            open_blocks = {blanks: begin for blanks, begin in open_blocks.items() if blanks <= start}
+            open_blocks.setdefault(start, f"{word}, line {above + 1}")
+    if indent in open_blocks or not open_blocks:
+        return ""
+    legal = ", ".join(f"{blanks} ({begin})" for blanks, begin in open_blocks.items())
+    return f"the line is indented by {indent}, what is open above it by {legal}"
+
+
+def _block_begins(line: str) -> Iterator[tuple[int, str]]:
+    """The column, from 0, and the word of each block that may begin in a line: several behind the dash of an item."""
+    position = 0
+    while found := _BLOCK_BEGIN.match(line, position):
+        yield found.start(1), found[1]
+        if found[1] != "-":
+            return
+        position = found.end()
 
 
 def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
@@ -149,12 +180,13 @@ def items(
     yaml_text: YamlText, node: yaml.MappingNode, faults: Diagnostics
 ) -> Iterator[tuple[Text, yaml.ScalarNode, yaml.Node]]:
     """Key text, key node and value node of each item; a key that is no scalar, or comes twice, is a fault."""
-    seen: set[str] = set()
+    seen: dict[str, SourceRef] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):
             faults.error("a key must be a word", yaml_text.source(key))
         elif key.value in seen:
-            faults.error(f"key '{key.value}' is given twice", yaml_text.source(key))
+            first = f"the first is at {seen[key.value]}"
+            faults.error(f"key '{key.value}' is given twice", yaml_text.source(key), first)
         else:
-            seen.add(key.value)
+            seen[key.value] = yaml_text.source(key)
             yield yaml_text.text(key), key, value

@@ -11,7 +11,9 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "fusesoc_firm"
 
 _WORDS = {"diagnostics", "naming"}
-_MESSAGE = _WORDS | {"message"}
+# Plain data that says how a middleware serialises.
+_WIRE = _WORDS | {"wire"}
+_MESSAGE = _WIRE | {"message"}
 _FRAME = _MESSAGE | {"frame"}
 # What every stage that makes files may use: it knows no stage.
 _WRITING = {"generation", "render"}
@@ -24,7 +26,8 @@ _SYSTEM = _CONVERTER | {"system"}
 ALLOWED: dict[str, set[str]] = {
     "diagnostics": set(),
     "naming": set(),
-    "message": _WORDS,
+    "wire": set(),
+    "message": _WIRE,
     "frame": _MESSAGE,
     "converter": _FRAME | _WRITING | _READING,
     # It knows requesters, not systems.

@@ -141,7 +141,7 @@ def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Config
     return {
         "entity": entity,
         "message": str(frame.message),
-        "ros": int(frame.ros),
+        "middleware": frame.ros.title,
         "payload_bytes": frame.payload_bytes,
         "width": stream.width,
         "data_high": stream.width - 1,

@@ -13,12 +13,12 @@ from itertools import groupby
 from typing import Any
 
 from fusesoc_firm.converter.ports import vhdl_type
-from fusesoc_firm.frame.layout import RULES
 from fusesoc_firm.frame.model import COUNT_BYTES
-from fusesoc_firm.frame.rules import CHARACTER, WIDE_CHARACTER
+from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import Constant, MessageName, RosVersion, StringType, nested_message
 from fusesoc_firm.message.signature import Definitions, signature
 from fusesoc_firm.naming import distinct_constants, entity_name
+from fusesoc_firm.wire import CHARACTER, WIDE_CHARACTER
 
 CONSTANTS_TEMPLATE = "vhdl/constants.vhd"
 SIGNATURE = "SIGNATURE"
@@ -69,7 +69,7 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
     return {
         "package": package,
         "message": str(name),
-        "ros": int(ros),
+        "middleware": ros.title,
         "signature": _declaration(SIGNATURE, f"string(1 to {len(sum_)})", _characters(sum_)),
         "has_values": bool(numbers),
         "values": _aligned([_value(item, own, ros) for item, own in zip(numbers, values, strict=True)]),
@@ -102,7 +102,7 @@ def _collect(name: MessageName, definitions: Definitions, found: list[MessageNam
 
 def _value(item: _Placed, name: str, ros: RosVersion) -> dict[str, Any]:
     """A number or a bool, as the bits that it has at a port."""
-    wire = RULES[ros].scalars[str(item.constant.type)]
+    wire = middleware_of(ros).rules.scalars[str(item.constant.type)]
     digits = struct.pack(f">{wire.code}", item.constant.value).hex()
     is_bit = wire.bits == 1
     return {

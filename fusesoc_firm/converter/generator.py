@@ -102,7 +102,7 @@ def _order(request: Request) -> Order:
 
 def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:
     """`<name>.vhd` of each name of a converter, whose text is `vhdl`, that is not its own."""
-    message = f"{frame.message} (ROS {int(frame.ros)})"
+    message = f"{frame.message} ({frame.ros.title})"
     return {
         f"{name}.vhd": GeneratedFile(
             render(INTERFACE_TEMPLATE, interface_configuration(name, converter, vhdl, message)), VHDL

@@ -82,7 +82,7 @@ def order_of_message(
         _check_no_selection(selection, text)
     frames = [select(frame_of(each, definitions), selection.include, selection.exclude) for each in names]
     messages = tuple(Wanted(frame, definitions, directions) for frame in frames)
-    facts = [f"ROS {int(library.ros)}"]
+    facts = [f"{library.ros.title}"]
     if interface is None:
         facts.append(signature(name, definitions))
     elif interface.has_signature:
@@ -152,7 +152,7 @@ def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], faults: Diagn
             entity = ENTITIES[direction](wanted.frame)
             _, twin = owners.setdefault(entity, (direction, wanted.frame))
             if twin.message == wanted.message and twin.ros is not wanted.ros:
-                message = f"'{wanted.message}' needs the entity '{entity}' for ROS {int(twin.ros)} already"
+                message = f"'{wanted.message}' needs the entity '{entity}' for {twin.ros.title} already"
                 faults.error(message, entry.name.source, "one project has a message in one ROS version each way")
     for entry, wanted in found:
         own = {"subscriber": entry.subscribers, "publisher": entry.publishers}

@@ -66,7 +66,7 @@ def payload_length_configuration(frame: Frame, suffix: str = "") -> Configuratio
     return {
         "entity": length_entity(frame, suffix),
         "message": str(frame.message),
-        "ros": int(frame.ros),
+        "middleware": frame.ros.title,
         "summand_count": len(total.elements),
         "has_paddings": total.modulus > 1,
         "chain_length": _chain_length(total.statements),

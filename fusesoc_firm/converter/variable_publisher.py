@@ -84,7 +84,7 @@ class _Publisher:
         checked = [name for name, found in [("stream", self._streams), ("elements", self._closings)] if found]
         return {
             "message": str(self.frame.message),
-            "ros": int(self.frame.ros),
+            "middleware": self.frame.ros.title,
             "width": self.width,
             "data_high": self.width - 1,
             "keep_high": self.lanes - 1,

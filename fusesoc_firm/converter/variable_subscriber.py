@@ -94,7 +94,7 @@ class _Subscriber:
         end = len(self.steps) - 1
         return {
             "message": str(self.frame.message),
-            "ros": int(self.frame.ros),
+            "middleware": self.frame.ros.title,
             "width": self.window.width,
             "lanes": self.lanes,
             "data_high": self.window.width - 1,

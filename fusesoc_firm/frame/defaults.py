@@ -59,6 +59,12 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
     return bytes(payload)
 
 
+def completed(frame: Frame, message: MessageValue) -> MessageValue:
+    """The message with what is missing in it: fields that are not used, by their defaults, zero or empty."""
+    filled: MessageValue = _filled(_as_sent(frame.nodes, message, 0), message)
+    return filled
+
+
 def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
     """A message, or an element `depth` names below it, with what is not used as its default, or empty."""
     sent: dict[str, Any] = deepcopy(dict(value)) if isinstance(value, Mapping) else {}

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad, WireType
+from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad
 from fusesoc_firm.frame.values import (
     BytesLike,
     CodecError,
@@ -19,6 +19,7 @@ from fusesoc_firm.frame.values import (
     shown,
     units_of,
 )
+from fusesoc_firm.wire import WireType
 
 
 def encode(frame: Frame, message: MessageValue) -> bytes:

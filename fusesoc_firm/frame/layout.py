@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fusesoc_firm.frame.cdr import CDR_RULES
 from fusesoc_firm.frame.model import (
     COUNT_BYTES,
     Data,
@@ -20,11 +19,9 @@ from fusesoc_firm.frame.model import (
     Path,
     Run,
     Step,
-    WireType,
 )
 from fusesoc_firm.frame.position import Position
-from fusesoc_firm.frame.ros1 import ROS1_RULES
-from fusesoc_firm.frame.rules import CHARACTER, WIDE_CHARACTER, WireRules
+from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import (
     ArrayType,
     DefaultValue,
@@ -35,19 +32,18 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
     StringType,
 )
+from fusesoc_firm.wire import CHARACTER, WIDE_CHARACTER, WireRules, WireType
 
-RULES: Mapping[RosVersion, WireRules] = {RosVersion.ROS1: ROS1_RULES, RosVersion.ROS2: CDR_RULES}
 Definitions = Mapping[MessageName, MessageDefinition]
 
 
 def frame_of(name: MessageName, definitions: Definitions) -> Frame:
     """The frame of message `name`; `definitions` holds it and every message below it."""
     definition = definitions[name]
-    rules = RULES[definition.ros]
+    rules = middleware_of(definition.ros).rules
     walk = _Walk(_Types(rules, definitions), Position(rules.max_alignment, frozenset({0})), size=len(rules.prefix))
     walk.message(definition, ())
     return Frame(

@@ -19,24 +19,11 @@ from math import prod
 
 from fusesoc_firm.diagnostics import SourceRef
 from fusesoc_firm.message.model import DefaultValue, MessageName, RosVersion
+from fusesoc_firm.wire import WireType
 
 ID_BYTES = 1
 LENGTH_BYTES = 4
 COUNT_BYTES = 4
-
-
-@dataclass(frozen=True)
-class WireType:
-    """How an element of a field is sent: its size in bytes and the `struct` code of its value."""
-
-    name: str
-    size: int
-    code: str
-
-    @property
-    def bits(self) -> int:
-        """Bits of an element at a converter's port: a bool is one bit there although it is a byte on the wire."""
-        return 1 if self.name == "bool" else 8 * self.size
 
 
 @dataclass(frozen=True)

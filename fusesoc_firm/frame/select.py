@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
 from fusesoc_firm.frame.model import Fixed, Frame, Loop, NameTree, Node, Pad, all_nodes
@@ -40,6 +41,24 @@ def names_in_use(frame: Frame) -> frozenset[Names]:
 def with_names_in_use(frame: Frame, names: Collection[Names]) -> Frame:
     """The frame with just the leaves of these names used."""
     return replace(frame, nodes=_Marking(lambda leaf: leaf in names).marked(frame.nodes))
+
+
+def used_part(message: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
+    """What a message holds of the fields that are used."""
+    found: dict[str, Any] = _part(message, names_in_use(frame))
+    return found
+
+
+def _part(value: Any, leaves: Collection[Names]) -> Any:
+    """What lies on the way to the leaves; the elements of an array are parted alike."""
+    if () in leaves:
+        return value
+    if not isinstance(value, Mapping):
+        return [_part(item, leaves) for item in value]
+    below: dict[str, set[Names]] = {}
+    for name, *rest in leaves:
+        below.setdefault(name, set()).add(tuple(rest))
+    return {name: _part(inner, below[name]) for name, inner in value.items() if name in below}
 
 
 def _is_chosen(names: Names, include: Collection[str], exclude: Collection[str]) -> bool:

@@ -26,7 +26,7 @@ class Row:
 def rows(name: MessageName, definitions: Mapping[MessageName, MessageDefinition], frame: Frame) -> Iterator[Row]:
     """The rows of a message, outer ones first."""
     is_fixed = frame.is_fixed_size
-    title = f"ROS {int(frame.ros)}"
+    title = f"{frame.ros.title}"
     yield Row(0, str(name), title, 8 * frame.payload_bytes if is_fixed else None, 0 if is_fixed else None)
     yield from _fields(definitions[name], definitions, (), _leaves(frame))
 

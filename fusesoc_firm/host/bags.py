@@ -18,14 +18,14 @@ from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived import Converter
+from fusesoc_firm.system.derived import Topic
 
-Recorded = tuple[Converter, bytes, dict[str, Any]]
+Recorded = tuple[Topic, bytes, dict[str, Any]]
 Stream = tuple[str, str]
 """Topic and type."""
 
 
-def read_bag(path: Path, subscribers: Sequence[Converter]) -> Iterator[Recorded]:
+def read_bag(path: Path, subscribers: Sequence[Topic]) -> Iterator[Recorded]:
     """Subscriber, payload and decoded message of all messages, by time. Raises `InputError`."""
     ros, connections, messages = _read(path)
     routes = _routes(connections, ros, subscribers, path)
@@ -57,11 +57,11 @@ def _stream(connection: Connection) -> Stream:
 
 
 def _routes(
-    connections: Sequence[Connection], ros: RosVersion, subscribers: Sequence[Converter], path: Path
-) -> dict[Stream, Converter]:
+    connections: Sequence[Connection], ros: RosVersion, subscribers: Sequence[Topic], path: Path
+) -> dict[Stream, Topic]:
     """The subscriber of each topic that has one. Raises `InputError` with every topic that does not fit."""
     faults = Diagnostics()
-    routes: dict[Stream, Converter] = {}
+    routes: dict[Stream, Topic] = {}
     for connection in connections:
         try:
             message = parse_name(connection.msgtype)
@@ -72,8 +72,8 @@ def _routes(
         named = [item for item in speaking if item.block == connection.topic.strip("/").replace("/", "_")]
         chosen = named or speaking
         if fitting and not speaking:
-            block, spoken = fitting[0].block, int(fitting[0].frame.ros)
-            faults.error(f"topic {connection.topic} of {path} is of ROS {int(ros)}, but '{block}' speaks ROS {spoken}")
+            block, spoken = fitting[0].block, fitting[0].frame.ros.title
+            faults.error(f"topic {connection.topic} of {path} is of {ros.title}, but '{block}' speaks {spoken}")
         elif len(chosen) > 1:
             names = ", ".join(item.block for item in chosen)
             faults.error(

@@ -9,29 +9,32 @@ from fusesoc_firm.frame.codec import pack_frame, used_bytes
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.host.reference import Response
 from fusesoc_firm.host.stimuli import Stimulus
-from fusesoc_firm.system.derived import Converter
+from fusesoc_firm.system.derived import Converter, Topic
 
 _BYTES_A_LINE = 32
 _LABEL_WIDTH = 160
 
 
-def stimulus_text(stimuli: Iterable[Stimulus]) -> str:
+def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter]) -> str:
     """The stimulus file."""
+    ids = {item.block: item.id for item in subscribers}
     lines: list[str] = []
     for stimulus in stimuli:
         lines.append(f"> {_label(stimulus.subscriber, stimulus.message)}")
-        lines += _hex_lines(pack_frame(stimulus.subscriber.id, stimulus.payload), None)
+        lines += _hex_lines(pack_frame(ids[stimulus.subscriber.block], stimulus.payload), None)
     return "\n".join(lines) + "\n"
 
 
-def expected_text(responses: Iterable[Response]) -> str:
+def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]) -> str:
     """The expected file; padding may hold any byte."""
+    ids = {item.block: item.id for item in publishers}
     lines: list[str] = []
     for response in responses:
         publisher = response.publisher
-        lines.append(f"< @{response.cause} {_label(publisher, response.message)}")
+        cause = "" if response.cause is None else f"@{response.cause} "
+        lines.append(f"< {cause}{_label(publisher, response.message)}")
         used = b"\1" * (ID_BYTES + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
-        lines += _hex_lines(pack_frame(publisher.id, response.payload), used)
+        lines += _hex_lines(pack_frame(ids[publisher.block], response.payload), used)
     return "\n".join(lines) + "\n"
 
 
@@ -42,10 +45,10 @@ def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:
         yield "  " + " ".join(digits[first : first + _BYTES_A_LINE])
 
 
-def _label(converter: Converter, message: dict[str, Any]) -> str:
+def _label(topic: Topic, message: dict[str, Any]) -> str:
     """Block, type and values on one line of plain ASCII, cut where it gets long."""
     values = " ".join(f"{name}={value}" for name, value in _values(message))
-    label = f"{converter.block} {converter.frame.message} {values}".encode("ascii", "replace").decode()
+    label = f"{topic.block} {topic.frame.message} {values}".encode("ascii", "replace").decode()
     return label if len(label) <= _LABEL_WIDTH else label[: _LABEL_WIDTH - 3] + "..."
 
 

@@ -10,6 +10,7 @@ from fusesoc_firm.host.environment import environment_files
 from fusesoc_firm.host.frames import expected_text, stimulus_text
 from fusesoc_firm.host.kernel import kernel_files
 from fusesoc_firm.host.reference import responses
+from fusesoc_firm.host.software import answered, stimulated, traffic
 from fusesoc_firm.host.stimuli import read_stimuli
 from fusesoc_firm.render import render
 from fusesoc_firm.system import generator
@@ -26,8 +27,9 @@ def generate(request: Request) -> GeneratedCore:
     """The core; it belongs beside the one that the same specification gives as a system. Raises `InputError`."""
     loaded = generator.load_requested(request)
     system = loaded.system
-    stimuli = read_stimuli(_path(request, "stimuli"), system.subscribers)
-    expected = responses(_path(request, "model"), stimuli, system.publishers)
+    stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
+    answers = responses(_path(request, "model"), stimuli, answered(system))
+    found = traffic(system, loaded.folder, stimuli, answers)
     files: dict[str, GeneratedFile] = {}
     for accelerator in system.accelerator_types:
         if accelerator.accelerator.type == "HLS":
@@ -41,8 +43,8 @@ def generate(request: Request) -> GeneratedCore:
     files |= {str(path): file for path, file in environment.items()}
     files |= {
         f"{system.entity}_tb.vhd": GeneratedFile(bench, "vhdlSource-93"),
-        "stimulus.txt": GeneratedFile(stimulus_text(stimuli), "user", copyto="stimulus.txt"),
-        "expected.txt": GeneratedFile(expected_text(expected), "user", copyto="expected.txt"),
+        "stimulus.txt": GeneratedFile(stimulus_text(found.stimuli, system.subscribers), "user", copyto="stimulus.txt"),
+        "expected.txt": GeneratedFile(expected_text(found.responses, system.publishers), "user", copyto="expected.txt"),
     }
     return GeneratedCore(f"Simulation of system {system.name}", files)
 

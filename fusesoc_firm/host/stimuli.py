@@ -3,6 +3,8 @@
 A YAML file is a list; each item names the subscriber's block and gives its message:
 
     - QuaternionToEuler_sub: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
+
+Fields that the subscriber has no port for may be left out; they are sent as their defaults, zero or empty.
 """
 
 from __future__ import annotations
@@ -16,9 +18,10 @@ import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, fail, nearest
 from fusesoc_firm.frame.codec import decode, encode
+from fusesoc_firm.frame.defaults import completed
 from fusesoc_firm.host.bags import read_bag
 from fusesoc_firm.host.yaml_message import read_message
-from fusesoc_firm.system.derived import Converter
+from fusesoc_firm.system.derived import Topic
 from fusesoc_firm.yaml_text import YamlText, is_null, kind, read_yaml
 
 _YAML_SUFFIXES = (".yaml", ".yml")
@@ -28,12 +31,12 @@ _YAML_SUFFIXES = (".yaml", ".yml")
 class Stimulus:
     """A message for a subscriber: its payload as the middleware serialises it, and the same decoded."""
 
-    subscriber: Converter
+    subscriber: Topic
     payload: bytes
     message: dict[str, Any]
 
 
-def read_stimuli(path: Path, subscribers: Sequence[Converter]) -> list[Stimulus]:
+def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     """All messages of a file or bag, in its order. Raises `InputError`; a file without a message is one, too."""
     if not path.exists():
         fail(f"there are no stimuli at {path}")
@@ -47,7 +50,7 @@ def read_stimuli(path: Path, subscribers: Sequence[Converter]) -> list[Stimulus]
     return stimuli
 
 
-def _from_yaml(path: Path, subscribers: Sequence[Converter]) -> list[Stimulus]:
+def _from_yaml(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     faults = Diagnostics()
     text = read_yaml(path, faults=faults)
     known = {subscriber.block: subscriber for subscriber in subscribers}
@@ -65,7 +68,7 @@ def _from_yaml(path: Path, subscribers: Sequence[Converter]) -> list[Stimulus]:
     return [stimulus for stimulus in stimuli if stimulus is not None]
 
 
-def _item(text: YamlText, node: yaml.Node, known: dict[str, Converter], faults: Diagnostics) -> Stimulus | None:
+def _item(text: YamlText, node: yaml.Node, known: dict[str, Topic], faults: Diagnostics) -> Stimulus | None:
     """One item of the list; None, with its faults noted, if it is no message."""
     if not isinstance(node, yaml.MappingNode) or len(node.value) != 1:
         faults.error("a stimulus is one block with its message: '- <subscriber>: {...}'", text.source(node))
@@ -79,5 +82,5 @@ def _item(text: YamlText, node: yaml.Node, known: dict[str, Converter], faults: 
     message = read_message(text, value, subscriber.frame, faults)
     if len(faults.found) > before:
         return None
-    payload = encode(subscriber.frame, message)
+    payload = encode(subscriber.frame, completed(subscriber.frame, message))
     return Stimulus(subscriber, payload, decode(subscriber.frame, payload))

@@ -16,8 +16,9 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, nearest
-from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, Loop, Path, WireType, all_nodes
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, Loop, Path, all_nodes
 from fusesoc_firm.frame.values import CodecError, check_bound, units_of
+from fusesoc_firm.wire import WireType
 from fusesoc_firm.yaml_text import YamlText, is_null, items, kind
 
 _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
@@ -27,7 +28,8 @@ _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
 class _Branch:
     """A field: each of its elements is a value of `type`, a `text`, or a message of `fields`.
 
-    An array of fixed size has `count` elements, one of variable size is an `array`.
+    An array of fixed size has `count` elements, one of variable size is an `array`. It must be given if `is_used`, or
+    if any of its `fields` is.
     """
 
     count: int | None = None
@@ -35,6 +37,7 @@ class _Branch:
     type: WireType | None = None
     text: Data | None = None
     fields: dict[str, _Branch] = field(default_factory=dict)
+    is_used: bool = False
 
     def at(self, path: Path) -> _Branch:
         """The field that a path leads to."""
@@ -43,9 +46,17 @@ class _Branch:
             branch = branch.fields.setdefault(step.name, _Branch(step.count))
         return branch
 
+    @property
+    def is_needed(self) -> bool:
+        """Whether somebody has a port for it or for something in it."""
+        return self.is_used or any(branch.is_needed for branch in self.fields.values())
+
 
 def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnostics) -> dict[str, Any]:
-    """The message of `frame` that a node holds; what does not fit is noted and left out."""
+    """The message of `frame` that a node holds; what does not fit is noted and left out.
+
+    Fields that are not used may be missing.
+    """
     if is_null(node) and not frame.names:
         return {}
     reader = _Reader(text, faults, str(frame.message))
@@ -58,15 +69,17 @@ def _tree(frame: Frame) -> _Branch:
         match node:
             case Fixed(fields=fields):
                 for leaf in fields:
-                    root.at(leaf.path).type = leaf.type
+                    branch = root.at(leaf.path)
+                    branch.type, branch.is_used = leaf.type, leaf.is_used
             case Data(kind=DataKind.ARRAY):
                 branch = root.at(node.path)
-                branch.array, branch.type = node, node.element
+                branch.array, branch.type, branch.is_used = node, node.element, node.is_used
             case Data():
-                root.at(node.path).text = node
+                branch = root.at(node.path)
+                branch.text, branch.is_used = node, node.is_used
             case Loop():
                 branch = root.at(node.path)
-                branch.count, branch.array = node.count, node
+                branch.count, branch.array, branch.is_used = node.count, node, node.is_used
     return root
 
 
@@ -93,7 +106,8 @@ class _Reader:
             else:
                 hints.append(nearest(key, branch.fields))
                 self._error(f"{what} has no field '{key}'", key_node, hints[-1])
-        missing = [name for name in branch.fields if name not in found and f"did you mean '{name}'?" not in hints]
+        needed = [name for name, field in branch.fields.items() if field.is_needed]
+        missing = [name for name in needed if name not in found and f"did you mean '{name}'?" not in hints]
         if missing:
             self._error(f"{what} needs a value for {', '.join(missing)}", node)
         return found

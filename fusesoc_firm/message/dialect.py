@@ -29,7 +29,7 @@ class NameRule:
 
     def fault(self, name: str, ros: RosVersion) -> str:
         """What is wrong with a name that is not accepted."""
-        return f"'{name}' is not a legal {self.kind} in ROS {ros}" if name else f"the {self.kind} is missing"
+        return f"'{name}' is not a legal {self.kind} in {ros.title}" if name else f"the {self.kind} is missing"
 
     @property
     def hint(self) -> str:

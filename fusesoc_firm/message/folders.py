@@ -6,7 +6,7 @@ In a package, a workspace of packages, a flat folder of packages, or an installe
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -15,14 +15,17 @@ from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
 # What catkin, colcon and ament leave out; colcon puts one into `build`, `install` and `log` itself.
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"})
 
-# The suffix of a file and the usual name of its folder.
+# The usual names of a file's folder; ROS has them as suffixes, too.
 _KINDS = tuple(InterfaceKind)
+_ROS_SUFFIXES = {kind.value: kind for kind in InterfaceKind}
 
 InterfaceFiles = dict[InterfaceKind, dict[MessageName, list[Path]]]
 
 
-def interface_files(folder: Path) -> InterfaceFiles:
+def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_SUFFIXES) -> InterfaceFiles:
     """Every file below a folder by kind and by the name that it defines; several where a name is given more than once.
+
+    The kind is that of the file's suffix.
 
     A file belongs to the package of the nearest `package.xml` above it. Without one, it belongs to the folder above
     `msg/`, `srv/` or `action/` or, in a flat layout, to the folder that it lies in. Folders that hide (`.git`) or carry
@@ -30,11 +33,11 @@ def interface_files(folder: Path) -> InterfaceFiles:
     """
     found: InterfaceFiles = {kind: {} for kind in _KINDS}
     packages: dict[Path, str] = {}
-    for path in _walk(folder):
+    for path in _walk(folder, suffixes):
         if path.parent not in packages:
             packages[path.parent] = _package_name(path.parent, folder)
         name = MessageName(packages[path.parent], path.stem)
-        found[InterfaceKind(path.suffix[1:])].setdefault(name, []).append(path)
+        found[suffixes[path.suffix[1:]]].setdefault(name, []).append(path)
     return found
 
 
@@ -50,7 +53,7 @@ def _entries(variable: str) -> list[Path]:
     return [Path(entry) for entry in variable.split(os.pathsep) if entry]
 
 
-def _walk(folder: Path) -> Iterator[Path]:
+def _walk(folder: Path, suffixes: Collection[str]) -> Iterator[Path]:
     """The files in a fixed order. Links are followed, as workspaces are made of them, but not in circles."""
     seen: set[str] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
@@ -60,7 +63,7 @@ def _walk(folder: Path) -> Iterator[Path]:
             continue
         seen.add(real)
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        yield from (Path(parent, name) for name in sorted(files) if Path(name).suffix[1:] in _KINDS)
+        yield from (Path(parent, name) for name in sorted(files) if Path(name).suffix[1:] in suffixes)
 
 
 def _package_name(parent: Path, folder: Path) -> str:

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
-from fusesoc_firm.message.dialect import dialect_of
-from fusesoc_firm.message.folders import InterfaceFiles, environment_folders, interface_files
+from fusesoc_firm.message.folders import InterfaceFiles, interface_files
+from fusesoc_firm.message.middleware import known_suffixes, middleware_of
 from fusesoc_firm.message.model import (
     InterfaceKind,
     MessageDefinition,
@@ -23,8 +23,6 @@ from fusesoc_firm.message.model import (
     RosVersion,
     nested_message,
 )
-from fusesoc_firm.message.parser import parse_message
-from fusesoc_firm.message.stores import DistributionStore, distributions
 from fusesoc_firm.message.unsupported import unsupported_word
 
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
@@ -39,12 +37,12 @@ class _Source:
 
 
 class MessageLibrary:
-    """All messages that one version of ROS can name, those of services and actions included.
+    """All messages that one middleware can name, those of services and actions included.
 
     `paths` are folders in order of precedence. `environment` is a mapping like `os.environ`; None leaves an installed
     ROS aside. `store` names the distribution behind all others (`noetic`, `jazzy`, ...). A message is taken from the
     first place that has it; in one place a `.msg` file goes before what a `.srv` or `.action` file implies. Raises
-    `InputError` for a folder that is missing or holds no such file.
+    `InputError` for a folder that is missing or holds no file that any middleware knows.
     """
 
     def __init__(
@@ -55,9 +53,10 @@ class MessageLibrary:
         store: str | None = None,
     ) -> None:
         self.ros = ros
-        self._store = DistributionStore(ros, store)
-        self._folders = [*paths, *(environment_folders(ros, environment) if environment is not None else ())]
-        found = {folder: interface_files(folder) for folder in self._folders}
+        self._middleware = middleware_of(ros)
+        self._store = self._middleware.store(store)
+        self._folders = [*paths, *(self._middleware.folders(environment) if environment is not None else ())]
+        found = {folder: interface_files(folder, self._middleware.suffixes) for folder in self._folders}
         _check_folders(path for path in paths if not any(found[path].values()))
         self._sources: dict[MessageName, _Source] = {}
         self._interfaces: dict[Interface, Path] = {}
@@ -159,7 +158,7 @@ class MessageLibrary:
             if interface:
                 found = interface.parse(text, file, faults)
             else:
-                found = {name: parse_message(text, name, self.ros, file, faults)}
+                found = {name: self._middleware.parse(text, name, self.ros, file, faults)}
         for each in interface.messages if interface else (name,):
             # One of a service's messages may come from a `.msg` file, which goes before the service.
             if self._sources.get(each) is source:
@@ -202,8 +201,8 @@ class MessageLibrary:
         same_type = [known for known in self.names() if known.name == name.name]
         if same_type:
             return str(same_type[0])
-        builtin_types = dialect_of(self.ros).builtin_types
-        primitives = difflib.get_close_matches(name.name, sorted(builtin_types), n=1, cutoff=0.8)
+        builtin_types = sorted(self._middleware.builtin_types)
+        primitives = difflib.get_close_matches(name.name, builtin_types, n=1, cutoff=0.8)
         names = [str(known) for known in (*self.names(), *(interface.name for interface in self._interfaces))]
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
 
@@ -211,11 +210,11 @@ class MessageLibrary:
 def libraries(
     paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None
 ) -> dict[RosVersion, MessageLibrary]:
-    """A library of each version, for those who speak both.
+    """A library of each middleware, for those who speak several.
 
     `store` is a distribution of one of them; the other keeps its default. Raises `InputError` as `MessageLibrary` does.
     """
-    known = {ros: distributions(ros) for ros in RosVersion}
+    known = {ros: middleware_of(ros).distributions() for ros in RosVersion}
     if store is not None and not any(store in names for names in known.values()):
         fail(f"'{store}' is not a distribution of ROS", hint=nearest(store, itertools.chain(*known.values())))
     return {
@@ -233,16 +232,18 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as fault:
-        line_start = data.rfind(b"\n", 0, fault.start) + 1
-        place = SourceRef(str(first), data.count(b"\n", 0, fault.start) + 1, fault.start - line_start + 1)
-        faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", place)
+        faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", byte_place(str(first), data, fault.start))
         return ""
 
 
 def _check_folders(empty: Iterable[Path]) -> None:
-    """Raise `InputError` that names every one of the user's folders that gave nothing."""
+    """Raise `InputError` that names every one of the user's folders that gave nothing, nor would to another library."""
     diagnostics = Diagnostics()
+    suffixes = known_suffixes()
+    *others, last = (f".{suffix}" for suffix in suffixes)
     for path in empty:
-        reason = "holds no .msg, .srv or .action file" if path.is_dir() else "is not a folder"
+        if any(interface_files(path, suffixes).values()):
+            continue
+        reason = f"holds no {', '.join(others)} or {last} file" if path.is_dir() else "is not a folder"
         diagnostics.error(f"message path '{path}' {reason}", hint="give a package, a workspace or a folder of packages")
     diagnostics.raise_if_any()

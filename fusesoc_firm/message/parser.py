@@ -163,7 +163,7 @@ class _Reader:
             self._diagnostics.error(
                 f"unexpected '{default.text}' behind field '{name.text}'",
                 default.source,
-                f"ROS {self._dialect.ros} has no default values; a constant is 'type NAME=value'",
+                f"{self._dialect.ros.title} has no default values; a constant is 'type NAME=value'",
             )
             return None
         return None if field_type is None else read_default(default, field_type, self._dialect, self._diagnostics)
@@ -228,7 +228,7 @@ class _Reader:
     def _bound(self, piece: Piece) -> int | None:
         """The number behind `<=`, with which `piece` starts."""
         if not self._dialect.has_bounds:
-            self._diagnostics.error(f"ROS {self._dialect.ros} has no bounds like '{piece.text}'", piece.source)
+            self._diagnostics.error(f"{self._dialect.ros.title} has no bounds like '{piece.text}'", piece.source)
             return None
         return self._size(piece.part(2), smallest=1)
 

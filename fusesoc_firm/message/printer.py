@@ -23,7 +23,7 @@ def to_text(definition: MessageDefinition, signature: str = "") -> str:
     ros = definition.ros
     constants = [(str(c.type), c.name, f"= {_constant(c, ros)}") for c in definition.constants]
     fields = [(str(f.type), f.name, _default(f.default)) for f in definition.fields]
-    header = [f"# {definition.name} (ROS {ros})", *([f"# signature: {signature}"] if signature else [])]
+    header = [f"# {definition.name} ({ros.title})", *([f"# signature: {signature}"] if signature else [])]
     blocks = [header, _aligned(constants), _aligned(fields)]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
 

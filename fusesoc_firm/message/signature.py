@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
@@ -22,7 +23,6 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
     StringType,
     nested_message,
@@ -55,9 +55,9 @@ _ONLY_MEMBER = ("structure_needs_at_least_one_member", PrimitiveType("uint8"))
 
 
 def signature(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The signature that the definitions' version of ROS has: `md5` or `rihs01`."""
+    """The signature that the definitions' middleware has: `md5` and `rihs01` are those of ROS."""
     ros = next(iter(definitions.values())).ros
-    return (md5 if ros is RosVersion.ROS1 else rihs01)(name, definitions, kind)
+    return middleware_of(ros).signature(name, definitions, kind)
 
 
 def md5(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:

@@ -37,7 +37,7 @@ class DistributionStore:
         """`distribution` is one of `distributions(ros)`; None takes the default. Raises `InputError` for another."""
         chosen = _DEFAULTS[ros] if distribution is None else distribution
         if chosen not in distributions(ros):
-            fail(f"'{chosen}' is not a distribution of ROS {ros}", hint=nearest(chosen, distributions(ros)))
+            fail(f"'{chosen}' is not a distribution of {ros.title}", hint=nearest(chosen, distributions(ros)))
         self._ros = ros
         self.title = f"rosbags {_prefix(ros)}{chosen}"
         self._name = f"{_prefix(ros)}{chosen}"

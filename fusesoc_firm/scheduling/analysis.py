@@ -8,16 +8,21 @@ from enum import StrEnum
 from math import floor, inf
 
 from fusesoc_firm.scheduling import area, response
+from fusesoc_firm.scheduling.area import Areas
 from fusesoc_firm.scheduling.dissertation import dissertation
+from fusesoc_firm.scheduling.models.lru import ImmediateLru
+from fusesoc_firm.scheduling.models.parallel import Parallel
 from fusesoc_firm.scheduling.policies import POLICIES
 from fusesoc_firm.scheduling.response import Overheads
 from fusesoc_firm.scheduling.tasks import Task
 
-# Above this LRU takes its requests in one after the other, and so do those that compare deadlines above the other one.
-_MOST_AT_ONCE = {"lru": 16, "edf_latency": 8, "lst": 8, "edf_resources": 0}
-
-# What the Manager takes more for bursts, with two channels (docs/figures.md).
-_BURST_LUT = 30
+# Policies that take requests in one after the other, and up to how many requesters they take them all at once instead.
+_MOST_AT_ONCE = {
+    "lru": ImmediateLru.MAX_REQUESTERS,
+    "edf_latency": Parallel.MAX_REQUESTERS,
+    "lst": Parallel.MAX_REQUESTERS,
+    "edf_resources": 0,
+}
 
 
 class Criterion(StrEnum):
@@ -104,7 +109,8 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
     takes in a request a cycle; each may lead to three operations of the queue (it goes in, who is interrupted goes in,
     the next comes out), of two cycles each in a heap.
     """
-    run, resume = (shortest_run, 1) if POLICIES[policy].is_preemptive else (0, 0)
+    # Who is alone is never interrupted.
+    run, resume = (shortest_run, 1) if POLICIES[policy].is_preemptive and requesters > 1 else (0, 0)
     if requesters <= _MOST_AT_ONCE.get(policy, requesters):
         return Overheads(1 if policy not in _MOST_AT_ONCE or policy == "lru" else 2, 0, run, resume)
     operation = 1 if policy == "edf_latency" else 2
@@ -137,12 +143,25 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
 
 
 def luts(policy: str, requesters: int) -> int | None:
-    """LUTs of a scheduler: what was measured of ours, or else the dissertation's table 4.1; None if neither has it."""
-    if measured := area.measured():
-        found = area.at(measured, policy, requesters)
-        return found.lut + (_BURST_LUT if POLICIES[policy].is_preemptive else 0) if found else None
-    known = {number: lut for number, (lut, _) in dissertation().area.get(policy, {}).items() if number >= requesters}
-    return int(known[min(known)]) if known else None
+    """LUTs of a scheduler, and of what the Manager takes more to make bursts of what a preemptive one interrupts.
+
+    They are the measured ones, or where nothing was measured those of the dissertation's table 4.1, which knows no
+    bursts; None if they are not known.
+    """
+    measured = area.measured()
+    if not measured:
+        areas = dissertation().area.get(policy, {})
+        known = {number: lut for number, (lut, _) in areas.items() if number >= requesters}
+        return int(known[min(known)]) if known else None
+    scheduler = area.at(measured, policy, requesters)
+    bursts = _burst_luts(measured, requesters) if POLICIES[policy].is_preemptive else 0
+    return None if scheduler is None or bursts is None else scheduler.lut + bursts
+
+
+def _burst_luts(measured: Areas, requesters: int) -> int | None:
+    """The Manager's; as a difference of two mappings it can be below 0, where the multiplexers are most of it."""
+    bursts, whole = (area.at(measured, design, requesters) for design in (area.MANAGER_PREEMPTIVE, area.MANAGER))
+    return bursts.lut - whole.lut if bursts and whole else None
 
 
 def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
@@ -262,7 +281,8 @@ def choose(
         (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in POLICIES), key=_RANKS[criterion]
     )
     load = utilisation(tasks)
-    return Choice(criterion, load, tuple(analyses), tuple(_reasons(analyses, criterion, load)))
+    names = tuple(task.name for task in tasks)
+    return Choice(criterion, load, tuple(analyses), tuple(_reasons(analyses, criterion, load, names)))
 
 
 def _luts_rank(analysis: Analysis) -> float:
@@ -282,7 +302,7 @@ _RANKS: Mapping[Criterion, Callable[[Analysis], tuple[float, ...]]] = {
 }
 
 
-def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float) -> list[str]:
+def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float, names: tuple[str, ...]) -> list[str]:
     best = analyses[0]
     found = [f"The publishers ask for {100 * load:.1f} % of the channel."]
     if load > 1:
@@ -296,7 +316,9 @@ def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float) ->
     else:
         found.append("No policy is certain to hold all deadlines.")
     found.append(f"{best.policy} {_MERITS[criterion](best)}")
-    if best.priorities:
+    if best.priorities == names:
+        found.append("Its priorities are the order in which the publishers stand.")
+    elif best.priorities:
         found.append(f"Its priorities, the highest first: {', '.join(best.priorities)}. So must the publishers stand.")
     return found
 
@@ -304,7 +326,10 @@ def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float) ->
 def _lut_words(analysis: Analysis) -> str:
     if analysis.lut is None:
         return "takes a number of LUTs that is not known"
-    source = "measured" if area.measured() else "by the dissertation's table 4.1"
+    if not area.measured():
+        source = "by the dissertation's table 4.1"
+    else:
+        source = "measured, with the Manager's bursts" if POLICIES[analysis.policy].is_preemptive else "measured"
     return f"takes the fewest LUTs of these, {analysis.lut} ({source})"
 
 

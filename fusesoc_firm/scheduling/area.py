@@ -1,7 +1,8 @@
-"""LUTs and flip-flops of the schedulers: what `make bench` measured, where it has.
+"""LUTs and flip-flops of the schedulers and of the Manager: what `make bench BENCH=manager` measured.
 
-The file is `area.csv` beside this module, with the columns policy, requesters, lut, ff. Of a policy or a number that it
-has not, nothing is known here.
+The file is `area.csv` beside this module, with the columns design, requesters, lut, ff. A design is a policy, a
+combination of policies by its name in table 4.5, or the Manager without scheduler for streams of 8 bits. Of a design or
+a number that the file has not, nothing is known here.
 """
 
 from __future__ import annotations
@@ -13,13 +14,16 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-COLUMNS = ("policy", "requesters", "lut", "ff")
+COLUMNS = ("design", "requesters", "lut", "ff")
 FILE = "area.csv"
+MANAGER = "manager"
+MANAGER_PREEMPTIVE = "manager_preemptive"
+"""The Manager that makes bursts of what a scheduler interrupts."""
 
 
 @dataclass(frozen=True)
 class Area:
-    """What a scheduler takes."""
+    """What a design takes; LUTs that are memory count as LUTs."""
 
     lut: int
     ff: int
@@ -33,7 +37,7 @@ Areas = Mapping[tuple[str, int], Area]
 
 @cache
 def measured() -> Areas:
-    """By policy and number of requesters; empty if nothing was measured."""
+    """By design and number of requesters; empty if nothing was measured."""
     file = resources.files(__package__) / FILE
     return read(file.read_text(encoding="utf-8")) if file.is_file() else {}
 
@@ -41,7 +45,7 @@ def measured() -> Areas:
 def read(text: str) -> dict[tuple[str, int], Area]:
     """The areas in the text of a file."""
     rows = csv.DictReader(text.splitlines())
-    return {(row["policy"], int(row["requesters"])): Area(int(row["lut"]), int(row["ff"])) for row in rows}
+    return {(row["design"], int(row["requesters"])): Area(int(row["lut"]), int(row["ff"])) for row in rows}
 
 
 def write(path: Path, areas: Areas) -> None:
@@ -51,7 +55,7 @@ def write(path: Path, areas: Areas) -> None:
     path.write_text(f"{text}\n", encoding="utf-8")
 
 
-def at(areas: Areas, policy: str, requesters: int) -> Area | None:
+def at(areas: Areas, design: str, requesters: int) -> Area | None:
     """The area for a number of requesters, or for the next larger one that is known; None if there is none."""
-    known = [number for name, number in areas if name == policy and number >= requesters]
-    return areas[policy, min(known)] if known else None
+    known = [number for name, number in areas if name == design and number >= requesters]
+    return areas[design, min(known)] if known else None

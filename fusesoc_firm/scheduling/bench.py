@@ -65,7 +65,7 @@ def bench(selection: Selection, places: Places) -> None:
     to_do = jobs(selection.data_sets, selection.policies, selection.requesters, settings)
     started = time.monotonic()
     outcomes: list[Outcome] = []
-    print(f"seed {settings.seed}, {settings.distribution} distribution", file=sys.stderr)
+    print(_of_all(settings), file=sys.stderr)
     bar = tqdm(total=len(to_do), unit="run", disable=None, file=sys.stderr)
     with _workers(places) as workers, bar:
         for outcome in run(to_do, workers):
@@ -128,8 +128,8 @@ def _workers(places: Places) -> AbstractContextManager[Workers]:
 def _report(selection: Selection, tables: Sequence[Table], figures: Sequence[Figure], lines: Sequence[Timeline]) -> str:
     settings = selection.settings
     data_sets = "\n".join(f"* {_heading(name, settings)}" for name in selection.data_sets)
-    intro = f"""The dissertation's section 4.3 again, by `firm scheduler bench`. Seed {settings.seed},
-{settings.distribution} distribution; times in clock cycles; docs/scheduling.md defines the metrics.
+    intro = f"""The dissertation's section 4.3 again, by `firm scheduler bench`: {_of_all(settings)}.
+Times are in clock cycles; docs/scheduling.md defines the metrics.
 
 {data_sets}
 """
@@ -150,6 +150,16 @@ def _report(selection: Selection, tables: Sequence[Table], figures: Sequence[Fig
         if drawn:
             parts.append(f"![{line.title}]({line.file_name}.svg)\n")
     return "\n".join(parts)
+
+
+def _of_all(settings: Settings) -> str:
+    """What all evaluations share; what is as in section 4.3 goes without saying."""
+    found = f"seed {settings.seed}, {settings.distribution} distribution"
+    if settings.shortest_run > 1:
+        found += f", a shortest run of {settings.shortest_run} beats"
+    if settings.resume_beats:
+        found += f", {settings.resume_beats} more beats in each resumed run"
+    return found
 
 
 def _heading(data_set: str, settings: Settings) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from fusesoc_firm.scheduling.area import Areas
@@ -102,15 +102,25 @@ def _spread_table(
     evaluation: Evaluation, number: str, title: str, metric: str, theirs: Mapping[str, Mapping[int, Sequence[float]]]
 ) -> Table:
     """Minimum, average and maximum of each policy and number of accelerators, the dissertation's beside."""
+    parts = ("min", "avg", "max")
     rows = []
     for policy in evaluation.policies(LARGE):
         for requesters in evaluation.requesters(LARGE):
-            ours = (evaluation.value(LARGE, policy, requesters, f"{metric}_{part}") for part in ("min", "avg", "max"))
-            known: Iterable[float | None] = theirs.get(policy, {}).get(requesters, (None,) * 3)
-            rows.append((POLICIES[policy].short, str(requesters), *map(decimal, ours), *map(decimal, known)))
-    parts = ("min", "avg", "max")
-    columns = ("scheduler", "accelerators", *parts, *(f"dissertation {part}" for part in parts))
+            ours = [evaluation.value(LARGE, policy, requesters, f"{metric}_{part}") for part in parts]
+            known = theirs.get(policy, {}).get(requesters, (math.nan,) * 3)
+            cells = map(decimal, (*ours, *known))
+            rows.append((POLICIES[policy].short, str(requesters), *cells, _verdict(ours[1], known[1])))
+    columns = ("scheduler", "accelerators", *parts, *(f"dissertation {part}" for part in parts), "our average is")
     return Table(number, title, columns, tuple(rows))
+
+
+def _verdict(ours: float, theirs: float) -> str:
+    """How a value of ours stands to theirs, of which the smaller one is the better one."""
+    if math.isnan(ours) or math.isnan(theirs):
+        return UNKNOWN
+    if abs(ours - theirs) <= _EQUAL:
+        return "equal"
+    return "better" if ours < theirs else "worse"
 
 
 def _combined_area_table(areas: Areas) -> Table:

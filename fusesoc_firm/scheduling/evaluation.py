@@ -17,12 +17,19 @@ from fusesoc_firm.workers import Workers
 
 @dataclass(frozen=True)
 class Settings:
-    """What all jobs share; `sets` and `cycles` of None are those of the data set."""
+    """What all jobs share; `sets` and `cycles` of None are those of the data set.
+
+    `shortest_run` and `resume_beats` are those of preemptive policies: the beats that a run has before it may be
+    interrupted, and the cycles that each run of a task but its first costs beside its beats. Those of section 4.3 are 1
+    and 0; the Manager's bursts cost one.
+    """
 
     seed: int = 1
     sets: int | None = None
     cycles: int | None = None
     distribution: Distribution = Distribution.NORMAL
+    shortest_run: int = 1
+    resume_beats: int = 0
 
     def sets_of(self, data_set: str) -> int:
         """The sets that are simulated of a data set."""
@@ -59,12 +66,12 @@ class Outcome:
     seconds: float
 
 
-def model_of(policy: str, workload: Workload) -> SchedulerModel:
+def model_of(policy: str, workload: Workload, shortest_run: int = 1) -> SchedulerModel:
     """The model of a policy, or of a combination, for a workload.
 
     The period of a requester is the least time between its requests, that is, its implicit deadline.
     """
-    generics = Generics(workload.deadlines, workload.transfer_times)
+    generics = Generics(workload.deadlines, workload.transfer_times, shortest_run=shortest_run)
     if policy in COMBINATIONS:
         return combined(COMBINATIONS[policy], generics)
     return MODELS[policy](generics)
@@ -77,7 +84,8 @@ def evaluate(job: Job) -> Outcome:
     workload = draw(
         DATA_SETS[key.data_set], key.requesters, settings.seed, settings.sets_of(key.data_set), settings.distribution
     )
-    trace = simulate(model_of(key.policy, workload), workload, settings.cycles_of(key.data_set))
+    model = model_of(key.policy, workload, settings.shortest_run)
+    trace = simulate(model, workload, settings.cycles_of(key.data_set), resume_beats=settings.resume_beats)
     return Outcome(key, measure(trace), time.perf_counter() - started)
 
 

@@ -81,7 +81,8 @@ def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], ov
             responses.append(None if start is None else start - number * task.period + service)
         known = [response for response in responses if response is not None]
         return max(known) if len(known) == len(responses) else None
-    start = _start(max(blocking, service), higher, overheads)
+    # Only those of higher priority can have waited for it.
+    start = _start(max(blocking, service) if higher else blocking, higher, overheads)
     return None if start is None else start + service
 
 

@@ -26,18 +26,24 @@ from fusesoc_firm.system.derived import (
     Connection,
     Converter,
     DerivedSystem,
+    End,
     MessageSide,
     PayloadLength,
 )
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
 from fusesoc_firm.system.length import output_length, publisher_buffers, with_lengths
+from fusesoc_firm.system.link import link_of
 from fusesoc_firm.system.pins import check_pins
+from fusesoc_firm.system.python_function import check_function
+from fusesoc_firm.system.software import MOST_CONVERTERS, Parting, Parts, message_names
 from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.specification import (
     CONVERTER,
+    MODES,
     PUBLISHER,
     SOURCE_SUFFIXES,
+    SUBSCRIBER,
     Accelerator,
     Block,
     InterfaceType,
@@ -49,7 +55,7 @@ from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text
 
 Libraries = Mapping[RosVersion, MessageLibrary]
-_MOST_CONVERTERS = 256
+_KINDS_OF_BLOCKS = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
 
 
 def derive(
@@ -69,32 +75,35 @@ def derive(
     analysis.resolve_accelerators()
     analysis.resolve_blocks()
     clocks = clocks_of(specification, faults)
-    connections = with_lengths(analysis.wiring().connect(), analysis.outputs, analysis.blocks, faults)
+    names = message_names(analysis.blocks, analysis.inputs, analysis.outputs)
+    parts = analysis.parts(analysis.wiring().connect(), names)
+    connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
     faults.raise_if_any()
-    buffers = publisher_buffers(connections, analysis.publishers(), faults)
+    parts.check(analysis.blocks, faults)
+    buffers = publisher_buffers(connections, parts.of_mode(PUBLISHER), faults)
     faults.raise_if_any()
     project = specification.project
     publishers = tuple(
-        replace(item, buffer=buffers.get(item.block, 0)) for item in analysis.converters("publisher", connections)
+        replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
-    scheduling = scheduling_of(project, analysis.blocks, publishers, faults)
+    scheduling = scheduling_of(project, parts.blocks, publishers, faults)
+    link = link_of(project, scheduling, faults)
     faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
         fpga_part=str(project.fpga_part or ""),
         width=project.width,
         scheduling=scheduling,
-        subscribers=analysis.converters("subscriber", connections),
+        subscribers=_converters(parts, SUBSCRIBER, connections),
         publishers=publishers,
-        accelerators=tuple(
-            AcceleratorBlock(str(block.name), analysis.types[block.type], str(block.clock or ""))
-            for block in specification.blocks
-            if block.type is not None
-        ),
+        accelerators=analysis.instances(is_software=False),
         connections=connections,
         clocks=clocks,
+        software=parts.software,
+        names=names,
+        link=link,
     )
-    check_entities(system, analysis.blocks, faults)
+    check_entities(system, parts.blocks, faults)
     faults.raise_if_any()
     return system
 
@@ -157,6 +166,8 @@ class _Analysis:
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
                 check_kernel(found, self.faults)
+            if accelerator.is_software and accelerator.sources:
+                check_function(found, sources[0], self.faults)
             check_pins(found, self.faults)
 
     def _check_sources(self, accelerator: Accelerator) -> None:
@@ -207,8 +218,10 @@ class _Analysis:
                 self._resolve_accelerator_block(block)
             else:
                 self._resolve_converter(block)
-        for mode in ("subscriber", "publisher"):
-            self._check_count(mode)
+        # With software, what is hardware is not known yet.
+        if not any(accelerator.is_software for accelerator in self.specification.accelerators):
+            for mode in MODES:
+                self._check_count(mode)
 
     def _resolve_accelerator_block(self, block: Block) -> None:
         assert block.type is not None
@@ -216,12 +229,15 @@ class _Analysis:
         # One that could not be read may be the one that is meant.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
-            self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, nearest(block.type, names))
+            hint = nearest(block.type, names) or "there is none under 'accelerators'"
+            self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, hint)
         for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
-                self.faults.error(f"'{key}' belongs to a converter, but '{block.name}' has a type", source)
-        self._check_no_publisher_keys(block)
+                message = f"'{key}' belongs to a converter, but '{block.name}' has a type"
+                self.faults.error(message, source, _KINDS_OF_BLOCKS)
+        if not any(item.is_software for item in self.specification.accelerators if item.name == block.type):
+            self._check_no_publisher_keys(block)
         if found := self.types.get(block.type):
             self.inputs[block.name] = found.inputs
             self.outputs[block.name] = found.outputs
@@ -232,8 +248,7 @@ class _Analysis:
             # What is wrong with a block that could not be read is noted already.
             if block.is_sound:
                 words = ", ".join(f"'{key}'" for key in missing)
-                hint = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
-                self.faults.error(f"block '{block.name}' needs {words}", block.name.source, hint)
+                self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)
             return
         assert block.middleware is not None and block.message is not None
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)
@@ -248,18 +263,19 @@ class _Analysis:
         for key in keys_only_of(Block, PUBLISHER):
             if getattr(block, key) is not None:
                 message = f"'{key}' belongs to a publisher, but '{block.name}' is none"
-                self.faults.error(message, block.name.source)
+                self.faults.error(message, block.place(key), "a publisher is a block with 'mode: publisher'")
 
     def _check_count(self, mode: str) -> None:
         blocks = self.specification.blocks
         found = [block for block in blocks if block.type is None and block.mode == mode]
         are_known = blocks and all(block.is_sound and (block.type or block.mode) for block in blocks)
         if not found and are_known:
-            self.faults.error(f"the system has no {mode}; it needs at least one", blocks[0].name.source)
-        elif len(found) > _MOST_CONVERTERS:
+            message = f"the system has no {mode}; it needs at least one"
+            self.faults.error(message, blocks[0].name.source, f"a {mode} is a block with 'mode: {mode}'")
+        elif len(found) > MOST_CONVERTERS:
             self.faults.error(
-                f"the system has {len(found)} {mode}s; an id of one byte tells {_MOST_CONVERTERS} apart",
-                found[_MOST_CONVERTERS].name.source,
+                f"the system has {len(found)} {mode}s; an id of one byte tells {MOST_CONVERTERS} apart",
+                found[MOST_CONVERTERS].name.source,
             )
 
     def wiring(self) -> Wiring:
@@ -280,25 +296,35 @@ class _Analysis:
             ambiguous={block.name for block in lost},
         )
 
-    def publishers(self) -> dict[str, Block]:
-        """The blocks that are publishers, by name."""
-        return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == "publisher"}
+    def parts(self, connections: Sequence[Connection], names: Mapping[End, str]) -> Parts:
+        """The system in hardware and software."""
+        software = self.instances(is_software=True)
+        return Parting(self.blocks, software, self.inputs, self.outputs, connections, names).parts()
 
-    def converters(self, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
-        """The converters with the fields that connections carry: what nobody takes or drives needs no port."""
-        names: dict[str, set[Names]] = {}
-        for connection in connections:
-            for sink, frame in zip(connection.sinks, connection.frames, strict=True):
-                end = connection.source if mode == "subscriber" else sink
-                names.setdefault(end.block, set()).update(names_in_use(frame))
-        sides = self.outputs if mode == "subscriber" else self.inputs
-        blocks = [block for block in self.specification.blocks if block.type is None and block.mode == mode]
-        suffixes: dict[Frame, str] = {}
-        found = []
-        for number, block in enumerate(blocks):
-            whole = select(sides[block.name][0].frame)
-            frame = with_names_in_use(whole, names[block.name])
-            # Blocks of the same fields share the entity of the first.
-            suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(block.name).lower()}")
-            found.append(Converter(str(block.name), frame, number, suffix))
-        return tuple(found)
+    def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
+        """The accelerators' blocks, as far as their types are known, in one part of the system."""
+        found = [
+            AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
+            for block in self.blocks.values()
+            if block.type in self.types
+        ]
+        return tuple(block for block in found if block.type.accelerator.is_software is is_software)
+
+
+def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
+    """The converters with the fields that connections carry: what nobody takes or drives needs no port."""
+    names: dict[str, set[Names]] = {}
+    for connection in connections:
+        for sink, frame in zip(connection.sinks, connection.frames, strict=True):
+            end = connection.source if mode == SUBSCRIBER else sink
+            names.setdefault(end.block, set()).update(names_in_use(frame))
+    sides = parts.outputs if mode == SUBSCRIBER else parts.inputs
+    suffixes: dict[Frame, str] = {}
+    found = []
+    for number, name in enumerate(parts.of_mode(mode)):
+        whole = select(sides[name][0].frame)
+        frame = with_names_in_use(whole, names[name])
+        # Blocks of the same fields share the entity of the first.
+        suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(name).lower()}")
+        found.append(Converter(str(name), frame, number, suffix, software=parts.crossings.get(name)))
+    return tuple(found)

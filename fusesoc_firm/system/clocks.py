@@ -66,6 +66,11 @@ def _check_uses(specification: Specification, faults: Diagnostics) -> None:
     """Note every block with a clock that is none, and every clock that has no block."""
     project, blocks = specification.project, specification.blocks
     names: Sequence[str] = [clock.name for clock in project.clocks]
+    software = {item.name for item in specification.accelerators if item.is_software}
+    for item in specification.accelerators:
+        if item.is_software and item.width is not None:
+            message = f"'width' belongs to hardware, but '{item.name}' is of type {item.type}"
+            faults.error(message, item.place("width"), "software gets whole messages")
     used = set()
     for block in blocks:
         if block.clock is None:
@@ -73,6 +78,9 @@ def _check_uses(specification: Specification, faults: Diagnostics) -> None:
         used.add(block.clock.lower())
         if block.type is None and block.mode is not None:
             message = f"'clock' belongs to an accelerator, but '{block.name}' is a {block.mode}"
+            faults.error(message, block.clock.source)
+        elif block.type in software:
+            message = f"'clock' belongs to hardware, but '{block.name}' runs on the host"
             faults.error(message, block.clock.source)
         elif all(names) and project.is_sound and block.clock not in names:
             hint = nearest(block.clock, names) if names else "add 'clocks' to the project"

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from fusesoc_firm.converter.ports import vhdl_type
-from fusesoc_firm.system.derived import DerivedSystem
+from fusesoc_firm.system.derived import DerivedSystem, LinkKind
 from fusesoc_firm.system.instances import ERROR_CODE_BITS, accelerator_instance, publisher_instance, subscriber_instance
 from fusesoc_firm.system.maps import port_map
 from fusesoc_firm.system.names import RELEASED, Names, blocks, reset_label, seen_reset
@@ -34,6 +34,7 @@ def system_configuration(system: DerivedSystem) -> Configuration:
     return {
         **_dimensions(system),
         "name": system.name,
+        **_interconnect(system),
         **scheduler_configuration(system),
         "clocks": _clocks(system),
         "resets": _resets(system),
@@ -65,6 +66,8 @@ def test_bench_configuration(
         *(clock.port for clock in system.clocks),
         *(str(port["formal"]) for group in pins for port in group["ports"]),
     ]
+    # A link carries bytes.
+    host_width = 8 if system.link else system.width
     return {
         "pins": pins,
         "clocks": [
@@ -75,6 +78,10 @@ def test_bench_configuration(
         if environment
         else None,
         **_dimensions(system),
+        **_interconnect(system),
+        "host_width": host_width,
+        "host_data_high": host_width - 1,
+        "host_keep_high": host_width // 8 - 1,
         "seed": seed,
         "stall_percent": stall_percent,
         "is_preemptive": system.scheduling.is_preemptive,
@@ -149,6 +156,47 @@ def _pins(names: Names, system: DerivedSystem) -> list[Configuration]:
         if ports:
             groups.append({"block": block.block, "ports": ports})
     return groups
+
+
+# The pins of a link at the top level, as its core calls them. A board may leave open what has a default.
+_LINK_PINS = {
+    LinkKind.UART: (
+        ("uart_rxd", "in ", "std_logic"),
+        ("uart_txd", "out", "std_logic"),
+        ("uart_rts_n", "out", "std_logic"),
+        ("uart_cts_n", "in ", "std_logic := '0'"),
+    ),
+    LinkKind.SPI: (
+        ("spi_sclk", "in ", "std_logic"),
+        ("spi_cs_n", "in ", "std_logic"),
+        ("spi_mosi", "in ", "std_logic"),
+        ("spi_miso", "out", "std_logic"),
+        ("spi_irq", "out", "std_logic"),
+    ),
+}
+
+
+def _interconnect(system: DerivedSystem) -> Configuration:
+    """The streams as ports of the top level, or the link that they end at."""
+    if system.link is None:
+        return {"has_streams": True, "link": None}
+    pins = _LINK_PINS[system.link.kind]
+    column = max(len(name) for name, _, _ in pins)
+    return {
+        "has_streams": False,
+        "link": {
+            "entity": f"firm_{system.link.kind.value}_link",
+            "width": system.width,
+            "data_high": system.width - 1,
+            "keep_high": system.width // 8 - 1,
+            "adapter": f"firm_sim_{system.link.kind.value}",
+            "uart": None if system.link.clock_hz is None else {"clock_hz": system.link.clock_hz},
+            "pins": [
+                {"name": name.ljust(column), "direction": direction, "type": type_, "actual": name}
+                for name, direction, type_ in pins
+            ],
+        },
+    }
 
 
 def _dimensions(system: DerivedSystem) -> Configuration:

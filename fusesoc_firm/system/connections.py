@@ -103,10 +103,12 @@ class Wiring:
             return False
         target = self.blocks[name]
         if block.type is None and block.mode == "publisher":
-            self.faults.error(f"'{block.name}' is a publisher; its message goes to the host", name.source)
+            message = f"'{block.name}' is a publisher; its message goes to the host"
+            self.faults.error(message, name.source, "'outgoing' belongs to subscribers and accelerators")
             return False
         if target.type is None and target.mode == "subscriber":
-            self.faults.error(f"'{name}' is a subscriber; its message comes from the host", name.source)
+            message = f"'{name}' is a subscriber; its message comes from the host"
+            self.faults.error(message, name.source, "'outgoing' names accelerators and publishers")
             return False
         return block.name in self.outputs and name in self.inputs
 
@@ -118,6 +120,9 @@ class Wiring:
             self.faults.error(
                 f"'{block.name}' gives {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
                 outgoing.name.source,
+                _what_lacks(block, gives, "output")
+                or _what_lacks(self.blocks[outgoing.name], takes, "input")
+                or "a connection is between blocks of the same message, in the same ROS version",
             )
             return {}
         try:
@@ -229,7 +234,12 @@ def _names(frame: Frame) -> frozenset[Names]:
 
 
 def _messages(sides: Sequence[MessageSide]) -> str:
-    return " and ".join(f"{side.frame.message} (ROS {int(side.frame.ros)})" for side in sides) or "no message"
+    return " and ".join(f"{side.frame.message} ({side.frame.ros.title})" for side in sides) or "no message"
+
+
+def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
+    """The key that an accelerator lacks which has no message at this side; empty if it has one."""
+    return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
 
 
 def _words(what: str, side: MessageSide) -> str:

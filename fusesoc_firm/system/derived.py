@@ -5,6 +5,7 @@ It is what `analysis` makes of a specification and what all templates, and `firm
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
@@ -16,18 +17,34 @@ from fusesoc_firm.system.specification import Accelerator
 
 
 @dataclass(frozen=True)
-class Converter:
-    """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks.
-
-    The fields that are used in `frame` are its ports. One without all of them has an entity with a `suffix`. `buffer`
-    are the bytes of the longest payload of a publisher that stores its frames whole, 0 of any other.
-    """
+class Topic:
+    """A message between the system and others, under a block's name."""
 
     block: str
     frame: Frame
+
+
+@dataclass(frozen=True)
+class End:
+    """One end of a connection: a block, and the prefix of the message there (empty at a converter)."""
+
+    block: str
+    prefix: str = ""
+
+
+@dataclass(frozen=True)
+class Converter(Topic):
+    """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks.
+
+    The fields that are used in `frame` are its ports. One without all of them has an entity with a `suffix`. `buffer`
+    are the bytes of the longest payload of a publisher that stores its frames whole, 0 of any other. Those that the
+    specification does not have come last: each stands between hardware and a message side of a block in `software`.
+    """
+
     id: int
     suffix: str = ""
     buffer: int = 0
+    software: End | None = None
 
 
 class LengthSource(Enum):
@@ -94,14 +111,6 @@ class AcceleratorBlock:
 
 
 @dataclass(frozen=True)
-class End:
-    """One end of a connection: a block, and the prefix of the message there (empty at a converter)."""
-
-    block: str
-    prefix: str = ""
-
-
-@dataclass(frozen=True)
 class Connection:
     """A message's way from where it arises to all who take it, in the order of the specification.
 
@@ -148,6 +157,41 @@ class Scheduling:
     reasons: tuple[str, ...] = ()
 
 
+class LinkKind(Enum):
+    """What carries bytes between the host and a board without a processor."""
+
+    UART = "uart"
+    SPI = "spi"
+
+
+@dataclass(frozen=True)
+class Link:
+    """The link between the host and the system; one over UART knows the clock's frequency."""
+
+    kind: LinkKind
+    clock_hz: int | None
+
+
+@dataclass(frozen=True)
+class Software:
+    """The host's part of a system: `blocks` in software, and all connections that a message takes on the host.
+
+    It comes from one of the `subscribers`, from the hardware's publisher that stands for a block's input, or from a
+    block; and goes to a block, to the hardware's subscriber that stands for a block's output, or to one of the
+    `publishers`. A subscriber may be in hardware as well; a publisher is only here.
+    """
+
+    blocks: tuple[AcceleratorBlock, ...] = ()
+    subscribers: tuple[Topic, ...] = ()
+    publishers: tuple[Topic, ...] = ()
+    connections: tuple[Connection, ...] = ()
+
+    @property
+    def types(self) -> tuple[AcceleratorType, ...]:
+        """Every type that has an instance, once."""
+        return tuple(dict.fromkeys(block.type for block in self.blocks))
+
+
 @dataclass(frozen=True)
 class Clock:
     """A clock beside that of the system: its `frequency` in Hz, and `ratio` of its edges to those of clk."""
@@ -169,7 +213,11 @@ class Clock:
 
 @dataclass(frozen=True)
 class DerivedSystem:
-    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` those beside clk."""
+    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` those beside clk.
+
+    Without a `link` its streams are ports. Converters, accelerators and connections are those of the hardware. `names`
+    are what messages at accelerators are called outside of these: `<block>_in`, `<block>_out1` and so on.
+    """
 
     name: str
     fpga_part: str
@@ -179,6 +227,9 @@ class DerivedSystem:
     publishers: tuple[Converter, ...]
     accelerators: tuple[AcceleratorBlock, ...]
     connections: tuple[Connection, ...]
+    software: Software
+    names: Mapping[End, str]
+    link: Link | None = None
     clocks: tuple[Clock, ...] = ()
 
     def clock_of(self, block: str) -> Clock | None:

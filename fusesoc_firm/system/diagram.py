@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.system.crossings import crossings
-from fusesoc_firm.system.derived import AcceleratorBlock, Connection, Converter, DerivedSystem
+from fusesoc_firm.system.derived import AcceleratorBlock, Connection, DerivedSystem
 from fusesoc_firm.system.sides import side_ports
 
 if TYPE_CHECKING:
@@ -19,6 +19,8 @@ FORMATS = ("svg", "dot")
 _HOST, _MANAGER = "host", "manager"
 _CONVERTER = {"shape": "box", "style": "filled", "fillcolor": "#dae8fc"}
 _ACCELERATOR = {"shape": "box", "style": "filled,rounded", "fillcolor": "#d5e8d4"}
+_SOFTWARE = {"shape": "box", "style": "filled,rounded", "fillcolor": "#ffe6cc"}
+_FPGA = {"name": "cluster_fpga", "graph_attr": {"label": "FPGA", "style": "dashed"}}
 _STREAM = {"penwidth": "2"}
 _CROSSING = {"style": "dashed"}
 
@@ -31,13 +33,12 @@ def diagram(system: DerivedSystem, output_format: str) -> str:
         fail("pictures need the Python package graphviz", hint="pip install 'fusesoc-firm[diagram]'")
     graph = graphviz.Digraph(system.name, node_attr={"fontname": "sans-serif"}, edge_attr={"fontname": "sans-serif"})
     graph.attr(rankdir="LR", label=f"{system.name}: streams of {system.width} bits", fontname="sans-serif")
+    with graph.subgraph(**_FPGA) as fpga:
+        _draw_blocks(fpga, system)
     _draw_streams(graph, system)
-    for block in system.accelerators:
-        accelerator = block.type.accelerator
-        label = f"{block.block}\n{accelerator.name} ({accelerator.type}){_differences(system, block)}"
-        graph.node(_node(block.block), label, **_ACCELERATOR)
     for connection in system.connections:
         _draw_connection(graph, connection, system)
+    _draw_software(graph, system)
     if output_format == "dot":
         return str(graph.source)
     try:
@@ -46,25 +47,48 @@ def diagram(system: DerivedSystem, output_format: str) -> str:
         fail("pictures need the program 'dot' of Graphviz", hint="Debian and Ubuntu: apt install graphviz")
 
 
-def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
-    """The host, the Manager on both its ways, and the converters with their ids."""
-    graph.node(f"{_HOST}_out", "host", shape="oval")
-    graph.node(f"{_HOST}_in", "host", shape="oval")
+def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
+    """The Manager on both its ways, converters and accelerators."""
     graph.node(f"{_MANAGER}_in", "Manager", shape="box")
     graph.node(f"{_MANAGER}_out", f"Manager\n{system.scheduling.policy}", shape="box")
+    for converter in (*system.subscribers, *system.publishers):
+        label = f"{converter.block}\n{converter.frame.message}\n{converter.frame.ros.title}"
+        graph.node(_node(converter.block), label, **_CONVERTER)
+    for block in system.accelerators:
+        graph.node(_node(block.block), _accelerator(block) + _differences(system, block), **_ACCELERATOR)
+
+
+def _accelerator(block: AcceleratorBlock) -> str:
+    accelerator = block.type.accelerator
+    return f"{block.block}\n{accelerator.name} ({accelerator.type})"
+
+
+def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
+    """The host, and the streams between it, the Manager and the converters with their ids."""
+    graph.node(f"{_HOST}_out", "host", shape="oval")
+    graph.node(f"{_HOST}_in", "host", shape="oval")
     graph.edge(f"{_HOST}_out", f"{_MANAGER}_in", **_STREAM)
     graph.edge(f"{_MANAGER}_out", f"{_HOST}_in", **_STREAM)
     for converter in system.subscribers:
-        _draw_converter(graph, converter)
         graph.edge(f"{_MANAGER}_in", _node(converter.block), label=f"id {converter.id}", **_STREAM)
     for converter in system.publishers:
-        _draw_converter(graph, converter)
         graph.edge(_node(converter.block), f"{_MANAGER}_out", label=f"id {converter.id}", **_STREAM)
 
 
-def _draw_converter(graph: Digraph, converter: Converter) -> None:
-    label = f"{converter.block}\n{converter.frame.message}\nROS {converter.frame.ros}"
-    graph.node(_node(converter.block), label, **_CONVERTER)
+def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
+    """The blocks on the host, and their messages: from and to the Manager, topics, and each other."""
+    blocks = {block.block for block in system.software.blocks}
+    for block in system.software.blocks:
+        graph.node(_node(block.block), _accelerator(block), **_SOFTWARE)
+    # Whatever else a message comes from or goes to is a topic.
+    starts = {item.block: f"{_MANAGER}_out" for item in system.publishers} | {name: _node(name) for name in blocks}
+    ends = {item.block: f"{_MANAGER}_in" for item in system.subscribers} | {name: _node(name) for name in blocks}
+    for connection in system.software.connections:
+        source = connection.source.block
+        for sink, frame in zip(connection.sinks, connection.frames, strict=True):
+            names = [name for name in (source, sink.block) if name not in blocks]
+            start, end = starts.get(source, f"{_HOST}_out"), ends.get(sink.block, f"{_HOST}_in")
+            graph.edge(start, end, label="\n".join([*names, str(frame.message)]))
 
 
 def _differences(system: DerivedSystem, block: AcceleratorBlock) -> str:

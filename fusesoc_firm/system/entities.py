@@ -24,13 +24,14 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     for entity, block, frame in _converters(system):
         if frames.setdefault(entity, frame) != frame:
             message = f"'{block}' and {owners[entity]} need the entity '{entity}' for different messages"
-            hint = f"one system has a message in one ROS version: here ROS {int(frames[entity].ros)}"
+            hint = f"one system has a message in one ROS version: here {frames[entity].ros.title}"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(entity, f"converter '{block}'")
         package = constants_package(frame.message)
         if packages.setdefault(package, frame.message) != frame.message:
             message = f"'{block}' and {owners[package]} need the package '{package}' for different messages"
-            faults.error(message, blocks[block].name.source)
+            hint = "a package is called after package and name of its message, joined with '_', in small letters"
+            faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(package, f"converter '{block}'")
     for frame, suffix in system.computed_lengths.items():
         owners.setdefault(length_entity(frame, suffix), f"what computes the length of {frame.message}")
@@ -41,7 +42,8 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
             faults.error(f"no entity can be called '{name}'", name.source, hint)
         for entity in _entities(accelerator):
             if owner := owners.get(entity.lower()):
-                faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source)
+                hint = "the entities of one system have names of their own, whatever their capitals"
+                faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source, hint)
             owners[entity.lower()] = f"accelerator '{name}'"
 
 

@@ -47,7 +47,9 @@ class LoadedSystem:
 
     def _message_files(self) -> list[Path]:
         found: list[Path] = []
-        for frame in self.system.frames:
+        types = self.system.software.types
+        sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
+        for frame in dict.fromkeys((*self.system.frames, *sides)):
             library = self.libraries[frame.ros]
             found += library.files(library.closure(frame.message))
         return list(dict.fromkeys(found))

@@ -107,7 +107,9 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
         message = f"the function is called after its file, and '{function}' cannot be its name"
         faults.error(message, sources[0].source, hint)
     if not accelerator.inputs or not accelerator.outputs:
-        faults.error(f"'{name}' is of type HLS, which needs at least one input and one output", name.source)
+        lacking = "output" if accelerator.inputs else "input"
+        message = f"'{name}' is of type HLS, which needs at least one input and one output"
+        faults.error(message, name.source, f"its interface has no '{lacking}'")
     interface = accelerator.accelerator.interface
     for side, item in zip(
         (*accelerator.inputs, *accelerator.outputs), (*interface.input, *interface.output), strict=True

@@ -91,7 +91,8 @@ def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> Payloa
     """How the length of an accelerator's output is known; None if it is always the same, or with the fault noted."""
     if frame.is_fixed_size:
         if item.length is not None:
-            faults.error(f"'length' is given for {frame.message}, which is of fixed size", item.length.source)
+            message = f"'length' is given for {frame.message}, which is of fixed size"
+            faults.error(message, item.length.source, "leave it out: the length is always the same")
         return None
     length = sent_length_of(frame)
     if item.length == LengthSource.COMPUTED.value and not length.is_computed:
@@ -133,7 +134,8 @@ def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics)
     """The size of a publisher's buffer; None if it has none, or with the fault noted."""
     if frame.is_fixed_size:
         if block.buffer is not None:
-            faults.error(f"'{block.name}' has a 'buffer', but {frame.message} is of fixed size", block.name.source)
+            message = f"'{block.name}' has a 'buffer', but {frame.message} is of fixed size"
+            faults.error(message, block.place("buffer"), "leave it out: only what is of variable size is stored")
         return None
     length = sent_length_of(frame)
     size = block.buffer
@@ -143,7 +145,7 @@ def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics)
         faults.error(f"'{block.name}' needs a 'buffer': {need.reason}", block.name.source, need.hint)
     elif size is not None and not length.minimum <= size <= _LARGEST_BUFFER:
         message = f"'{block.name}' cannot have a buffer of {size} bytes for {frame.message}"
-        faults.error(message, block.name.source, f"legal here: {length.minimum} to {_LARGEST_BUFFER}")
+        faults.error(message, block.place("buffer"), f"legal here: {length.minimum} to {_LARGEST_BUFFER}")
     return size
 
 

@@ -23,6 +23,8 @@ _TAKEN = """
     sub_axis_tdata sub_axis_tkeep sub_axis_tlast sub_axis_tvalid sub_axis_tready
     pub_axis_tdata pub_axis_tkeep pub_axis_tvalid pub_axis_tlast pub_axis_tready
     sched_request sched_beat sched_last sched_grant_valid sched_grant_select
+    u_link u_adapter clock_hz baud link_error
+    uart_rxd uart_txd uart_rts_n uart_cts_n spi_sclk spi_cs_n spi_mosi spi_miso spi_irq
     periods deadlines transfer_times firm_sched_pkg times_t
     std standard std_logic std_logic_vector
 """.split()

@@ -6,18 +6,20 @@ from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import AcceleratorType
 from fusesoc_firm.system.sides import accelerator_ports
-from fusesoc_firm.system.specification import Pin
+from fusesoc_firm.system.specification import SOFTWARE, Pin
 
 # As many as the largest array has that a port of a message holds.
 _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
+# What accelerators of some types lack.
+_WITHOUT_PINS = {"HLS": "ports but those of its messages", SOFTWARE: "ports"}
 
 
 def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:
     """Note every pin that cannot be a port of its accelerator."""
     accelerator = type_.accelerator
-    if accelerator.type == "HLS" and accelerator.pins:
-        message = f"'{accelerator.name}' is of type HLS, which has no ports but those of its messages"
+    if accelerator.type in _WITHOUT_PINS and accelerator.pins:
+        message = f"'{accelerator.name}' is of type {accelerator.type}, which has no {_WITHOUT_PINS[accelerator.type]}"
         faults.error(message, accelerator.pins[0].source, "write this accelerator in VHDL")
         return
     taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")
@@ -28,12 +30,14 @@ def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:
 
 def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
     if pin.bits is not None and not 1 <= pin.bits <= _MOST_BITS:
-        faults.error(f"'bits' of pin '{pin.name}' cannot be {pin.bits}", pin.source, f"legal here: 1 to {_MOST_BITS}")
+        message = f"'bits' of pin '{pin.name}' cannot be {pin.bits}"
+        faults.error(message, pin.place("bits"), f"legal here: 1 to {_MOST_BITS}")
     if not pin.name:
         return
     if identifier(pin.name) != pin.name:
         hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
         faults.error(f"no port can be called '{pin.name}'", pin.name.source, hint)
     elif owner := taken.get(pin.name.lower()):
-        faults.error(f"a pin cannot be called '{pin.name}', which is {owner}", pin.name.source)
+        hint = "the ports of an entity have names of their own, whatever their capitals"
+        faults.error(f"a pin cannot be called '{pin.name}', which is {owner}", pin.name.source, hint)
     taken[pin.name.lower()] = f"the pin at {pin.name.source}"

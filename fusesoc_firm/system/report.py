@@ -15,7 +15,8 @@ from fusesoc_firm.system.generator import LoadedSystem, Part, artifacts
 class Report:
     """Lines of code of a system: what its author wrote, and what is made of it.
 
-    Empty lines and lines of comment do not count. `configuration` are those of the templates' data, as YAML.
+    Empty lines and lines of comment do not count. `software` are those of functions that stand where hardware could,
+    `configuration` those of the templates' data, as YAML.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Report:
     wrappers: int
     converters: int
     components: int
+    software: int = 0
 
     @property
     def generated(self) -> int:
@@ -33,12 +35,13 @@ class Report:
     @property
     def ratio(self) -> float:
         """Lines made for each line written."""
-        return self.generated / self.written
+        return self.generated / (self.written + self.software)
 
     def __str__(self) -> str:
         rows = {
             "system": self.name,
             "lines written: specification": self.written,
+            **({"lines written: software": self.software} if self.software else {}),
             "template configuration": self.configuration,
             "accelerators' wrappers": self.wrappers,
             "converters": self.converters,
@@ -65,7 +68,14 @@ def report(specification: Path, loaded: LoadedSystem) -> Report:
         lines[Part.WRAPPERS],
         lines[Part.CONVERTERS],
         lines[Part.COMPONENTS],
+        sum(_lines_of_code(path.read_text(encoding="utf-8"), "#") for path in _software(loaded)),
     )
+
+
+def _software(loaded: LoadedSystem) -> list[Path]:
+    """The sources of software, each once."""
+    sources = (source for type_ in loaded.system.software.types for source in type_.accelerator.sources)
+    return [*dict.fromkeys((loaded.folder / source).resolve() for source in sources)]
 
 
 def _lines_of_code(text: str, comment: str) -> int:

@@ -16,11 +16,14 @@ from fusesoc_firm.system.derived import (
     Converter,
     DerivedSystem,
     End,
+    MessageSide,
     PayloadLength,
     PublisherTimes,
     Scheduling,
 )
+from fusesoc_firm.system.python_function import function_name
 from fusesoc_firm.system.sides import side_ports
+from fusesoc_firm.system.specification import AXI_STREAM
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
@@ -31,6 +34,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "top": system.entity,
             "fpgaPart": system.fpga_part,
             "width": system.width,
+            "interconnect": system.link.kind.value if system.link else AXI_STREAM,
             **_scheduling(system.scheduling),
             **_clocks(system),
         },
@@ -57,6 +61,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             for block in system.accelerators
         ],
         "Connections": list(_connections(system.connections, system.width)),
+        **_software(system),
         **_crossings(system),
     }
 
@@ -101,12 +106,57 @@ def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict
     return {"pins": pins} if pins else {}
 
 
+def _software(system: DerivedSystem) -> dict[str, Any]:
+    """The blocks in software, and the ways of their messages on the host."""
+    blocks = [
+        {
+            "name": block.block,
+            "type": str(block.type.accelerator.type),
+            **_function(block),
+            "inputs": [_taken(End(block.block, side.prefix), side, system) for side in block.type.inputs],
+            "outputs": [_given(End(block.block, side.prefix), side, system) for side in block.type.outputs],
+        }
+        for block in system.software.blocks
+    ]
+    return {"Software": blocks} if blocks else {}
+
+
+def _function(block: AcceleratorBlock) -> dict[str, Any]:
+    sources = [str(source) for source in block.type.accelerator.sources]
+    return {"function": function_name(block.type), "sources": sources} if sources else {}
+
+
+def _taken(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
+    """A message that software takes: where it is from."""
+    sources = [item.source for item in system.software.connections if end in item.sinks]
+    return {**_message(end, side, system), "from": [_place(source, system.publishers, system) for source in sources]}
+
+
+def _given(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
+    """A message that software gives: where it goes."""
+    sinks = [sink for item in system.software.connections if item.source == end for sink in item.sinks]
+    return {**_message(end, side, system), "to": [_place(sink, system.subscribers, system) for sink in sinks]}
+
+
+def _message(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
+    return {"name": system.names[end], "nameMW": str(side.frame.message), "ROS": int(side.frame.ros)}
+
+
+def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> dict[str, Any]:
+    """What a message of software comes from or goes to: another block, a converter of the hardware, or a topic."""
+    if end.prefix:
+        return {"block": end.block, "message": system.names[end]}
+    crossing = [item for item in converters if item.block == end.block]
+    return {"converter": end.block, "id": crossing[0].id} if crossing else {"topic": end.block}
+
+
 def _converter(converter: Converter, entity: str) -> dict[str, Any]:
     return {
         "nameBD": entity,
         "nameMW": str(converter.frame.message),
         "ROS": int(converter.frame.ros),
         "block": converter.block,
+        **({"software": converter.software.block} if converter.software else {}),
         "id": converter.id,
         "payloadBytes": _payload_bytes(converter.frame),
     }

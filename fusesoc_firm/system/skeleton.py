@@ -11,20 +11,22 @@ from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem, MessageSide
 from fusesoc_firm.system.hls import arguments, function_name, prototype
+from fusesoc_firm.system.python_skeleton import python_skeleton
 from fusesoc_firm.system.sides import SidePort, accelerator_ports
-from fusesoc_firm.system.specification import Pin
+from fusesoc_firm.system.specification import SOFTWARE, Pin
 
 Configuration = dict[str, Any]
 
-_TEMPLATES = {"VHDL": "vhdl/skeleton.vhd", "HLS": "hls/skeleton.cpp"}
+_TEMPLATES = {"VHDL": "vhdl/skeleton.vhd", "HLS": "hls/skeleton.cpp", SOFTWARE: "python/skeleton.py"}
 
 
 def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
     """A text for the first source of each accelerator none of whose sources is in `folder`."""
     texts = {}
-    for type_ in system.accelerator_types:
+    for type_ in (*system.accelerator_types, *system.software.types):
         paths = [folder / source for source in type_.accelerator.sources]
-        if not any(path.exists() for path in paths):
+        # Software elsewhere has none.
+        if paths and not any(path.exists() for path in paths):
             texts[paths[0]] = skeleton(type_)
     return texts
 
@@ -32,7 +34,10 @@ def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
 def skeleton(type_: AcceleratorType) -> str:
     """The text of an accelerator's source."""
     language = str(type_.accelerator.type)
-    configuration = _function(type_) if language == "HLS" else _entity(type_)
+    if language == SOFTWARE:
+        configuration = python_skeleton(type_)
+    else:
+        configuration = _function(type_) if language == "HLS" else _entity(type_)
     return render(_TEMPLATES[language], {**configuration, "purpose": _purpose(type_)})
 
 

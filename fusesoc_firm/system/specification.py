@@ -15,8 +15,14 @@ from fusesoc_firm.message.model import MIDDLEWARES
 from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
+# The type of an accelerator that is a function on the host.
+SOFTWARE = "ROS-SW"
 # The types of accelerators, each with the endings of its sources' names.
-SOURCE_SUFFIXES = {"HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"), "VHDL": (".vhd", ".vhdl")}
+SOURCE_SUFFIXES = {
+    "HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"),
+    "VHDL": (".vhd", ".vhdl"),
+    SOFTWARE: (".py",),
+}
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
 # A block that is no accelerator, and one that is.
@@ -33,6 +39,9 @@ SCHEDULERS = (
 )
 # The smallest of these that holds all deadlines.
 AUTO_SCHEDULER = "auto"
+# How frames get between the host and the system: the top level's own streams, or a link of bytes (cores/board).
+AXI_STREAM = "axi_stream"
+LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 
@@ -65,6 +74,11 @@ class Project(Section):
         name="shortestRun",
         form="integer",
         default=16,
+    )
+    interconnect: Text = key(
+        "how frames get between the host and the system: as streams, for a DMA engine, or over a link of bytes",
+        choices=(AXI_STREAM, *LINKS),
+        default=Text(AXI_STREAM),
     )
     clock: Text | None = key("frequency of clk, such as 100 MHz, for times that are not in cycles and for clocks")
     clocks: tuple[ClockDomain, ...] = key("further clocks, for accelerators", form="sections", section=ClockDomain)
@@ -110,10 +124,17 @@ class Accelerator(Section):
 
     name: Text = key("the type's name; for VHDL that of the entity", is_required=True)
     type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
-    sources: tuple[Text, ...] = key("its source files, relative to the specification", form="texts", is_required=True)
+    sources: tuple[Text, ...] = key(
+        "its source files, relative to the specification", form="texts", is_required=True, unless=("type", SOFTWARE)
+    )
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
     width: int | None = key("bits of its streams; those of the project unless given", form="integer", choices=WIDTHS)
     pins: tuple[Pin, ...] = key("its ports that lead out of the system", form="sections", section=Pin)
+
+    @property
+    def is_software(self) -> bool:
+        """Whether it runs on the host."""
+        return self.type == SOFTWARE
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,10 @@ _SECONDS = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1
 _HERTZ = {"Hz": 1, "kHz": 1000, "MHz": 10**6, "GHz": 10**9}
 _QUANTITY = re.compile(r"(\d+(?:\.\d+)?)\s*([A-Za-z]*)")
 
+# What to add to a publisher that lacks a time.
+_PERIOD = "add 'period: <cycles, a time, or a rate>', such as 'period: 100 Hz'"
+_WCET = "add 'wcet: <cycles or a time>', or 'buffer: <bytes of its longest payload>'"
+
 Rounding = Callable[[Fraction], int]
 
 
@@ -47,8 +51,7 @@ def scheduling_of(
     project: Project, blocks: Mapping[str, Block], publishers: Sequence[Converter], faults: Diagnostics
 ) -> Scheduling:
     """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted."""
-    clock = frequency("clock", project.clock, faults) if project.clock else None
-    reader = _Reader(project.clock is not None, clock, faults)
+    reader = _Reader(project.clock is not None, clock_frequency(project, faults), faults)
     times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
     policy, reasons = str(project.scheduler), tuple[str, ...]()
     _check_shortest_run(project, faults)
@@ -63,9 +66,12 @@ def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
     faults = Diagnostics()
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
-            faults.error(f"the 'period' of publisher '{publisher.block}' is not given")
+            hint = "the least time between its messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
+            faults.error(f"the 'period' of publisher '{publisher.block}' is not given", hint=hint)
         if times.transfer_time is None:
-            faults.error(f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound")
+            hint = "the cycles that its longest frame takes to be sent"
+            message = f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound"
+            faults.error(message, hint=hint)
     faults.raise_if_any()
     return _tasks(system.publishers, system.scheduling.times)
 
@@ -113,6 +119,11 @@ def _time_bits(times: Iterable[PublisherTimes]) -> int:
     return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
 
 
+def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
+    """The clock's frequency in Hz; None if it is not given, or wrong, which is noted."""
+    return None if project.clock is None else frequency("clock", project.clock, faults)
+
+
 def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
     """A frequency in Hz, or None if what stands at `key` is none, which is noted."""
     found = _QUANTITY.fullmatch(text)
@@ -124,7 +135,8 @@ def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
 
 def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
     if project.shortest_run < 1:
-        faults.error(f"'shortestRun' cannot be {project.shortest_run}", project.source, "legal: 1 and more beats")
+        place = project.place("shortest_run")
+        faults.error(f"'shortestRun' cannot be {project.shortest_run}", place, "legal here: 1 and more beats")
 
 
 def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
@@ -132,13 +144,13 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
     for block, item in zip(blocks, times, strict=True):
         # What cannot be read is noted already.
         if policy == AUTO_SCHEDULER and item.period is None and block.period is None:
-            faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source)
+            faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
         if policy in WITH_DEADLINES and item.deadline is None and block.period is None and block.deadline is None:
-            faults.error(f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'", block.name.source)
+            message = f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'"
+            faults.error(message, block.name.source, _PERIOD)
         if policy in (*WITH_TRANSFER_TIMES, AUTO_SCHEDULER) and item.transfer_time is None and block.wcet is None:
-            faults.error(
-                f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound", block.name.source
-            )
+            message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound"
+            faults.error(message, block.name.source, _WCET)
 
 
 @dataclass(frozen=True)
@@ -172,12 +184,12 @@ class _Reader:
         if unit and self.clock is None:
             if not self.is_clock_given:
                 message = f"'{key}' is '{time}', but the clock's frequency is not given"
-                self.faults.error(message, time.source, "add 'clock' to the project, such as 'clock: 100 MHz'")
+                self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
             return None
         cycles = number if not unit else self._of_unit(number, unit)
         if not 1 <= cycles <= _LONGEST_TIME:
-            message = f"'{key}' is {floor(cycles)} cycles; legal: 1 to {_LONGEST_TIME}"
-            self.faults.error(message, time.source)
+            message = f"'{key}' is {floor(cycles)} cycles"
+            self.faults.error(message, time.source, f"legal here: 1 to {_LONGEST_TIME} cycles")
             return None
         return rounded(cycles)
 

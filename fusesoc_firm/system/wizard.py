@@ -183,7 +183,7 @@ class _Draft:
 
     def needs(self, entry: Key) -> bool:
         """Whether a key must be there: a converter has all of one word that the grammar leaves open to a block."""
-        return entry.is_required or (entry.only_of == CONVERTER and entry.form == "text")
+        return entry.is_needed(self.made) or (entry.only_of == CONVERTER and entry.form == "text")
 
 
 def _default(section: type[Section], field_name: str) -> str:

@@ -47,7 +47,7 @@ def loop_text(frame: Frame, width: int) -> str:
         _TEMPLATE,
         {
             "message": str(frame.message),
-            "ros": int(frame.ros),
+            "middleware": frame.ros.title,
             "entity": ENTITY,
             "width": width,
             "subscriber": SUBSCRIBER_ID,

@@ -133,10 +133,10 @@ def _groups(entries: Sequence[Entry], versions_of_ros: Sequence[RosVersion]) -> 
     rows = []
     for ros in versions_of_ros:
         mine = [entry for entry in entries if entry.ros is ros]
-        rows.append((f"ROS {int(ros)}", mine))
+        rows.append((f"{ros.title}", mine))
         for level, words in _LEVELS.items():
             of_level = [entry for entry in mine if entry.statistics and entry.statistics.level is level]
-            rows.append((f"ROS {int(ros)}, level {words}", of_level))
+            rows.append((f"{ros.title}, level {words}", of_level))
     return rows
 
 
@@ -188,7 +188,7 @@ def _figures(entries: Sequence[Entry], ros: RosVersion) -> list[dict[str, Any]]:
         ("Distinct types of the fields", histogram([each.types for each in known], 0, 1, 60)),
         ("Depth of nesting; 1 is a message without another one", histogram([each.depth for each in known], 1, 1, 30)),
     )
-    return [_figure(f"ROS {int(ros)}: {title}", found, known) for title, found in figures]
+    return [_figure(f"{ros.title}: {title}", found, known) for title, found in figures]
 
 
 def _figure(title: str, found: Histogram, known: Sequence[Statistics]) -> dict[str, Any]:

@@ -94,6 +94,11 @@ def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
     """The messages that the system publishes when `subscriber` receives `message`."""
     if subscriber != "camera":
         raise ValueError(f"unknown subscriber '{subscriber}', legal: 'camera'")
-    for accelerator in ACCELERATORS.values():
-        message = accelerator(message)
-    return [("sums", message)]
+    gray_image = ACCELERATORS["rgb_to_gray"](message)
+    small_image = ACCELERATORS["scale_down"](gray_image)
+    # What goes to an accelerator counts where that is software.
+    return [
+        ("small_in", gray_image),
+        ("integral_in", small_image),
+        ("sums", ACCELERATORS["integral_image"](small_image)),
+    ]

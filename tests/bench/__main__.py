@@ -1,6 +1,6 @@
-"""`make bench`: measure, print the tables, write docs/figures.md and the schedulers' areas.
+"""`make bench`: measure, print the tables, write docs/figures.md and the areas of Manager and schedulers.
 
-    python -m tests.bench [area] [timing] [cycles] [fuzz] [images] [--seed N] [--broken N]
+    python -m tests.bench [area] [manager] [timing] [cycles] [fuzz] [images] [systems] [--seed N] [--broken N]
 
 Progress goes to the standard error, tables to the standard output. The exit code is 1 if a design cannot be measured,
 a converter fails or a bar is missed; messages that are not converted yet are none of these.
@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from tests.bench import area, cycles, figures, fuzz, images, timing
+from tests.bench import area, cycles, figures, fuzz, images, manager, systems, timing
 from tests.bench.areas import write_areas
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import Table
@@ -40,16 +40,20 @@ def main() -> int:
         is_good = is_good and all(table.is_good for table in tables)
         sections[part] = figures.section(part, tables)
         print(sections[part], flush=True)
-        if part == "area":
+        if part == "manager":
             write_areas(tables)
     figures.write(sections)
     return 0 if is_good else 1
 
 
 def _measure(part: str, seed: int, broken: int) -> list[Table]:
+    if part == "systems":
+        return systems.measure(seed, _tell)
     yosys = Yosys()
     if part == "area":
         return area.measure(yosys, _tell)
+    if part == "manager":
+        return manager.measure(yosys, _tell)
     if part == "timing":
         return timing.measure(Nextpnr(yosys), _tell)
     if part == "images":

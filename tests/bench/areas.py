@@ -1,4 +1,4 @@
-"""The schedulers' areas as a file: `firm scheduler bench` shows them, `firm scheduler choose` compares them."""
+"""Areas of the Manager and of schedulers as a file: `firm scheduler bench` shows them, the choice compares them."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from tests.sim.ghdl import REPOSITORY
 
 PATH = REPOSITORY / "fusesoc_firm" / "scheduling" / FILE
 
-_SCHEDULER = re.compile(r"(\w+), N = (\d+)")
+# The Manager is that of the dissertation's streams.
+_WIDTHS = ("", "8")
+_DESIGN = re.compile(r"(\S+), N = (\d+)")
 
 
 def write_areas(tables: Iterable[Table], path: Path = PATH) -> None:
-    """Write what the table of schedulers holds; a scheduler that could not be measured is left out."""
-    (table,) = (table for table in tables if table.title == "Schedulers")
-    columns = [table.columns.index(name) for name in ("design", "LUT", "FF", "LUT as RAM")]
+    """Write what the tables of the Manager and of schedulers hold; what could not be measured is left out."""
     found = {}
-    for row in table.rows:
-        design, lut, ff, memory = (row[column] for column in columns)
-        name = _SCHEDULER.fullmatch(design)
-        if name and lut and ff:
-            # LUTs that are memory are LUTs.
-            found[name[1], int(name[2])] = Area(int(lut) + int(memory or 0), int(ff))
+    for table in tables:
+        columns = [table.columns.index(name) for name in ("design", "bits", "LUT", "FF", "LUT as RAM")]
+        for row in table.rows:
+            design, width, lut, ff, memory = (row[column] for column in columns)
+            name = _DESIGN.fullmatch(design)
+            if name and lut and width in _WIDTHS:
+                # LUTs that are memory are LUTs.
+                found[name[1], int(name[2])] = Area(int(lut) + int(memory or 0), int(ff))
     write(path, found)

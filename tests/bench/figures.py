@@ -9,17 +9,26 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, images, nextpnr, timing, yosys
+from tests.bench import area, cycles, fuzz, images, manager, nextpnr, systems, timing, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
 FIGURES = REPOSITORY / "docs" / "figures.md"
 
-_HEADINGS = {"area": "Area", "timing": "Timing", "cycles": "Cycles", "fuzz": "Fuzzing", "images": "Images"}
+_HEADINGS = {
+    "area": "Area",
+    "manager": "Area of Manager and schedulers",
+    "timing": "Timing",
+    "cycles": "Cycles",
+    "fuzz": "Fuzzing",
+    "images": "Images",
+    "systems": "Systems",
+}
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
         to LUT6, and inverters but for those of resets, which a slice has; FF are FDRE, FDSE, FDCE and FDPE. A design
         with a latch fails. The dissertation's are Vivado's on an UltraScale+, LUT/FF.""",
+    "manager": "Measured as in 'Area'.",
     "timing": f"""The clock's frequency that all paths keep after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
         (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. Another seed gives figures
         some percent away.""",
@@ -27,12 +36,13 @@ _METHODS = {
     "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
     "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
+    "systems": "Time that a user waits for a large system.",
 }
 _INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `timing`, `cycles`, `fuzz`,
-    `images`). 'not
-    converted' is a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand:
-    `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `cycles`,
+    `fuzz`, `images`, `systems`). 'not converted' is a message that no converter is made of yet, or, for FrankaState,
+    whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell
+    how a row stands to its bar.
     """
 
 
@@ -43,7 +53,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    return area.keys() | timing.keys() | cycles.keys() | fuzz.keys() | images.keys()
+    return area.keys() | manager.keys() | timing.keys() | cycles.keys() | fuzz.keys() | images.keys() | systems.keys()
 
 
 def section(part: str, tables: Sequence[Table]) -> str:
@@ -66,10 +76,12 @@ def _section_of(text: str, heading: str) -> str:
 
 
 def _versions(part: str) -> str:
+    if part == "systems":
+        return f"With Python {platform.python_version()} and rosbags {metadata.version('rosbags')}."
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
-    elif part in ("area", "timing"):
+    elif part in ("area", "manager", "timing"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
         tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
     else:

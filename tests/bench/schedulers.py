@@ -1,9 +1,11 @@
-"""The schedulers that are measured: each policy's entity, with times spread as in the large data set of section 4.3."""
+"""The schedulers that are measured: of each policy, and combined ones; times are as in the large set of section 4.3."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+from fusesoc_firm.scheduling.combinations import TOP
 from fusesoc_firm.system.specification import SCHEDULERS
 from fusesoc_firm.system.timing import WITH_TRANSFER_TIMES
 from tests.sim.ghdl import Library, core_files
@@ -18,11 +20,27 @@ _ENTITY = "measured_scheduler"
 
 def analysed(folder: Path, policy: str, requesters: int) -> tuple[Library, str]:
     """A policy's entity for so many requesters in a library of its own, and what it is called there."""
+    return _wrapped(folder, ENTITIES[policy].entity, requesters, _generics(policy, requesters))
+
+
+def combined(folder: Path, policies: Sequence[str], requesters: int) -> tuple[Library, str]:
+    """The same of a scheduler of schedulers, whose groups of these policies share the requesters evenly."""
+    generics = {
+        "REQUESTERS": str(requesters),
+        "SIZES": _aggregate(requesters // len(policies) for _ in policies),
+        "POLICIES": _aggregate(policies),
+        "TOP_POLICY": TOP,
+        **_times(requesters),
+    }
+    return _wrapped(folder, "firm_sched_combined", requesters, generics)
+
+
+def _wrapped(folder: Path, entity: str, requesters: int, generics: Mapping[str, str]) -> tuple[Library, str]:
     firm, work = Library("firm", folder), Library("work", folder)
-    firm.analyse(core_files("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES)))
+    cores = (*POLICY_CORES, "by_policy", "combined")
+    firm.analyse(core_files("axis/axis", "sched/package", *(f"sched/{core}" for core in cores)))
     file = folder / f"{_ENTITY}.vhd"
-    entity = ENTITIES[policy]
-    file.write_text(wrapper(_ENTITY, entity.entity, requesters, _generics(policy, requesters)), encoding="ascii")
+    file.write_text(wrapper(_ENTITY, entity, requesters, generics), encoding="ascii")
     work.analyse([file])
     return work, _ENTITY
 
@@ -30,15 +48,27 @@ def analysed(folder: Path, policy: str, requesters: int) -> tuple[Library, str]:
 def _generics(policy: str, requesters: int) -> dict[str, str]:
     entity = ENTITIES[policy]
     generics = {"REQUESTERS": str(requesters), **{name: str(value).lower() for name, value in entity.generics.items()}}
-    if entity.has_times:
-        generics |= {"TIME_BITS": str(TIME_BITS), "PERIODS": _times(37, requesters)}
-    if policy in WITH_TRANSFER_TIMES:
-        generics["TRANSFER_TIMES"] = _times(61, requesters)
-    return generics
+    times = _times(requesters) if entity.has_times else {}
+    if policy not in WITH_TRANSFER_TIMES:
+        times.pop("TRANSFER_TIMES", None)
+    return generics | times
 
 
-def _times(step: int, requesters: int) -> str:
-    """A time for each requester, which have nothing in common."""
+def _times(requesters: int) -> dict[str, str]:
+    """All generics that are about time; the steps have nothing in common with each other."""
+    return {
+        "TIME_BITS": str(TIME_BITS),
+        "PERIODS": _aggregate(_spread(37, requesters)),
+        "TRANSFER_TIMES": _aggregate(_spread(61, requesters)),
+    }
+
+
+def _spread(step: int, requesters: int) -> Iterator[int]:
+    """A time for each requester."""
     range_of_times = LONGEST_TIME - SHORTEST_TIME + 1
-    times = (SHORTEST_TIME + step * requester % range_of_times for requester in range(requesters))
-    return f"({', '.join(f'{requester} => {time}' for requester, time in enumerate(times))})"
+    return (SHORTEST_TIME + step * requester % range_of_times for requester in range(requesters))
+
+
+def _aggregate(values: Iterable[object]) -> str:
+    """An array in VHDL; with names, since one of a single value needs them."""
+    return f"({', '.join(f'{index} => {value}' for index, value in enumerate(values))})"

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+
+from fusesoc_firm.scheduling.tables import grid
 
 NOT_CONVERTED = "not converted"
 MET, MISSED, FAILED = "met", "MISSED", "FAILED"
@@ -26,12 +28,8 @@ class Table:
 
     def __str__(self) -> str:
         table = self._without_empty_columns()
-        lines = [table.columns, *table.rows]
-        widths = [max(len(line[column]) for line in lines) for column in range(len(table.columns))]
-        rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (width + 1) + ":" for width in widths[1:]), ""])
-        heading, *body = (_line(line, widths) for line in lines)
-        text = "\n".join([f"### {self.title}", "", heading, rule, *body])
-        return f"{text}\n\n{filled(self.note)}\n" if self.note else f"{text}\n"
+        text = f"### {self.title}\n\n{grid(table.columns, table.rows)}"
+        return f"{text}\n{filled(self.note)}\n" if self.note else text
 
     @property
     def is_good(self) -> bool:
@@ -47,9 +45,3 @@ class Table:
 def filled(text: str) -> str:
     """A paragraph in lines as long as docs have them."""
     return textwrap.fill(" ".join(text.split()), _LINE_LENGTH)
-
-
-def _line(cells: Sequence[str], widths: Sequence[int]) -> str:
-    aligned = [cells[0].ljust(widths[0])]
-    aligned += [cell.rjust(width) for cell, width in zip(cells[1:], widths[1:], strict=True)]
-    return f"| {' | '.join(aligned)} |"

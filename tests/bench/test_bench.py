@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,9 @@ from fusesoc_firm.frame.values import CodecError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.generator import load_system
 from tests import yowasp
-from tests.bench import figures, fuzz
+from tests.bench import figures, fuzz, systems
 from tests.bench.cycles import cycles_of
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, ports_of
 from tests.bench.model import FrameError, Message, publisher_model, subscriber_model
@@ -203,3 +205,18 @@ def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
     )
     for wrong in cases:
         assert fuzz.difference(model, frames, wrong)
+
+
+def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
+    """And what is measured ends well: a broken call would be measured as well."""
+    systems.write_system(tmp_path, SEED)
+    libraries = {ros: MessageLibrary(ros) for ros in RosVersion}
+    system = load_system(tmp_path / "spec.yaml", libraries).system
+    assert len(system.subscribers) + len(system.publishers) + len(system.accelerators) == systems.BLOCKS
+    assert len({connection.frame.message for connection in system.connections}) == systems.MESSAGES
+    for job in systems.JOBS:
+        wall, processor = systems.run(job, tmp_path)
+        assert 0 < processor <= wall
+    (tmp_path / "spec.yaml").write_text("project: {}\n", encoding="utf-8")
+    with pytest.raises(subprocess.CalledProcessError, match=r"fusesoc_firm\.cli"):
+        systems.run(systems.JOBS[0], tmp_path)

@@ -9,12 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from fusesoc_firm.render import render
 from tests.bench import schedulers
 from tests.bench.area import Subject
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.bench.yosys import SynthesisError
 from tests.sim.ghdl import GhdlError, Library, core_files
+from tests.sim.schedulers import ENTITIES
 
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.
@@ -23,8 +25,13 @@ MANAGER_WIDTH = 8
 
 _SCHEDULERS_TITLE = "Schedulers, MHz"
 _MANAGER_TITLE = f"Manager without scheduler, {MANAGER_WIDTH} bits, MHz"
+_LOOP_TITLE = f"Manager with its scheduler, {MANAGER_WIDTH} bits, MHz"
 _COLUMNS = ("design", *(f"N = {channels}" for channels in CHANNELS), "bar", "result")
 _BAR = ", ".join(f"{bar:.0f} at {channels}" for channels, bar in BARS.items())
+
+# The simplest one has no more than the loop itself.
+_POLICIES_IN_LOOP = ("fixed_priority",)
+_LOOP_ENTITY = "manager_loop"
 
 Make = Callable[[Path, int], Subject]
 
@@ -39,7 +46,11 @@ class Row:
 
 def rows() -> dict[str, list[Row]]:
     """All rows by the title of their table."""
-    return {_SCHEDULERS_TITLE: [*_schedulers()], _MANAGER_TITLE: [Row("firm_manager", _manager)]}
+    return {
+        _SCHEDULERS_TITLE: [*_schedulers()],
+        _MANAGER_TITLE: [Row("firm_manager", _manager)],
+        _LOOP_TITLE: [Row(policy, _loop(policy)) for policy in _POLICIES_IN_LOOP],
+    }
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
@@ -102,3 +113,20 @@ def _manager(folder: Path, channels: int) -> Subject:
     library.analyse(core_files("axis/axis", "manager/manager"))
     generics = {"WIDTH": MANAGER_WIDTH, "SUBSCRIBERS": channels, "PUBLISHERS": channels}
     return Subject(library, "firm_manager", generics)
+
+
+def _loop(policy: str) -> Make:
+    def make(folder: Path, channels: int) -> Subject:
+        library, scheduler = schedulers.analysed(folder, policy, channels)
+        Library("firm", folder).analyse(core_files("manager/manager"))
+        file = folder / f"{_LOOP_ENTITY}.vhd"
+        configuration = {
+            "entity": _LOOP_ENTITY,
+            "scheduler": scheduler,
+            "is_preemptive": str(ENTITIES[policy].is_preemptive).lower(),
+        }
+        file.write_text(render(file.name, configuration, Path(__file__).parent), encoding="ascii")
+        library.analyse([file])
+        return Subject(library, _LOOP_ENTITY, {"WIDTH": MANAGER_WIDTH, "CHANNELS": channels})
+
+    return make

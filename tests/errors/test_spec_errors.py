@@ -6,27 +6,31 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.analysis import derive
-from fusesoc_firm.system.specification import read_specification
+from fusesoc_firm.system.derived import DerivedSystem
+from fusesoc_firm.system.generator import load_system
 from tests.expected import check_expected
 
 FOLDER = Path(__file__).parent / "spec"
 SPECIFICATIONS = sorted(FOLDER.glob("*.yaml"))
 
 
-@pytest.fixture(scope="module")
-def libraries() -> dict[RosVersion, MessageLibrary]:
-    return {ros: MessageLibrary(ros) for ros in RosVersion}
+def derive_file(
+    path: Path, libraries: dict[RosVersion, MessageLibrary], monkeypatch: pytest.MonkeyPatch
+) -> DerivedSystem:
+    """The system of one of `SPECIFICATIONS`, as `firm system check` derives it."""
+    monkeypatch.chdir(FOLDER)  # so that the messages show relative paths
+    return load_system(Path(path.name), libraries).system
 
 
 @pytest.mark.parametrize("path", SPECIFICATIONS, ids=lambda path: path.stem)
-def test_a_bad_specification_is_explained(path: Path, libraries: dict[RosVersion, MessageLibrary]) -> None:
-    faults = Diagnostics()
+def test_a_bad_specification_is_explained(
+    path: Path, libraries: dict[RosVersion, MessageLibrary], monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(InputError) as raised:
-        derive(read_specification(path, path.name, faults), path.parent, libraries, faults)
+        derive_file(path, libraries, monkeypatch)
     check_expected(path.with_suffix(".expected"), f"{raised.value}\n")
 
 

@@ -56,7 +56,9 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
     return done.returncode == 0 and "PASS 100/100" in done.stdout.splitlines()
 
 
-@pytest.mark.parametrize(("name", "messages"), [("image_pipeline", 7), ("sobel", 7), ("multi_type", 19)])
+@pytest.mark.parametrize(
+    ("name", "messages"), [("image_pipeline", 7), ("image_pipeline_software", 14), ("sobel", 7), ("multi_type", 19)]
+)
 def test_every_other_application_passes(tmp_path: Path, name: str, messages: int) -> None:
     done = run(name, tmp_path / "build")
     print(done.stdout)

@@ -66,14 +66,16 @@ def _fixed_priority() -> tuple[Proof, ...]:
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
         ),
         "scheduler_whole_tasks": (
-            Mutation(file, "(started_r or beat) and", "beat and", ("whole_tasks", "only_to_who_has_not_begun")),
+            Mutation(file, "started_r or beat;", "beat;", ("whole_tasks", "only_to_who_has_not_begun")),
             Mutation(file, "grant_select_r <= choice", "grant_select_r <= not choice", ("request_is_still_there",)),
         ),
         "scheduler_service": (
-            Mutation(file, "(started_r or beat) and not finished", "started_r or beat", ("no_deadlock",)),
+            Mutation(file, "kept and not finished and rst_n", "kept and rst_n", ("no_deadlock",)),
+            Mutation(file, "is_before or not offered", "is_before", ("no_deadlock",)),
         ),
-        "scheduler_gaps": (Mutation(file, "and not kept;", "and not (kept or finished);", ("no_gap_between_tasks",)),),
+        "scheduler_gaps": (Mutation(file, "(finished or (", "((", ("no_gap_between_tasks",)),),
         "scheduler_priority": (
+            Mutation(file, "is_before or not offered", "not offered", ("lowest_index_first",)),
             Mutation(
                 "firm_sched_pkg.vhd",
                 "      return lower;\n    end if;\n    return higher;",
@@ -99,7 +101,7 @@ def _fixed_priority_preemptive() -> tuple[Proof, ...]:
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not finished", ("grant_stays_valid",)),
         ),
         "scheduler_service": (Mutation(file, "    kept <= '0';", "    kept <= not beat;", ("no_deadlock",)),),
-        "scheduler_gaps": (Mutation(file, "    kept <= '0';", "    kept <= finished;", ("no_gap_between_tasks",)),),
+        "scheduler_gaps": (Mutation(file, "(finished or (", "((", ("no_gap_between_tasks",)),),
         "scheduler_priority": (Mutation(file, "    kept <= '0';", "    kept <= beat;", ("lowest_index_first",)),),
     }
     sizes = tuple({**size, "PREEMPTIVE": True} for size in _SIZES)
@@ -113,9 +115,9 @@ def _fixed_priority_runs() -> tuple[Proof, ...]:
         "scheduler_preemption": (
             Mutation(file, "beats < SHORTEST_RUN else", "beats < SHORTEST_RUN-1 else", ("no_short_run",)),
         ),
-        "scheduler_priority": (Mutation(file, "or finished = '1' or (moves", "or (moves", ("lowest_index_first",)),),
-        "scheduler_service": (Mutation(file, "offered(0) and not finished", "not finished", ("no_deadlock",)),),
-        "scheduler_gaps": (Mutation(file, "offered(0) and not finished", "offered(0)", ("no_gap_between_tasks",)),),
+        "scheduler_priority": (Mutation(file, "or finished = '1' or moves", "or moves", ("lowest_index_first",)),),
+        "scheduler_service": (Mutation(file, "<= offered when", "<= '1' when", ("no_deadlock",)),),
+        "scheduler_gaps": (Mutation(file, "(finished or (", "((", ("no_gap_between_tasks",)),),
     }
     sizes = tuple({**size, "PREEMPTIVE": True, "SHORTEST_RUN": 3} for size in _SIZES)
     helpers = "firm_sched_fixed_priority_runs"

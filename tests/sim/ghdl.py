@@ -53,6 +53,10 @@ class Library:
         """Analyse files in this order as strict VHDL-93; raise `GhdlError` on a fault."""
         self._ghdl("-a", *(str(file) for file in files))
 
+    def elaborate(self, entity: str) -> None:
+        """Bind and elaborate `entity` and all below it, without a simulation; raise `GhdlError` on a fault."""
+        self._ghdl("--elab-run", entity, "--no-run")
+
     def run(
         self,
         entity: str,

@@ -19,8 +19,9 @@ RUNTIME = (
     "sched/package",
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
-    "sim/host",
+    "board/link",
 )
+SIMULATION = ("sim/host", "sim/link")
 
 
 @dataclass(frozen=True)
@@ -76,9 +77,15 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
     *kernels, bench = _write(simulation.generate(request), folder)
     # A kernel before the wrapper that instantiates it, the test bench last.
     vhdl = [*kernels, *_write(generator.generate(request), folder), bench]
-    Library("firm", folder).analyse(core_files(*RUNTIME, *cores))
+    Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
     Library("work", folder).analyse(vhdl)
     return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
+
+
+def generate_system(spec: Path, folder: Path) -> list[Path]:
+    """Generate a system without its simulation into `folder`: its VHDL, in order. Raises `InputError`."""
+    parameters: dict[str, Plain] = {"spec": spec.name, "product": "system", "paths": None, "distro": None}
+    return _write(generator.generate(Request("far", "test:sys:system:0", spec.parent, parameters)), folder)
 
 
 def _write(core: GeneratedCore, folder: Path) -> list[Path]:

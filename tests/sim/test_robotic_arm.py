@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import random
 import re
 from pathlib import Path
@@ -15,6 +14,7 @@ from fusesoc_firm.generation import Plain
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
+from tests import corpus
 from tests.sim.applications import SPECS, for_ros2, simulation
 from tests.sim.ghdl import Library, core_files
 
@@ -22,8 +22,6 @@ ARM = SPECS / "robotic_arm"
 CORES = ("acc/cordic/cordic", "acc/float64/float64")
 SEED = 20240901
 LATENCY = 300
-# The environment variable that names the folder of real message definitions.
-CORPUS = "CORPUS"
 # Fields, their elements, and how far from zero these are: some desired ones have no result.
 FIELDS = (("q", 7, 4.0), ("q_d", 7, 16.5), ("o_t_ee", 16, 1.5), ("o_t_ee_d", 16, 4.02))
 
@@ -88,11 +86,10 @@ def test_the_netlist_answers_alike(tmp_path: Path) -> None:
     assert system.passes(SEED=5, STALL_PERCENT=10)
 
 
-@pytest.mark.skipif(not os.environ.get(CORPUS), reason=f"{CORPUS} names no folder of message definitions")
 def test_the_state_as_franka_ros_publishes_it(tmp_path: Path) -> None:
     """The same answers to franka_msgs/FrankaState: our states within messages whose other fields are at random."""
     print(f"seed {SEED}")
-    definitions = str(Path(os.environ[CORPUS], "ros1"))
+    definitions = str(corpus.definitions("ros1", "franka_msgs"))
     name = MessageName("franka_msgs", "FrankaState")
     closure = MessageLibrary(RosVersion.ROS1, [Path(definitions)]).closure(name)
     draw = Stimuli(closure, RosVersion.ROS1, random.Random(SEED))

@@ -26,15 +26,23 @@ accelerators:
     interface:
       input: [{{middleware: ROS, message: {POINT}}}]
       output: [{{middleware: ROS, message: {POSE}}}]
+  - name: plan
+    type: ROS-SW
+    sources: plan.py
+    interface:
+      input: [{{middleware: ROS, message: {POSE}}}]
+      output: [{{middleware: ROS, message: {POSE}}}]
 blocks:
   - {{name: image, middleware: ROS, mode: subscriber, message: {IMAGE}, outgoing: [{{name: m}}]}}
   - {{name: point, middleware: ROS, mode: subscriber, message: {POINT}, outgoing: [{{name: m}}]}}
   - {{name: other, middleware: ROS, mode: subscriber, message: {POINT}, outgoing: [{{name: t}}]}}
   - {{name: m, type: mix, outgoing: [{{name: image_out}}, {{name: pose_out}}]}}
-  - {{name: t, type: turn, outgoing: [{{name: turned}}]}}
+  - {{name: t, type: turn, outgoing: [{{name: turned}}, {{name: p}}]}}
+  - {{name: p, type: plan, outgoing: [{{name: planned}}]}}
   - {{name: image_out, middleware: ROS, mode: publisher, message: {IMAGE}}}
   - {{name: pose_out, middleware: ROS, mode: publisher, message: {POSE}}}
   - {{name: turned, middleware: ROS, mode: publisher, message: {POSE}}}
+  - {{name: planned, middleware: ROS, mode: publisher, message: {POSE}}}
 """
 STIMULI = """
 - image:
@@ -57,7 +65,11 @@ IMAGE = {"header": {"seq": 0, "stamp": STAMP, "frame_id": ""}, "height": 0, "wid
 
 
 def respond(subscriber, message):
-    return {"image": [], "other": [("turned", POSE)], "point": [("image_out", IMAGE), ("pose_out", POSE)]}[subscriber]
+    return {
+        "image": [],
+        "other": [("turned", POSE), ("p_in", POSE), ("planned", POSE)],
+        "point": [("image_out", IMAGE), ("pose_out", POSE)],
+    }[subscriber]
 """
 
 
@@ -73,7 +85,9 @@ def test_a_system_of_first_versions_answers_with_zeros(tmp_path: Path, capsys: p
     assert main(["system", "check", str(spec)]) == 1
     assert "'firm system skeleton' writes a first version" in capsys.readouterr().err
     assert main(["system", "skeleton", str(spec)]) == 0
-    assert capsys.readouterr().out == f"{tmp_path / 'rtl' / 'mix.vhd'}\n{tmp_path / 'turn.cpp'}\n"
+    assert (
+        capsys.readouterr().out == f"{tmp_path / 'rtl' / 'mix.vhd'}\n{tmp_path / 'turn.cpp'}\n{tmp_path / 'plan.py'}\n"
+    )
     made = system(tmp_path)
     assert made.passes(STALL_PERCENT=0)
     assert made.passes(SEED=3, STALL_PERCENT=60)
@@ -86,7 +100,7 @@ def test_what_is_there_is_never_overwritten(tmp_path: Path, capsys: pytest.Captu
     source.parent.mkdir()
     source.write_text("-- mine\n", encoding="utf-8")
     assert main(["system", "skeleton", str(spec)]) == 0
-    assert capsys.readouterr().out == f"{tmp_path / 'turn.cpp'}\n"
+    assert capsys.readouterr().out == f"{tmp_path / 'turn.cpp'}\n{tmp_path / 'plan.py'}\n"
     assert source.read_text(encoding="utf-8") == "-- mine\n"
     assert main(["system", "skeleton", str(spec)]) == 0
     assert capsys.readouterr().out == "every accelerator has a source\n"

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.cli import STAGES, main
+from fusesoc_firm.cli import main
+from fusesoc_firm.cli.message import STAGES
 from fusesoc_firm.library_path import library_root
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -249,6 +250,12 @@ def test_a_right_specification(capsys: Captured) -> None:
     assert text == f"{SPEC}: quat2euler is right: 1 subscriber, 1 accelerator, 1 publisher\n"
 
 
+def test_software_is_counted_apart(capsys: Captured) -> None:
+    spec = SPEC.parents[1] / "image_pipeline" / "image_pipeline_software.yaml"
+    text = out(capsys, "system", "check", str(spec))
+    assert text.endswith(": 2 subscribers, 2 accelerators, 2 publishers, 1 accelerator in software\n")
+
+
 @pytest.mark.parametrize("distro", ["noetic", "humble"])
 def test_a_distribution_of_either_version_serves_a_specification(distro: str, capsys: Captured) -> None:
     assert "is right" in out(capsys, "system", "check", str(SPEC), "--distro", distro)
@@ -285,7 +292,7 @@ def test_a_reader_that_leaves_early_is_no_fault() -> None:
 def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec, picture = tmp_path / "robot.yaml", tmp_path / "robot.dot"
     point = "geometry_msgs/Point"
-    answers = ["robot", *[""] * 6, "no", "sub", "", "ROS", "subscriber", point, "", "", "yes", "pub", "", "", "no"]
+    answers = ["robot", *[""] * 7, "no", "sub", "", "ROS", "subscriber", point, "", "", "yes", "pub", "", "", "no"]
     answers += ["yes", "pub", "", "ROS", "publisher", point, *[""] * 6, "no", "no"]
     monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
     assert f"{spec}: robot is right: 1 subscriber" in out(capsys, "system", "new", str(spec))

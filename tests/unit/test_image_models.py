@@ -87,9 +87,9 @@ def test_edges(pixels: Pixels) -> None:
 def test_what_is_no_image_becomes_an_empty_one(model: Any, channels: int) -> None:
     source = random.Random(SEED)
     for message in broken_images("ROS", source, channels):
-        ((_, answer),) = model.respond("camera", message)
+        (*_, (_, answer)) = model.respond("camera", message)
         assert [answer[field] for field in ("height", "width", "step", "data")] == [0, 0, 0, b""]
-    ((_, answer),) = model.respond("camera", image("ROS", source, 3, 5, channels))
+    (*_, (_, answer)) = model.respond("camera", image("ROS", source, 3, 5, channels))
     assert answer["data"]
 
 

@@ -101,6 +101,21 @@ def test_the_bracket_that_is_open_is_named() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "legal"),
+    [
+        ("a:\n  b: c\n # d\n e: f\n", "0 (a, line 1), 2 (b, line 2)"),
+        ("a:\n  - - b: c - d\n\n   e: f\n", "0 (a, line 1), 2 (-, line 2), 4 (-, line 2), 6 (b, line 2)"),
+        ("  a: b\nc: d\n", "2 (a, line 1)"),
+        ("a:\n    b: c\nd:\n  e: f\n   g: h\n", "0 (a, line 1), 2 (e, line 4)"),
+    ],
+)
+def test_how_far_a_line_may_be_indented_is_said(text: str, legal: str) -> None:
+    _, fault = parse(text)
+    indent = len(text.splitlines()[-1]) - len(text.splitlines()[-1].lstrip())
+    assert fault.splitlines()[-1] == f"      = the line is indented by {indent}, what is open above it by {legal}"
+
+
+@pytest.mark.parametrize(
     ("text", "keys"),
     [
         ("a: b\nc: d\n\te: f\n", ["a", "c"]),
@@ -134,7 +149,7 @@ def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
     ("content", "message"),
     [
         (None, "error: cannot read a.yaml: No such file or directory"),
-        (b"a: \xff\n", "error: a.yaml is not UTF-8: byte 3 is 0xff"),
+        (b"a: \xff\n", "a.yaml:1:4: error: byte 0xff is not UTF-8"),
         (b"a: [\n", "a.yaml:1:4: error: this is not YAML"),
     ],
 )

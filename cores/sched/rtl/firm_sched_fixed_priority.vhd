@@ -30,11 +30,13 @@ end entity firm_sched_fixed_priority;
 
 architecture rtl of firm_sched_fixed_priority is
 
-  signal finished : std_logic;
-  signal found    : std_logic;
-  signal choice   : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-  signal kept     : std_logic;  -- the granted requester keeps the grant, whoever asks
-  signal moves    : std_logic;  -- the choice becomes the grant
+  signal finished  : std_logic;
+  signal offered   : std_logic;  -- the granted requester's request
+  signal found     : std_logic;  -- another one asks
+  signal is_before : std_logic;  -- one of a higher priority does
+  signal choice    : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);  -- of the others
+  signal kept      : std_logic;  -- the granted requester keeps the grant until its task is finished, whoever asks
+  signal moves     : std_logic;  -- the choice becomes the grant
 
   signal grant_valid_r  : std_logic;
   signal grant_select_r : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
@@ -49,28 +51,31 @@ begin
     report "firm_sched_fixed_priority: " & fault_of_run(SHORTEST_RUN)
     severity failure;
 
+  -- The Manager selects `beat` and `last` by the grant, so they come late: they do not enter the choice.
   finished <= beat and last;
-  moves    <= found and not kept;
+  moves    <= found and (finished or (not kept and (is_before or not offered)));
 
   u_choice : entity firm.firm_sched_lowest
     generic map (
       REQUESTERS => REQUESTERS)
     port map (
-      request   => request,
-      index     => grant_select_r,
-      leave_out => finished,
-      found     => found,
-      lowest    => choice);
+      request     => request,
+      index       => grant_select_r,
+      index_valid => grant_valid_r,
+      asks        => offered,
+      found       => found,
+      is_before   => is_before,
+      lowest      => choice);
 
   whole_tasks : if not PREEMPTIVE generate
     signal started_r : std_logic;  -- the granted task has had a beat and needs more
   begin
-    kept <= (started_r or beat) and not finished;
+    kept <= started_r or beat;
 
     follow_task : process (clk)
     begin
       if rising_edge(clk) then
-        started_r <= kept and rst_n;
+        started_r <= kept and not finished and rst_n;
       end if;
     end process follow_task;
   end generate whole_tasks;
@@ -83,25 +88,15 @@ begin
     subtype beats_t is natural range 0 to SHORTEST_RUN;
     signal beats   : beats_t;
     signal beats_r : beats_t;                       -- of the run, no further than to the shortest
-    signal offered : std_logic_vector(0 downto 0);  -- the granted requester's request
   begin
     beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
-    kept  <= offered(0) and not finished when beats > 0 and beats < SHORTEST_RUN else '0';
-
-    u_offered : entity firm.firm_axis_select
-      generic map (
-        WORDS => REQUESTERS,
-        WIDTH => 1)
-      port map (
-        words_in => request,
-        index    => grant_select_r,
-        word     => offered);
+    kept  <= offered when beats > 0 and beats < SHORTEST_RUN else '0';
 
     follow_run : process (clk)
     begin
       if rising_edge(clk) then
         beats_r <= beats;
-        if rst_n = '0' or finished = '1' or (moves = '1' and choice /= grant_select_r) then
+        if rst_n = '0' or finished = '1' or moves = '1' then
           beats_r <= 0;
         end if;
       end if;

@@ -1,4 +1,4 @@
-"""Earliest deadline first (sections 4.2.3 and 4.2.4), preemptive."""
+"""Earliest deadline first (section 4.2.3), preemptive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Least slack time first (section 4.2.5), preemptive."""
+"""Least slack time first (section 4.2.4), preemptive."""
 
 from __future__ import annotations
 

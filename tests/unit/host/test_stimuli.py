@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import select
 from fusesoc_firm.host.stimuli import Stimulus, read_stimuli
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
@@ -62,6 +64,38 @@ def test_messages_come_in_order_with_their_payload(tmp_path: Path) -> None:
     assert [item.subscriber.block for item in found] == ["point", "byte", "point", "nothing"]
     assert [item.payload for item in found] == [struct.pack("<3d", 1, 2.5, -3), b"\x07", bytes(24), b""]
     assert found[0].message == {"x": 1.0, "y": 2.5, "z": -3.0}
+
+
+@pytest.mark.parametrize("ros", RosVersion)
+def test_what_the_subscriber_has_no_port_for_may_be_left_out(ros: RosVersion, tmp_path: Path) -> None:
+    """Numbers, texts and arrays, and parts of the elements of an array; what is given is sent."""
+    name = parse_name("sensor_msgs/PointCloud2")
+    whole = frame_of(name, LIBRARIES[ros].closure(name))
+    used = select(whole, {"width": None, "fields.offset": None})
+    path = tmp_path / "stimuli.yaml"
+    path.write_text("- cloud: {width: 7, height: 3, fields: [{offset: 4}, {offset: 8, name: y}]}\n", encoding="utf-8")
+    (stimulus,) = read_stimuli(path, [Converter("cloud", used, 0)])
+    assert decode(whole, stimulus.payload) == stimulus.message
+    assert (stimulus.message["width"], stimulus.message["height"], stimulus.message["data"]) == (7, 3, b"")
+    assert [(part["offset"], part["name"], part["count"]) for part in stimulus.message["fields"]] == [
+        (4, "", 0),
+        (8, "y", 0),
+    ]
+    path.write_text("- cloud: {height: 3, fields: [{name: y}]}\n", encoding="utf-8")
+    with pytest.raises(InputError) as raised:
+        read_stimuli(path, [Converter("cloud", used, 0)])
+    assert [fault.message for fault in raised.value.diagnostics] == [
+        "a sensor_msgs/PointCloud2 needs a value for width",
+        "'fields[0]' needs a value for offset",
+    ]
+
+
+def test_what_is_left_out_of_a_fixed_message_is_its_default(tmp_path: Path) -> None:
+    used = select(frame("geometry_msgs/Pose", RosVersion.ROS2), {"position.y": None})
+    path = tmp_path / "stimuli.yaml"
+    path.write_text("- pose: {position: {y: 2, x: 1}}\n", encoding="utf-8")
+    (stimulus,) = read_stimuli(path, [Converter("pose", used, 0)])
+    assert stimulus.payload == b"\0\1\0\0" + struct.pack("<7d", 1, 2, *5 * [0])
 
 
 def test_ros2_has_its_header(tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def defaults(draw: st.DrawFn, kind: FieldType, dialect: Dialect) -> DefaultValue
 
 @st.composite
 def definitions(draw: st.DrawFn) -> MessageDefinition:
-    ros = draw(st.sampled_from(RosVersion))
+    ros = draw(st.sampled_from(list(RosVersion)))
     dialect = dialect_of(ros)
     names = st.lists(st.from_regex(dialect.field_name.pattern, fullmatch=True), max_size=6, unique=True)
     fields = []

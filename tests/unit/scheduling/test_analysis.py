@@ -157,6 +157,23 @@ def test_measured_luts_go_before_the_dissertation(monkeypatch: pytest.MonkeyPatc
     assert luts("lst", 8) is None
 
 
+def test_bursts_count_with_a_policy_that_interrupts(monkeypatch: pytest.MonkeyPatch) -> None:
+    areas = {
+        ("fixed_priority", 8): Area(20, 5),
+        ("fixed_priority_preemptive", 8): Area(14, 4),
+        (area.MANAGER, 8): Area(100, 50),
+        (area.MANAGER_PREEMPTIVE, 8): Area(123, 70),
+    }
+    monkeypatch.setattr(area, "measured", lambda: areas)
+    assert luts("fixed_priority", 3) == 20
+    assert luts("fixed_priority_preemptive", 3) == 14 + 23
+    assert "fewest LUTs of these, 37 (measured, with the Manager's bursts)" in choose(ROBOT).reasons[2]
+    for design in (area.MANAGER, area.MANAGER_PREEMPTIVE):
+        others = {key: each for key, each in areas.items() if key[0] != design}
+        monkeypatch.setattr(area, "measured", lambda others=others: others)
+        assert luts("fixed_priority_preemptive", 3) is None
+
+
 @pytest.mark.parametrize(
     ("make", "fault"),
     [

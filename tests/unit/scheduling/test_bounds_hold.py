@@ -89,6 +89,19 @@ def test_over_the_hyperperiod_from_every_phase(policy: str, count: int) -> None:
 
 
 @pytest.mark.parametrize("policy", POLICIES)
+def test_alone(policy: str) -> None:
+    """A task that nobody can interrupt or keep waiting, with any deadline, and more of it than the channel can take."""
+    chance = random.Random(f"{SEED} {policy} alone")
+    for _ in range(10):
+        period = chance.randint(2, 12)
+        tasks = [Task("t", period, chance.randint(1, 12), chance.randint(1, 20))]
+        first = np.arange(period)[:, np.newaxis]
+        left = slack(policy, tasks, first, np.zeros_like(first), 300, Channel(1, chance.choice((1, 8))))
+        # The bound is reached, but for what a queue costs.
+        assert left == [0] or overheads_of(policy, 1).acceptance, f"seed {SEED}: {tasks}, {left}"
+
+
+@pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("count", [4, 7, 12, 20])
 def test_with_random_requests(policy: str, count: int) -> None:
     """Sporadic requests: some sets as soon as may be, some with random pauses; 50 of each task set side by side."""

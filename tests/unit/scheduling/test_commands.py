@@ -54,7 +54,7 @@ def test_bench_writes_tables_figures_and_all_values(tmp_path: Path, capsys: Capt
     assert {"evaluation.md", "table_4_3.csv", "table_4_6.csv", "figure_4_8.csv", "figure_4_17.csv"} <= names
     assert ("figure_4_10.svg" in names) == pictures.are_possible()
     report = (folder / "evaluation.md").read_text()
-    assert "Seed 5" in report and "### Table 4.4: lateness in cycles" in report
+    assert "seed 5, normal distribution." in report and "### Table 4.4: lateness in cycles" in report
     rows = list(csv.DictReader(values.read_text().splitlines()))
     assert len(rows) == 8 and set(rows[0]) == {"data_set", "policy", "requesters", *METRICS}
     # Two accelerators, two tasks at least each: everybody is served.
@@ -75,6 +75,9 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
         (["--dataset", "cc5"], "there is no data set 'cc5'\n      = did you mean"),
         (["--requesters", "2,257"], "'257' is no number of accelerators\n      = legal: 1 to 256"),
         (["--requesters", "x"], "'x' is no number of accelerators"),
+        (["--requesters", ""], "'' is no number of accelerators"),
+        (["--requesters", "0"], "'0' is no number of accelerators"),
+        (["--policies", ""], "there is no policy ''\n      = legal here: edf_latency"),
         (["--output", "{file}/below"], "below' cannot be written: Not a directory"),
         (["--csv", "{file}/values.csv"], "values.csv' cannot be written: Not a directory"),
     ],
@@ -86,10 +89,35 @@ def test_bad_arguments_of_bench(arguments: list[str], fault: str, tmp_path: Path
     assert fault in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("number", ["0", "-3", "many"])
-def test_numbers_must_be_positive(number: str) -> None:
+@pytest.mark.parametrize(
+    ("option", "number", "fault"),
+    [
+        ("--sets", "0", "0 is less than 1"),
+        ("--jobs", "-3", "-3 is less than 1"),
+        ("--cycles", "many", "'many' is no whole number"),
+        ("--shortest-run", "0", "0 is less than 1"),
+        ("--resume-beats", "-1", "-1 is less than 0"),
+        ("--seed", "-1", "-1 is less than 0"),
+    ],
+)
+def test_numbers_have_a_least_one(option: str, number: str, fault: str, capsys: Captured) -> None:
     with pytest.raises(SystemExit, match="2"):
-        main(["scheduler", "bench", "--sets", number])
+        main(["scheduler", "bench", option, number])
+    assert capsys.readouterr().err.endswith(f"argument {option}: {fault}\n")
+
+
+def test_longer_runs_and_what_a_resumption_costs(tmp_path: Path, capsys: Captured) -> None:
+    """LST interrupts less if it may not do so after every beat; a resumed run takes channel time without beats."""
+    found = {}
+    for name, options in {"bare": [], "bursts": ["--resume-beats", "1"], "long": ["--shortest-run", "32"]}.items():
+        path = tmp_path / f"{name}.csv"
+        few = ["--requesters", "4", "--policies", "lst", "--sets", "2", "--cycles", "2000", "--jobs", "1"]
+        assert main(["scheduler", "bench", *few, *options, "--csv", str(path)]) == 0
+        (row,) = csv.DictReader(path.read_text().splitlines())
+        found[name] = {key: float(row[key]) for key in ("preemptions", "utilisation")}
+    assert found["long"]["preemptions"] < found["bare"]["preemptions"] / 4
+    assert found["bursts"]["utilisation"] < found["bare"]["utilisation"] - 5
+    assert "a shortest run of 32 beats" in capsys.readouterr().err
 
 
 def test_choose_tells_the_policy_and_why(spec: Path, capsys: Captured) -> None:
@@ -99,6 +127,12 @@ def test_choose_tells_the_policy_and_why(spec: Path, capsys: Captured) -> None:
     # 5 bytes of header and 28 of payload in beats of 4; 100,000 cycles are 1 ms.
     assert "| slow      | 100000 |             9 |   100000 |" in out
     assert "priorities, the highest first: fast, slow." in out
+
+
+def test_choose_sees_that_publishers_stand_in_order(spec: Path, capsys: Captured) -> None:
+    spec.write_text(SPEC.replace("period: 1 kHz", "period: 50, deadline: 30"))
+    assert main(["scheduler", "choose", str(spec)]) == 0
+    assert "Its priorities are the order in which the publishers stand." in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("form", ["json", "yaml"])

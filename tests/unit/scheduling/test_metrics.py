@@ -40,7 +40,7 @@ def values(name: str) -> list[float]:
         ("completed", 3),
         ("preemptions", ((2 + 4) / 2 + 1 / 1) / 2),
         ("response_min", 0),
-        ("response_avg", (2 + 12 + 0) / 3),
+        ("response_avg", (2 + 12 + 0 + 1) / 4),
         ("response_max", 12),
         ("lateness_min", 17 - 45),
         ("lateness_avg", ((12 - 30) + (17 - 45) + (75 - 70)) / 3),
@@ -53,12 +53,14 @@ def test_metric_of_a_set(name: str, of_set_0: float) -> None:
     assert values(name)[0] == pytest.approx(of_set_0)
 
 
-def test_a_set_without_completed_tasks_has_no_times() -> None:
+def test_a_set_without_tasks_has_no_times() -> None:
     assert values("granted") == [2, 1, 0]
     assert values("finished") == [2, 0, 0]
     for name in METRICS:
-        if name.startswith(("response", "lateness", "preemptions")):
+        if name.startswith(("lateness", "preemptions")):
             assert all(math.isnan(value) for value in values(name)[1:]), name
+    # Set 1 has a task that was granted and not completed.
+    assert values("response_max")[1] == 1 and math.isnan(values("response_max")[2])
     assert math.isnan(values("utilisation_requested")[2])
 
 
@@ -66,5 +68,6 @@ def test_means_leave_out_sets_without_a_value() -> None:
     means = metrics().means()
     assert set(means) == set(METRICS)
     assert means["granted"] == 1
-    assert means["response_max"] == 12
+    assert means["response_max"] == (12 + 1) / 2
+    assert means["lateness_max"] == 75 - 70
     assert means["utilisation"] == pytest.approx((29 + 92) / 3)

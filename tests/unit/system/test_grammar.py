@@ -120,7 +120,7 @@ def _rows(section: type[Section], names: str) -> list[list[str]]:
 
 def _default(section: type[Section], field: str, entry: Key) -> str:
     if entry.is_required:
-        return "required"
+        return "required" + (f" unless `{entry.unless[0]}` is {entry.unless[1]}" if entry.unless else "")
     (default,) = (item.default for item in dataclasses.fields(section) if item.name == field)
     return "none" if default in (None, ()) else str(default)
 
@@ -132,3 +132,28 @@ def test_the_page_has_every_key_as_it_is(page: str, grammar: type[Section]) -> N
     table = lines[start : lines.index("", start)]
     written = [[cell.strip() for cell in line.strip("|").split("|")] for line in table]
     assert sorted(written) == sorted(_rows(grammar, "(the file)"))
+
+
+ACCELERATORS = "project: {name: a}\naccelerators: [{name: b, type: TYPE, interface: {}SOURCES}]\nblocks: [{name: c}]\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "sources", "message"),
+    [
+        (
+            "VHDL",
+            "",
+            "an item of 'accelerators' needs the key 'sources': its source files, relative to the specification",
+        ),
+        ("VHDL", ", sources: ", "'sources' must be a word, not nothing"),
+        ("ROS-SW", "", ""),
+        ("ROS-SW", ", sources: ", ""),
+        ("ROS-SW", ", sources: []", "'sources' is an empty list"),
+        ("ROS-SW", ", sources: a.py", ""),
+    ],
+)
+def test_a_key_that_depends_on_another(tmp_path: Path, kind: str, sources: str, message: str) -> None:
+    text = ACCELERATORS.replace("TYPE", kind).replace("SOURCES", sources)
+    specification, faults = read(tmp_path, text)
+    assert [fault.message for fault in faults.found] == ([message] if message else [])
+    assert specification.accelerators[0].is_sound is not bool(message)

@@ -90,6 +90,12 @@ def test_good_specifications_keep_to_the_schema(path: Path) -> None:
     jsonschema.validate(yaml.safe_load(path.read_text(encoding="utf-8")), SCHEMA)
 
 
+def test_only_software_may_have_no_sources() -> None:
+    for kind, is_right in (("ROS-SW", True), ("VHDL", False), ("HLS", False)):
+        text = TEXT.replace("type: VHDL, sources: [acc.vhd]", f"type: {kind}")
+        assert jsonschema.Draft202012Validator(SCHEMA).is_valid(yaml.safe_load(text)) is is_right
+
+
 @pytest.mark.parametrize(
     ("before", "after"),
     [

@@ -78,6 +78,28 @@ def test_a_new_specification(tmp_path: Path) -> None:
     assert system.scheduling.times[0].period == 500
 
 
+def test_software_may_have_no_sources(tmp_path: Path) -> None:
+    """`sources` is asked for all the same, and needed for any other type."""
+    for kind, sources in (("VHDL", ["acc.vhd"]), ("ROS-SW", [])):
+        answers = Answers(
+            name=["turn", "turner", "in", "out", "out"],
+            add_to_accelerators=["yes"],
+            type=[kind],
+            sources=sources,
+            add_to_input=["yes"],
+            middleware=["ROS", "ROS", "ROS"],
+            message=[POINT, POINT, POINT],
+            add_to_blocks=["yes"],
+            mode=["subscriber", "publisher"],
+            add_to_outgoing=["yes"],
+        )
+        text = run(tmp_path / f"{kind}.yaml", answers)
+        (question,) = (question for question in answers.asked if question.name == "sources")
+        assert question.is_required is (kind == "VHDL")
+        assert ("sources" in text) is (kind == "VHDL")
+        assert len(derived(tmp_path, text).subscribers) == 1
+
+
 def test_every_key_is_explained_once(tmp_path: Path) -> None:
     text = run(tmp_path / "robot.yaml", turner())
     assert text.count("# the system's name; the top level is <name>_system") == 1
@@ -152,8 +174,8 @@ def test_a_specification_that_is_there_is_extended(tmp_path: Path) -> None:
     [
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
-        (["robot", "", "", "", "", "", "", "no", "a", "b"], "answer 10: 'type' cannot be 'b'"),
-        (["robot", "", "", "", "", "", "", "no", "a", "", "ROS", "subscriber", ""], "answer 13: 'message' is needed"),
+        (["robot", "", "", "", "", "", "", "", "no", "a", "b"], "answer 11: 'type' cannot be 'b'"),
+        (["robot", "", "", "", "", "", "", "", "no", "a", "", "ROS", "subscriber", ""], "answer 14: 'message' is needed"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:
@@ -165,6 +187,6 @@ def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], messa
 
 def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
-    answers = ["robot", *[""] * 6, "no", "a", "", "ROS", "subscriber", POINT, "", "", "no", "yes", "a"]
-    with pytest.raises(InputError, match="answer 18: there is 'a' already"):
+    answers = ["robot", *[""] * 7, "no", "a", "", "ROS", "subscriber", POINT, "", "", "no", "yes", "a"]
+    with pytest.raises(InputError, match="answer 19: there is 'a' already"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)

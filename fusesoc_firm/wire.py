@@ -1,6 +1,6 @@
 """What a middleware decides about the wire: types, alignment and the bytes around a message.
 
-A middleware is one `WireRules` value; the layout and the codec ask nothing else. `ros1` and `cdr` hold one each.
+One `WireRules` value says it all; the layout and the codec ask nothing else.
 """
 
 from __future__ import annotations
@@ -8,7 +8,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from fusesoc_firm.frame.model import WireType
+
+@dataclass(frozen=True)
+class WireType:
+    """How an element of a field is sent: its size in bytes and the `struct` code of its value."""
+
+    name: str
+    size: int
+    code: str
+
+    @property
+    def bits(self) -> int:
+        """Bits of an element at a converter's port: a bool is one bit there although it is a byte on the wire."""
+        return 1 if self.name == "bool" else 8 * self.size
+
 
 INTEGER_AND_FLOAT = MappingProxyType(
     {

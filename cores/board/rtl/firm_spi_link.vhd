@@ -1,0 +1,227 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- The host's two streams over SPI, mode 0, highest bit first, the host being the master; frames are sent as they are. SPI
+-- sends both ways in every byte, asked or not, so each selection (spi_cs_n low) begins with a command:
+--
+--   00  status  then come: room for bytes to the system (two bytes, the lower first), bytes that wait for the host (two)
+--   01  write   what follows are bytes of frames, no more than there is room for
+--   02  read    then come bytes of frames; behind those that waited, 00
+--   03  cut     what is written next begins a frame: both sides are together again after a fault
+--
+-- While the command is sent, what comes back is 80, and 1 more if bytes wait, 2 more if bytes were dropped since the last
+-- cut. The pins are sampled by clk, so a period of spi_sclk takes 10 cycles of it at least. A byte counts when its last
+-- bit is clocked; selections may end anywhere.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+library firm;
+
+entity firm_spi_link is
+  generic (
+    WIDTH : integer := 8;
+    DEPTH : integer := 1024);  -- bytes that can wait, in each direction
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    spi_sclk : in  std_logic;
+    spi_cs_n : in  std_logic;
+    spi_mosi : in  std_logic;
+    spi_miso : out std_logic;
+    spi_irq  : out std_logic;  -- bytes wait for the host
+
+    -- Frames to the system.
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic;
+
+    -- Frames from the system.
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- Pulses where bytes begin to be dropped.
+    link_error : out std_logic);
+end entity firm_spi_link;
+
+architecture rtl of firm_spi_link is
+
+  subtype byte_t is std_logic_vector(7 downto 0);
+  constant STATUS : byte_t := x"00";
+  constant WRITE  : byte_t := x"01";
+  constant READ   : byte_t := x"02";
+  constant CUT    : byte_t := x"03";
+
+  -- The pins, which know no clock, behind two flip-flops; a third one shows edges. The highest bit is the oldest.
+  signal sclk_r : std_logic_vector(2 downto 0);
+  signal cs_n_r : std_logic_vector(1 downto 0);
+  signal mosi_r : std_logic_vector(1 downto 0);
+
+  signal rises : std_logic;
+  signal falls : std_logic;
+
+  signal bit_r     : natural range 0 to 7;  -- of the byte, how many came
+  signal first_r   : std_logic;             -- the byte is the selection's first
+  signal in_r      : std_logic_vector(6 downto 0);
+  signal out_r     : byte_t;
+  signal command_r : byte_t;
+  signal received  : byte_t;
+  signal complete  : std_logic;  -- with this cycle a byte has come
+  signal offered_r : std_logic;  -- what goes out is a byte of the FIFO
+  signal dropped_r : std_logic;  -- bytes were, since the last cut
+  signal status_r  : std_logic_vector(31 downto 0);  -- room and waiting bytes of one moment, what goes out next lowest
+
+  signal rx_valid : std_logic;
+  signal rx_cut   : std_logic;
+  signal room     : natural range 0 to DEPTH;
+  signal error    : std_logic;
+
+  signal tx_data    : byte_t;
+  signal tx_valid   : std_logic;
+  signal tx_ready   : std_logic;
+  signal head_data  : byte_t;
+  signal head_valid : std_logic;
+  signal head_taken : std_logic;
+  signal waiting_r  : unsigned(15 downto 0);  -- bytes for the host
+
+begin
+
+  assert DEPTH >= 16 and DEPTH <= 32768
+    report "firm_spi_link: DEPTH is " & integer'image(DEPTH) & "; legal: 16 to 32768"
+    severity failure;
+
+  rises    <= not cs_n_r(1) and sclk_r(1) and not sclk_r(2);
+  falls    <= not cs_n_r(1) and sclk_r(2) and not sclk_r(1);
+  received <= in_r & mosi_r(1);
+  complete <= '1' when rises = '1' and bit_r = 7 else '0';
+
+  rx_valid   <= '1' when complete = '1' and first_r = '0' and command_r = WRITE else '0';
+  rx_cut     <= '1' when complete = '1' and first_r = '1' and received = CUT else '0';
+  head_taken <= complete and offered_r;
+
+  shift : process (clk)
+
+    procedure take_bit is
+    begin
+      in_r <= received(6 downto 0);
+      if complete = '0' then
+        bit_r <= bit_r + 1;
+      else
+        bit_r   <= 0;
+        first_r <= '0';
+        if first_r = '1' then
+          command_r <= received;
+          status_r  <= std_logic_vector(waiting_r) & std_logic_vector(to_unsigned(room, 16));
+        end if;
+      end if;
+    end procedure take_bit;
+
+    procedure begin_answer is
+    begin
+      out_r     <= x"00";
+      offered_r <= '0';
+      if command_r = READ and head_valid = '1' then
+        out_r     <= head_data;
+        offered_r <= '1';
+      elsif command_r = STATUS then
+        out_r    <= status_r(7 downto 0);
+        status_r <= x"00" & status_r(31 downto 8);
+      end if;
+    end procedure begin_answer;
+
+  begin
+    if rising_edge(clk) then
+      sclk_r <= sclk_r(1 downto 0) & spi_sclk;
+      cs_n_r <= cs_n_r(0) & spi_cs_n;
+      mosi_r <= mosi_r(0) & spi_mosi;
+      if cs_n_r(1) = '1' then
+        bit_r     <= 0;
+        first_r   <= '1';
+        offered_r <= '0';
+        out_r     <= "100000" & dropped_r & head_valid;
+      elsif rises = '1' then
+        take_bit;
+      elsif falls = '1' and bit_r = 0 then
+        begin_answer;
+      elsif falls = '1' then
+        out_r <= out_r(6 downto 0) & '0';
+      end if;
+      if error = '1' then
+        dropped_r <= '1';
+      elsif rx_cut = '1' then
+        dropped_r <= '0';
+      end if;
+      if rst_n = '0' then
+        cs_n_r    <= "11";
+        dropped_r <= '0';
+      end if;
+    end if;
+  end process shift;
+
+  u_streams : entity firm.firm_link_streams
+    generic map (
+      WIDTH => WIDTH,
+      DEPTH => DEPTH)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      rx_data       => received,
+      rx_valid      => rx_valid,
+      rx_cut        => rx_cut,
+      rx_lost       => '0',
+      room          => room,
+      tx_data       => tx_data,
+      tx_valid      => tx_valid,
+      tx_ready      => tx_ready,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      link_error    => error);
+
+  u_fifo : entity firm.firm_axis_fifo
+    generic map (
+      WIDTH => 8,
+      DEPTH => DEPTH)
+    port map (
+      clk             => clk,
+      rst_n           => rst_n,
+      s_axis_tdata    => tx_data,
+      s_axis_tkeep(0) => '1',
+      s_axis_tvalid   => tx_valid,
+      s_axis_tlast    => '0',
+      s_axis_tready   => tx_ready,
+      m_axis_tdata    => head_data,
+      m_axis_tkeep    => open,
+      m_axis_tvalid   => head_valid,
+      m_axis_tlast    => open,
+      m_axis_tready   => head_taken);
+
+  count : process (clk)
+  begin
+    if rising_edge(clk) then
+      if (tx_valid and tx_ready) = '1' and head_taken = '0' then
+        waiting_r <= waiting_r + 1;
+      elsif (tx_valid and tx_ready) = '0' and head_taken = '1' then
+        waiting_r <= waiting_r - 1;
+      end if;
+      if rst_n = '0' then
+        waiting_r <= (others => '0');
+      end if;
+    end if;
+  end process count;
+
+  spi_miso   <= out_r(7);
+  spi_irq    <= head_valid;
+  link_error <= error;
+
+end architecture rtl;

@@ -1,0 +1,149 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent as they are, byte
+-- after byte. A break from the host, or a pause of TIMEOUT_MS, ends a frame that has begun; both bring the two sides
+-- together again after bytes were lost. uart_rts_n rises while there is little room, in time for the bytes that an
+-- adapter still sends.
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+
+entity firm_uart_link is
+  generic (
+    WIDTH      : integer := 8;
+    CLOCK_HZ   : integer := 100000000;
+    BAUD       : integer := 1000000;
+    DEPTH      : integer := 1024;  -- bytes from the host that can wait
+    TIMEOUT_MS : integer := 200);
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    -- As a modem has them: rts_n low lets the host send, cts_n low lets this side send.
+    uart_rxd   : in  std_logic;
+    uart_txd   : out std_logic;
+    uart_rts_n : out std_logic;
+    uart_cts_n : in  std_logic := '0';
+
+    -- Frames to the system.
+    m_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
+    m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic;
+
+    -- Frames from the system.
+    s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
+    s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
+    s_axis_tvalid : in  std_logic;
+    s_axis_tlast  : in  std_logic;
+    s_axis_tready : out std_logic;
+
+    -- Pulses where bytes begin to be dropped.
+    link_error : out std_logic);
+end entity firm_uart_link;
+
+architecture rtl of firm_uart_link is
+
+  -- Cycles of a bit; the nearest number.
+  function divisor_of(clock_hz : integer; baud : integer) return integer is
+  begin
+    if baud < 1 then
+      return 0;
+    end if;
+    return (clock_hz + baud/2) / baud;
+  end function divisor_of;
+
+  constant DIVISOR : integer := divisor_of(CLOCK_HZ, BAUD);
+  -- An adapter sees rts_n late; the usual ones send up to 16 bytes more.
+  constant RESERVE : positive := 32;
+
+  signal rx_data  : std_logic_vector(7 downto 0);
+  signal rx_valid : std_logic;
+  signal rx_break : std_logic;
+  signal rx_wrong : std_logic;
+  signal room     : natural range 0 to DEPTH;
+
+  signal tx_data  : std_logic_vector(7 downto 0);
+  signal tx_valid : std_logic;
+  signal tx_ready : std_logic;
+
+begin
+
+  assert BAUD >= 1 and CLOCK_HZ / 4 >= BAUD
+    report "firm_uart_link: BAUD is " & integer'image(BAUD) & "; legal: 1 to a quarter of CLOCK_HZ"
+    severity failure;
+  -- What is over half a bit at the tenth one is read wrong; the host's clock may take the other half of that.
+  assert abs (CLOCK_HZ - DIVISOR*BAUD) <= CLOCK_HZ/40
+    report "firm_uart_link: " & integer'image(DIVISOR) & " cycles of CLOCK_HZ are no bit at BAUD " & integer'image(BAUD)
+           & ", it is off by more than 2.5 %"
+    severity failure;
+  assert DEPTH >= 2*RESERVE
+    report "firm_uart_link: DEPTH is " & integer'image(DEPTH) & "; legal: 64 and more"
+    severity failure;
+  assert TIMEOUT_MS >= 1 and TIMEOUT_MS <= 4000
+    report "firm_uart_link: TIMEOUT_MS is " & integer'image(TIMEOUT_MS) & "; legal: 1 to 4000"
+    severity failure;
+
+  u_receiver : entity firm.firm_uart_receiver
+    generic map (
+      DIVISOR => DIVISOR)
+    port map (
+      clk      => clk,
+      rst_n    => rst_n,
+      uart_rxd => uart_rxd,
+      data     => rx_data,
+      valid    => rx_valid,
+      is_break => rx_break,
+      is_wrong => rx_wrong);
+
+  u_streams : entity firm.firm_link_streams
+    generic map (
+      WIDTH   => WIDTH,
+      DEPTH   => DEPTH,
+      TIMEOUT => CLOCK_HZ/1000 * TIMEOUT_MS)
+    port map (
+      clk           => clk,
+      rst_n         => rst_n,
+      rx_data       => rx_data,
+      rx_valid      => rx_valid,
+      rx_cut        => rx_break,
+      rx_lost       => rx_wrong,
+      room          => room,
+      tx_data       => tx_data,
+      tx_valid      => tx_valid,
+      tx_ready      => tx_ready,
+      m_axis_tdata  => m_axis_tdata,
+      m_axis_tkeep  => m_axis_tkeep,
+      m_axis_tvalid => m_axis_tvalid,
+      m_axis_tlast  => m_axis_tlast,
+      m_axis_tready => m_axis_tready,
+      s_axis_tdata  => s_axis_tdata,
+      s_axis_tkeep  => s_axis_tkeep,
+      s_axis_tvalid => s_axis_tvalid,
+      s_axis_tlast  => s_axis_tlast,
+      s_axis_tready => s_axis_tready,
+      link_error    => link_error);
+
+  u_transmitter : entity firm.firm_uart_transmitter
+    generic map (
+      DIVISOR => DIVISOR)
+    port map (
+      clk        => clk,
+      rst_n      => rst_n,
+      data       => tx_data,
+      valid      => tx_valid,
+      ready      => tx_ready,
+      uart_txd   => uart_txd,
+      uart_cts_n => uart_cts_n);
+
+  ask_for_bytes : process (clk)
+  begin
+    if rising_edge(clk) then
+      uart_rts_n <= '1';
+      if room > RESERVE and rst_n = '1' then
+        uart_rts_n <= '0';
+      end if;
+    end if;
+  end process ask_for_bytes;
+
+end architecture rtl;

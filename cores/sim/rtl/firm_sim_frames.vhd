@@ -1,0 +1,105 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- The host's end of a link that carries bytes: finds frames in them by their lengths and passes each on when it is whole.
+-- It keeps what it has, however much that is. Simulation only.
+library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+entity firm_sim_frames is
+  port (
+    clk   : in std_logic;
+    rst_n : in std_logic;
+
+    data  : in std_logic_vector(7 downto 0);
+    valid : in std_logic;  -- in a cycle with a byte
+
+    m_axis_tdata  : out std_logic_vector(7 downto 0);
+    m_axis_tkeep  : out std_logic_vector(0 downto 0);
+    m_axis_tid    : out std_logic_vector(7 downto 0);
+    m_axis_tvalid : out std_logic;
+    m_axis_tlast  : out std_logic;
+    m_axis_tready : in  std_logic);
+end entity firm_sim_frames;
+
+architecture simulation of firm_sim_frames is
+
+  constant HEADER_BYTES : positive := 5;
+
+  type item_t;
+  type item_ptr_t is access item_t;
+  type item_t is record
+    data      : std_logic_vector(7 downto 0);
+    tid       : std_logic_vector(7 downto 0);
+    is_last   : boolean;
+    next_item : item_ptr_t;
+  end record item_t;
+
+  signal valid_r : std_logic := '0';
+
+begin
+
+  frame : process (clk)
+
+    -- All bytes that wait, those of whole frames first.
+    variable first  : item_ptr_t;
+    variable newest : item_ptr_t;
+    variable whole  : natural := 0;  -- bytes of whole frames
+
+    variable bytes  : natural := 0;  -- of the frame that comes in
+    variable header : unsigned(8*HEADER_BYTES-1 downto 0);
+
+    procedure take_byte is
+      variable item : item_ptr_t;
+    begin
+      if bytes < HEADER_BYTES then
+        header(8*bytes+7 downto 8*bytes) := unsigned(data);
+      end if;
+      bytes := bytes + 1;
+      item  := new item_t'(data, std_logic_vector(header(7 downto 0)), false, null);
+      if first = null then
+        first := item;
+      else
+        newest.next_item := item;
+      end if;
+      newest := item;
+      if bytes >= HEADER_BYTES and bytes - HEADER_BYTES = header(8*HEADER_BYTES-1 downto 8) then
+        newest.is_last := true;
+        whole          := whole + bytes;
+        bytes          := 0;
+      end if;
+    end procedure take_byte;
+
+    procedure show_byte is
+      variable shown : item_ptr_t;
+    begin
+      valid_r <= '0';
+      if whole > 0 then
+        shown        := first;
+        first        := shown.next_item;
+        whole        := whole - 1;
+        valid_r      <= '1';
+        m_axis_tdata <= shown.data;
+        m_axis_tid   <= shown.tid;
+        m_axis_tlast <= '0';
+        if shown.is_last then
+          m_axis_tlast <= '1';
+        end if;
+        deallocate(shown);
+      end if;
+    end procedure show_byte;
+
+  begin
+    if rising_edge(clk) and rst_n = '1' then
+      if valid = '1' then
+        take_byte;
+      end if;
+      if valid_r = '0' or m_axis_tready = '1' then
+        show_byte;
+      end if;
+    end if;
+  end process frame;
+
+  m_axis_tkeep  <= "1";
+  m_axis_tvalid <= valid_r;
+
+end architecture simulation;

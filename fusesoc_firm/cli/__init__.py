@@ -1,0 +1,56 @@
+"""The door for people: the command `firm`. Each of its commands is a module; what it needs is imported when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from fusesoc_firm import __version__
+from fusesoc_firm.cli.common import command
+from fusesoc_firm.cli.message import add_message
+from fusesoc_firm.cli.scheduler import add_scheduler
+from fusesoc_firm.cli.system import add_system
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.library_path import library_root
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run `firm`; the exit status is 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
+    arguments = _parser().parse_args(argv)
+    try:
+        arguments.handler(arguments)
+        sys.stdout.flush()
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # Whoever read the output (`| head`) has seen enough. Nothing may be flushed into the closed pipe at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="firm", description="ROS messages and robot systems as FPGA hardware.")
+    parser.add_argument("--version", action="version", version=f"firm {__version__}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    command(
+        commands,
+        "path",
+        "print the folder of the FuseSoC library",
+        'fusesoc library add firm "$(firm path)"',
+        _print_path,
+    )
+    add_message(commands)
+    add_system(commands)
+    add_scheduler(commands)
+    return parser
+
+
+def _print_path(_: argparse.Namespace) -> None:
+    print(library_root())

@@ -1,0 +1,107 @@
+"""What the commands of `firm` share: how they are declared, and what most of them load and write."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from fusesoc_firm.diagnostics import fail
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.library import MessageLibrary
+    from fusesoc_firm.system.generator import LoadedSystem
+
+Handler = Callable[[argparse.Namespace], None]
+
+
+def command(
+    commands: Any, name: str, text: str, example: str, handler: Handler | None = None
+) -> argparse.ArgumentParser:
+    """A command with its help, an example of it, and what it does."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=text,
+        description=f"{text[0].upper()}{text[1:]}.",
+        epilog=f"example: {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    if handler:
+        parser.set_defaults(handler=handler)
+    return parser
+
+
+def positive(text: str) -> int:
+    """The type of an argument that counts something."""
+    return _at_least(1, text)
+
+
+def natural(text: str) -> int:
+    """The type of an argument that counts something, of which there may be none."""
+    return _at_least(0, text)
+
+
+def _at_least(least: int, text: str) -> int:
+    if not re.fullmatch(r"[+-]?\d+", text):
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number")
+    if int(text) < least:
+        raise argparse.ArgumentTypeError(f"{text} is less than {least}")
+    return int(text)
+
+
+def add_definitions(parser: argparse.ArgumentParser) -> None:
+    """The arguments of commands about the messages of one ROS version."""
+    parser.add_argument("--ros", type=int, choices=(1, 2), default=2, help="the ROS version (default: 2)")
+    add_sources(parser)
+
+
+def add_sources(parser: argparse.ArgumentParser) -> None:
+    """The arguments that say where message definitions are."""
+    parser.add_argument(
+        "--path",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="a folder with message definitions; may be given more than once",
+    )
+    parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
+
+
+def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
+    """The messages that the arguments mean."""
+    from fusesoc_firm.message.library import MessageLibrary
+    from fusesoc_firm.message.model import RosVersion
+
+    return MessageLibrary(RosVersion(ros), arguments.path, environment=os.environ, store=arguments.distro)
+
+
+def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
+    """The system of the specification that the arguments name.
+
+    Unless it `needs_sources`, those of its accelerators may be missing.
+    """
+    from fusesoc_firm.message.library import libraries
+    from fusesoc_firm.system.generator import load_system
+
+    known = libraries(arguments.path, os.environ, arguments.distro)
+    return load_system(arguments.spec, known, needs_sources=needs_sources)
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file of the user, with the folders above it."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror}")
+
+
+def as_yaml(data: dict[str, Any]) -> str:
+    """Data for people to read: in its own order."""
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)

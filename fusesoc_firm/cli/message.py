@@ -1,0 +1,146 @@
+"""`firm message`: definitions, their way to hardware, and the check of converters."""
+
+from __future__ import annotations
+
+import argparse
+import fnmatch
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusesoc_firm.cli.common import add_definitions, as_yaml, command, library_of, positive
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.derived import Interface
+    from fusesoc_firm.message.model import MessageDefinition, MessageName
+
+STAGES = ("tree", "message", "frame", "config", "vhdl")
+
+
+def add_message(commands: Any) -> None:
+    """Declare the command and its actions."""
+    message = command(commands, "message", "look at message definitions", "firm message show geometry_msgs/Pose")
+    actions = message.add_subparsers(title="actions", metavar="ACTION", required=True)
+    listing = command(
+        actions,
+        "list",
+        "list the known messages, services and actions",
+        "firm message list 'sensor_msgs/*'",
+        _list_messages,
+    )
+    listing.add_argument("pattern", nargs="?", default="*", help="only names like this one, with * and ?")
+    show = command(
+        actions,
+        "show",
+        "print a message, or those of a service or action, in any stage of the way to hardware",
+        "firm message show geometry_msgs/Quaternion --ros 1 --stage vhdl",
+        _show_message,
+    )
+    show.add_argument("type", metavar="TYPE", help="its type, such as geometry_msgs/Quaternion")
+    show.add_argument("--stage", choices=STAGES, default="tree", help="what to print (default: tree)")
+    show.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
+    verify = command(
+        actions,
+        "verify",
+        "check converters of messages in simulation, against other serialisers",
+        "firm message verify 'geometry_msgs/*' --ros 1 --report geometry.json",
+        _verify_messages,
+    )
+    for parser in (listing, show, verify):
+        add_definitions(parser)
+    _add_verification(verify)
+
+
+def _add_verification(verify: argparse.ArgumentParser) -> None:
+    verify.add_argument("types", metavar="TYPE", nargs="*", help="a type, or several with * and ? (default: all known)")
+    verify.add_argument("--stimuli", type=positive, default=3, metavar="N", help="values of each message (default: 3)")
+    verify.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
+    verify.add_argument("--seed", type=int, default=1, metavar="N", help="all randomness follows from it (default: 1)")
+    verify.add_argument("--jobs", type=positive, metavar="N", help="messages at once (default: one a core)")
+    verify.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
+    verify.add_argument("--report", type=Path, metavar="F.json", help="write a report, and F.html beside it")
+    verify.add_argument("--keep", type=Path, metavar="DIR", help="keep the work folder of each message that fails")
+
+
+def _list_messages(arguments: argparse.Namespace) -> None:
+    library = library_of(arguments, arguments.ros)
+    origins = {str(name): library.origin(name) for name in library.names()}
+    origins |= {str(interface): str(file) for interface, file in library.interfaces().items()}
+    names = sorted(name for name in origins if fnmatch.fnmatchcase(name, arguments.pattern))
+    width = max((len(name) for name in names), default=0)
+    for name in names:
+        print(f"{name:{width}}  {origins[name]}")
+
+
+def _show_message(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.message.parser import parse_full_name
+
+    library = library_of(arguments, arguments.ros)
+    kind, name = parse_full_name(arguments.type)
+    interface = library.interface(name, kind)
+    names = interface.messages if interface else (name,)
+    definitions = library.joint_closure(names)
+    texts = [_stage(arguments.stage, each, definitions, arguments.width) for each in names]
+    if interface and arguments.stage == "message":
+        texts.insert(0, _title(interface, definitions))
+    separator = "\n---\n" if arguments.stage in ("frame", "config") else "\n\n"
+    print(separator.join(text.rstrip("\n") for text in texts))
+
+
+def _verify_messages(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.verify.campaign import Settings
+    from fusesoc_firm.verify.command import Places, verify_messages
+
+    command = ["firm", "message", "verify", "--ros", str(arguments.ros)]
+    command += [word for path in arguments.path for word in ("--path", str(path))]
+    command += ["--distro", arguments.distro] if arguments.distro else []
+    command += ["--width", str(arguments.width), "--stimuli", str(arguments.stimuli), "--seed", str(arguments.seed)]
+    verify_messages(
+        library_of(arguments, arguments.ros),
+        arguments.types,
+        Settings(arguments.width, arguments.stimuli, arguments.seed, keeps_files=arguments.keep is not None),
+        Places(arguments.jobs, arguments.cluster, arguments.report, arguments.keep, command),
+    )
+
+
+def _title(interface: Interface, definitions: dict[MessageName, MessageDefinition]) -> str:
+    """What stands above the messages of a service or an action."""
+    from fusesoc_firm.message.signature import signature
+
+    title = f"# {interface} ({interface.ros.title})"
+    if not interface.has_signature:
+        return title
+    return f"{title}\n# signature: {signature(interface.name, definitions, interface.kind)}"
+
+
+def _stage(stage: str, name: MessageName, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
+    """The text of a message in one of `STAGES`."""
+    from fusesoc_firm.frame import tree
+    from fusesoc_firm.frame.description import description
+    from fusesoc_firm.frame.layout import frame_of
+    from fusesoc_firm.message.printer import to_text
+    from fusesoc_firm.message.signature import signature
+
+    if stage == "message":
+        return to_text(definitions[name], signature(name, definitions))
+    frame = frame_of(name, definitions)
+    if stage == "tree":
+        return tree.text(tree.rows(name, definitions, frame))
+    return as_yaml(description(frame)) if stage == "frame" else _converters(stage, frame, definitions, width)
+
+
+def _converters(stage: str, frame: Any, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
+    """Configuration or VHDL of the message's package and of both converters."""
+    from fusesoc_firm.converter import constants
+    from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
+    from fusesoc_firm.render import render
+
+    package = constants.constants_package(frame.message)
+    configuration = constants.constants_configuration(frame.message, definitions, package)
+    made = (
+        ConverterSource(constants.CONSTANTS_TEMPLATE, configuration),
+        subscriber_source(frame, width),
+        publisher_source(frame, width),
+    )
+    if stage == "config":
+        return "---\n".join(as_yaml(source.configuration) for source in made)
+    return "\n".join(render(source.template, source.configuration) for source in made)

@@ -1,0 +1,107 @@
+"""`firm scheduler`: the evaluation of the schedulers, and the best one for a system."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.cli.common import add_sources, command, load, natural, positive
+
+
+def add_scheduler(commands: Any) -> None:
+    """Declare the command and its actions."""
+    scheduler = command(commands, "scheduler", "evaluate and choose schedulers", "firm scheduler choose robot.yaml")
+    actions = scheduler.add_subparsers(title="actions", metavar="ACTION", required=True)
+    bench = command(
+        actions,
+        "bench",
+        "evaluate the schedulers by cycle-exact models, as the dissertation's section 4.3 does",
+        "firm scheduler bench --dataset all --output evaluation",
+        _bench_schedulers,
+    )
+    lists = "names with commas between (default: %(default)s)"
+    bench.add_argument("--dataset", default="large", metavar="NAMES", help=f"large, cc1 to cc4, or all; {lists}")
+    bench.add_argument("--policies", default="all", metavar="NAMES", help=f"schedulers; {lists}")
+    bench.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
+    bench.add_argument("--sets", type=positive, metavar="N", help="sets of each data set (default: its own)")
+    bench.add_argument("--cycles", type=positive, metavar="N", help="cycles of each simulation (default: its own)")
+    bench.add_argument(
+        "--seed", type=natural, default=1, metavar="N", help="all randomness follows from it (default: 1)"
+    )
+    bench.add_argument(
+        "--distribution", choices=("normal", "uniform"), default="normal", help="how times spread (default: normal)"
+    )
+    bench.add_argument(
+        "--shortest-run",
+        type=positive,
+        default=1,
+        metavar="BEATS",
+        help="beats of a run before preemptive schedulers may interrupt it (default: 1)",
+    )
+    bench.add_argument(
+        "--resume-beats",
+        type=natural,
+        default=0,
+        metavar="BEATS",
+        help="beats more that a resumed run takes; 1 with the Manager's bursts (default: 0, as in section 4.3)",
+    )
+    bench.add_argument("--jobs", type=positive, metavar="N", help="simulations at once (default: one a core)")
+    bench.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
+    bench.add_argument(
+        "--output", type=Path, metavar="DIR", help="write a report, every table and figure into a folder"
+    )
+    bench.add_argument("--csv", type=Path, metavar="F.csv", help="write all metrics of all simulations into one table")
+    choose = command(
+        actions,
+        "choose",
+        "find the best scheduler for a specification, and the buffers it needs",
+        "firm scheduler choose robot.yaml --criterion lateness",
+        _choose_scheduler,
+    )
+    choose.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    choose.add_argument(
+        "--criterion",
+        choices=("luts", "lateness", "finish"),
+        default="luts",
+        help="fewest LUTs with all deadlines held, smallest worst lateness, or fewest LUTs with nobody starving "
+        "(default: luts)",
+    )
+    choose.add_argument("--format", choices=("text", "yaml", "json"), default="text", help="default: text")
+    add_sources(choose)
+
+
+def _bench_schedulers(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.scheduling.bench import Places, Selection, bench, names_of, numbers_of
+    from fusesoc_firm.scheduling.evaluation import Settings
+    from fusesoc_firm.scheduling.models import POLICIES
+    from fusesoc_firm.scheduling.workloads import DATA_SETS, REQUESTERS, Distribution
+
+    def names(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
+        return tuple(legal) if text == "all" else names_of(text, legal, what)
+
+    selection = Selection(
+        names(arguments.dataset, list(DATA_SETS), "data set"),
+        names(arguments.policies, list(POLICIES), "policy"),
+        REQUESTERS if arguments.requesters is None else numbers_of(arguments.requesters),
+        Settings(
+            arguments.seed,
+            arguments.sets,
+            arguments.cycles,
+            Distribution(arguments.distribution),
+            arguments.shortest_run,
+            arguments.resume_beats,
+        ),
+    )
+    bench(selection, Places(arguments.jobs, arguments.cluster, arguments.output, arguments.csv))
+
+
+def _choose_scheduler(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.scheduling.analysis import Criterion, choose
+    from fusesoc_firm.scheduling.choice import show
+    from fusesoc_firm.system.timing import channel_of, tasks_of
+
+    system = load(arguments).system
+    choice = choose(tasks_of(system), Criterion(arguments.criterion), channel_of(system))
+    print(show(choice, arguments.format), end="")

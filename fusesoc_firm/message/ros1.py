@@ -1,0 +1,43 @@
+"""ROS 1: a serialisation that is little-endian, without alignment and prefix (dissertation, section 3.3)."""
+
+from functools import partial
+from types import MappingProxyType
+
+from fusesoc_firm.message import dialect, folders, parser, signature, stores
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import InterfaceKind, RosVersion
+from fusesoc_firm.wire import INTEGER_AND_FLOAT, WireRules
+
+_uint32, _int32 = INTEGER_AND_FLOAT["uint32"], INTEGER_AND_FLOAT["int32"]
+
+_RULES = WireRules(
+    scalars=MappingProxyType(
+        {**INTEGER_AND_FLOAT, "byte": INTEGER_AND_FLOAT["int8"], "char": INTEGER_AND_FLOAT["uint8"]}
+    ),
+    compounds=MappingProxyType(
+        {
+            "time": (("sec", _uint32), ("nsec", _uint32)),
+            "duration": (("sec", _int32), ("nsec", _int32)),
+        }
+    ),
+    max_alignment=1,
+    prefix=b"",
+    checked_prefix=0,
+    empty_bytes=0,
+    string_terminator=0,
+    trailing_bytes=0,
+)
+
+MIDDLEWARE = Middleware(
+    ros=RosVersion.ROS1,
+    # ROS was once all there was.
+    words=("ROS", "ROS1"),
+    rules=_RULES,
+    parse=parser.parse_message,
+    signature=signature.md5,
+    builtin_types=dialect.ROS1.builtin_types,
+    suffixes={kind.value: kind for kind in InterfaceKind},
+    folders=partial(folders.environment_folders, RosVersion.ROS1),
+    distributions=partial(stores.distributions, RosVersion.ROS1),
+    store=partial(stores.DistributionStore, RosVersion.ROS1),
+)

@@ -1,0 +1,40 @@
+"""ROS 2: a serialisation that is XCDR version 1 as DDS-XTYPES 1.3, section 7.4, defines it, little-endian.
+
+The header's first two bytes name the encoding and are checked; the other two are options that a receiver
+ignores. Writers round a payload up to a multiple of four, so up to three bytes may trail. Nothing is padded
+between the count of an empty sequence and what follows.
+"""
+
+from functools import partial
+from types import MappingProxyType
+
+from fusesoc_firm.message import dialect, folders, parser, signature, stores
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import InterfaceKind, RosVersion
+from fusesoc_firm.wire import INTEGER_AND_FLOAT, WireRules
+
+_RULES = WireRules(
+    scalars=MappingProxyType(
+        {**INTEGER_AND_FLOAT, "byte": INTEGER_AND_FLOAT["uint8"], "char": INTEGER_AND_FLOAT["uint8"]}
+    ),
+    compounds=MappingProxyType({}),
+    max_alignment=8,
+    prefix=b"\x00\x01\x00\x00",
+    checked_prefix=2,
+    empty_bytes=1,
+    string_terminator=1,
+    trailing_bytes=3,
+)
+
+MIDDLEWARE = Middleware(
+    ros=RosVersion.ROS2,
+    words=("ROS2",),
+    rules=_RULES,
+    parse=parser.parse_message,
+    signature=signature.rihs01,
+    builtin_types=dialect.ROS2.builtin_types,
+    suffixes={kind.value: kind for kind in InterfaceKind},
+    folders=partial(folders.environment_folders, RosVersion.ROS2),
+    distributions=partial(stores.distributions, RosVersion.ROS2),
+    store=partial(stores.DistributionStore, RosVersion.ROS2),
+)

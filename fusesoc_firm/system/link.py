@@ -1,0 +1,47 @@
+"""How frames get between the host and a system: the specification's `interconnect`."""
+
+from __future__ import annotations
+
+from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.system.derived import Link, LinkKind, Scheduling
+from fusesoc_firm.system.specification import Project
+from fusesoc_firm.system.timing import clock_frequency
+
+# Beyond it the generic CLOCK_HZ is no integer of VHDL.
+_FASTEST = 10**9
+
+
+def link_of(project: Project, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
+    """The link between the host and a system; None where the system's streams are its ports. Faults are noted."""
+    if project.interconnect not in {kind.value for kind in LinkKind}:
+        return None
+    kind = LinkKind(project.interconnect)
+    if scheduling.is_preemptive:
+        faults.error(
+            f"interconnect '{kind.value}' cannot carry the bursts of scheduler '{scheduling.policy}'",
+            project.interconnect.source,
+            "a row of bytes does not show where a burst ends: take a scheduler that is not preemptive, or 'axi_stream'",
+        )
+    return Link(kind, _clock_hz(project, faults) if kind is LinkKind.UART else None)
+
+
+def _clock_hz(project: Project, faults: Diagnostics) -> int | None:
+    """The clock's frequency as an integer."""
+    if project.clock is None:
+        faults.error(
+            f"interconnect '{project.interconnect}' needs the clock's frequency",
+            project.interconnect.source,
+            "add 'clock' to the project, such as 'clock: 100 MHz'",
+        )
+        return None
+    # What is wrong with it is noted by who reads the publishers' times.
+    frequency = clock_frequency(project, Diagnostics())
+    if frequency is None:
+        return None
+    if frequency.denominator != 1 or frequency > _FASTEST:
+        faults.error(
+            f"interconnect '{project.interconnect}' cannot work at 'clock' {project.clock}",
+            project.clock.source,
+            "legal: a whole number of Hz, at most 1 GHz",
+        )
+    return int(frequency)

@@ -1,0 +1,117 @@
+"""LUTs and flip-flops of the Manager and of schedulers, with all numbers of channels of the dissertation's tables."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from fusesoc_firm.scheduling.area import MANAGER, MANAGER_PREEMPTIVE
+from fusesoc_firm.scheduling.combinations import COMBINATIONS, COMBINED_REQUESTERS
+from fusesoc_firm.scheduling.dissertation import dissertation
+from fusesoc_firm.scheduling.workloads import REQUESTERS
+from tests.bench import schedulers
+from tests.bench.area import WIDTHS, Bar, Row, Subject, of_core, tables_of
+from tests.bench.tables import Table, Tell
+from tests.bench.yosys import Yosys
+from tests.sim.ghdl import Generic
+
+# The sum of table 3.3, LUT/FF.
+_MANAGER = {
+    2: "26/12",
+    4: "44/13",
+    8: "81/14",
+    16: "157/15",
+    32: "522/16",
+    64: "722/17",
+    128: "2400/18",
+    256: "5438/19",
+}
+_MANAGER_BAR = Bar(1400, 64)
+_SCHEDULER_BARS = {
+    ("fixed_priority", 256): Bar(350, 12),
+    ("fixed_priority_preemptive", 256): Bar(350, 12),
+    ("lru", 8): Bar(80, 40),
+    ("lru", 256): Bar(1800, 600),
+    ("edf_resources", 256): Bar(2000, 650),
+    ("edf_latency", 8): Bar(220, 160),
+    ("edf_latency", 256): Bar(20000, 9000),
+    ("lst", 8): Bar(350, 160),
+    ("lst", 256): Bar(2000, 650),
+}
+
+_MANAGER_TITLE, _SCHEDULERS_TITLE, _COMBINED_TITLE = "Manager without scheduler", "Schedulers", "Combined schedulers"
+_NOTES = {
+    _MANAGER_TITLE: f"""As many subscribers as publishers; {MANAGER_PREEMPTIVE} makes bursts of what a scheduler
+        interrupts. The dissertation's is the sum of table 3.3.""",
+    _SCHEDULERS_TITLE: f"""Times have {schedulers.TIME_BITS} bits; periods and transfer times are
+        {schedulers.SHORTEST_TIME} to {schedulers.LONGEST_TIME} cycles. A bar counts LUTs as RAM, too. The
+        dissertation's are those of table 4.1.""",
+    _COMBINED_TITLE: "The times are those of the schedulers above. The dissertation's are those of table 4.5.",
+}
+
+
+def rows() -> dict[str, list[Row]]:
+    """All rows, by the title of their table."""
+    return {
+        _MANAGER_TITLE: [*_managers()],
+        _SCHEDULERS_TITLE: [*_schedulers()],
+        _COMBINED_TITLE: [*_combined()],
+    }
+
+
+def keys() -> dict[str, list[tuple[str, ...]]]:
+    """The first cells of every row, by table."""
+    return {title: [row.key for row in found] for title, found in rows().items()}
+
+
+def measure(yosys: Yosys, tell: Tell) -> list[Table]:
+    """Synthesise everything; `tell` hears of each design."""
+    return tables_of(rows(), _NOTES, yosys, tell)
+
+
+def label(design: str, channels: int) -> str:
+    """What a row is called."""
+    return f"{design}, N = {channels}"
+
+
+def _managers() -> Iterator[Row]:
+    """At the width of the dissertation's streams all numbers of channels, at others two."""
+    for design, is_preemptive in ((MANAGER, False), (MANAGER_PREEMPTIVE, True)):
+        for width in WIDTHS:
+            is_theirs = width == WIDTHS[0]
+            for channels in REQUESTERS if is_theirs else (2, 8):
+                generics: dict[str, Generic] = {
+                    "WIDTH": width,
+                    "SUBSCRIBERS": channels,
+                    "PUBLISHERS": channels,
+                    "PREEMPTIVE": is_preemptive,
+                }
+                known = _MANAGER[channels] if is_theirs and not is_preemptive else ""
+                bar = _MANAGER_BAR if known and channels == 256 else None
+                yield Row(label(design, channels), "", width, of_core("firm_manager", generics), known, bar)
+
+
+def _schedulers() -> Iterator[Row]:
+    for policy in schedulers.POLICIES:
+        known = {number: _lut_ff(area) for number, area in dissertation().area.get(policy, {}).items()}
+        for channels in REQUESTERS:
+            bar = _SCHEDULER_BARS.get((policy, channels))
+            yield Row(label(policy, channels), "", None, _scheduler(policy, channels), known.get(channels, ""), bar)
+
+
+def _scheduler(policy: str, channels: int) -> Callable[[Path], Subject]:
+    return lambda folder: Subject(*schedulers.analysed(folder, policy, channels))
+
+
+def _combined() -> Iterator[Row]:
+    for name in COMBINATIONS:
+        known = _lut_ff(dissertation().combined_area[name])
+        yield Row(label(name, COMBINED_REQUESTERS), "", None, _combination(name), known)
+
+
+def _combination(name: str) -> Callable[[Path], Subject]:
+    return lambda folder: Subject(*schedulers.combined(folder, COMBINATIONS[name], COMBINED_REQUESTERS))
+
+
+def _lut_ff(area: list[float]) -> str:
+    return "/".join(f"{number:.0f}" for number in area)

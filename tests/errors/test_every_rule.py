@@ -1,0 +1,100 @@
+"""Every place that notes a fault of a specification is reached by a bad specification in `tests/errors/spec`."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+import pytest
+
+from fusesoc_firm.diagnostics import Diagnostics, InputError
+from tests.errors.conftest import make_libraries
+from tests.errors.test_spec_errors import SPECIFICATIONS, derive_file
+
+PACKAGE = Path(sys.modules["fusesoc_firm"].__path__[0])
+# What a specification is read and judged by.
+SOURCES = (
+    *sorted((PACKAGE / "system").glob("*.py")),
+    *(
+        PACKAGE / name
+        for name in ("yaml_text.py", "yaml_sections.py", "frame/select.py", "converter/limits.py", "message/library.py")
+    ),
+)
+# What notes a fault, and functions whose faults are of something else than the specification's text.
+NOTING_METHODS, NOTING_FUNCTIONS = ("error", "_error", "take"), ("fail", "InputError")
+OTHER_FAULTS = {
+    ("system/diagram.py", "diagram"): "a program or package that is not installed",
+    ("message/library.py", "libraries"): "an option of the command line",
+    ("message/library.py", "_check_folders"): "an option of the command line",
+    ("system/timing.py", "tasks_of"): "a question that a right specification does not answer",
+}
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A call that notes a fault: the file below the package, the function, the lines of the call."""
+
+    file: str
+    function: str
+    lines: range
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.lines[0]} in {self.function}"
+
+
+def rules() -> list[Rule]:
+    return [rule for path in SOURCES for rule in _rules(path) if (rule.file, rule.function) not in OTHER_FAULTS]
+
+
+def _rules(path: Path) -> Iterator[Rule]:
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    for function in (node for node in nodes if isinstance(node, ast.FunctionDef)):
+        for call in ast.walk(function):
+            if isinstance(call, ast.Call) and _notes(call.func):
+                lines = range(call.lineno, (call.end_lineno or call.lineno) + 1)
+                yield Rule(path.relative_to(PACKAGE).as_posix(), function.name, lines)
+
+
+def _notes(function: ast.expr) -> bool:
+    if isinstance(function, ast.Attribute):
+        return function.attr in NOTING_METHODS
+    return isinstance(function, ast.Name) and function.id in NOTING_FUNCTIONS
+
+
+@pytest.fixture
+def reached(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, int]]:
+    """The lines that were at work when a fault was noted: files below the package, and lines."""
+    found: set[tuple[str, int]] = set()
+
+    def watched(method: Callable[..., None], self: object, *arguments: object) -> None:
+        frame: FrameType | None = sys._getframe(2)
+        while frame is not None:
+            path = Path(frame.f_code.co_filename)
+            if path.is_relative_to(PACKAGE):
+                found.add((path.relative_to(PACKAGE).as_posix(), frame.f_lineno))
+            frame = frame.f_back
+        method(self, *arguments)
+
+    for owner, name in ((Diagnostics, "error"), (InputError, "__init__")):
+        method = getattr(owner, name)
+        monkeypatch.setattr(owner, name, lambda self, *arguments, method=method: watched(method, self, *arguments))
+    return found
+
+
+def test_every_rule_has_a_bad_specification(reached: set[tuple[str, int]], monkeypatch: pytest.MonkeyPatch) -> None:
+    # New ones: a library notes what is wrong in a file when it first reads it.
+    libraries = make_libraries()
+    for path in SPECIFICATIONS:
+        with pytest.raises(InputError):
+            derive_file(path, libraries, monkeypatch)
+    idle = [str(rule) for rule in rules() if not any((rule.file, line) in reached for line in rule.lines)]
+    assert not idle, "no specification in tests/errors/spec has these faults:\n" + "\n".join(idle)
+
+
+def test_every_exception_is_still_there() -> None:
+    functions = {(rule.file, rule.function) for path in SOURCES for rule in _rules(path)}
+    assert OTHER_FAULTS.keys() <= functions

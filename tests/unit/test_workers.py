@@ -1,0 +1,147 @@
+"""Work on a Dask cluster on loopback: results are those of this machine, and faults end with a message, in time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fusesoc_firm import workers
+from fusesoc_firm.cli import main
+from fusesoc_firm.diagnostics import InputError
+from tests.sim.ghdl import REPOSITORY
+
+distributed: Any = pytest.importorskip("distributed", reason="no distributed; make test installs it")
+
+# All tests share the cluster.
+pytestmark = pytest.mark.xdist_group("dask")
+
+SMALL_BENCH = ("scheduler", "bench", "--requesters", "2,9", "--policies", "lru,lst", "--sets", "2", "--cycles", "500")
+
+Captured = pytest.CaptureFixture[str]
+
+
+def _cluster(workers: int) -> Any:
+    return distributed.LocalCluster(n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=":0")
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    with _cluster(2) as cluster:
+        yield cluster.scheduler_address
+
+
+def _square(number: int) -> int:
+    return number * number
+
+
+def _leave(_: int) -> None:
+    os._exit(1)
+
+
+def test_results_are_those_of_this_machine(address: str, tmp_path: Path, capsys: Captured) -> None:
+    tables = []
+    for place in (["--cluster", address], ["--jobs", "1"]):
+        path = tmp_path / f"{place[0].strip('-')}.csv"
+        assert main([*SMALL_BENCH, *place, "--csv", str(path)]) == 0
+        tables.append(path.read_text())
+    assert tables[0] == tables[1]
+    assert len(tables[0].splitlines()) == 1 + 4
+    assert "4 evaluations in" in capsys.readouterr().out
+
+
+def test_every_task_comes_back_once(address: str) -> None:
+    numbers = range(100)
+    with workers.cluster_workers(address) as cluster:
+        assert cluster.count == 2
+        assert sorted(cluster.run(_square, numbers)) == [(number, number**2) for number in numbers]
+
+
+def test_an_address_where_nobody_answers(monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+    monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
+    with socket.socket() as bound:
+        # Bound, not listening; free again behind it, and not given away soon.
+        bound.bind(("127.0.0.1", 0))
+        dead = f"tcp://127.0.0.1:{bound.getsockname()[1]}"
+    started = time.monotonic()
+    assert main([*SMALL_BENCH, "--cluster", dead]) == 1
+    assert time.monotonic() - started < 20
+    assert f"error: no Dask scheduler answers at '{dead}'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("nonsense", ["nonsense", "tcp://", "http://127.0.0.1:1", "tcp://127.0.0.1:port"])
+def test_an_address_that_is_none(nonsense: str, monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
+    monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
+    assert main([*SMALL_BENCH, "--cluster", nonsense]) == 1
+    assert f"error: no Dask scheduler answers at '{nonsense}'" in capsys.readouterr().err
+
+
+def test_a_cluster_without_workers() -> None:
+    with _cluster(0) as cluster:
+        address = cluster.scheduler_address
+        with pytest.raises(InputError, match=f"'{address}' has no workers"), workers.cluster_workers(address):
+            pass
+
+
+def test_workers_of_another_version(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "__version__", "99.0")
+    expected = r"its worker tcp://\S+ has \d+\.\d+\.\d+\n      = all workers need fusesoc-firm 99.0"
+    with pytest.raises(InputError, match=expected), workers.cluster_workers(address):
+        pass
+
+
+def test_workers_that_die() -> None:
+    with (
+        _cluster(1) as cluster,
+        pytest.raises(InputError, match="was lost"),
+        workers.cluster_workers(cluster.scheduler_address) as found,
+    ):
+        list(found.run(_leave, [1]))
+
+
+def test_a_scheduler_that_ends() -> None:
+    with _cluster(1) as cluster:
+        threading.Timer(2, cluster.close).start()
+        started = time.monotonic()
+        with (
+            pytest.raises(InputError, match="was lost\n      = its scheduler ended"),
+            workers.cluster_workers(cluster.scheduler_address) as found,
+        ):
+            list(found.run(time.sleep, [60]))
+        assert time.monotonic() - started < 45
+
+
+def test_ctrl_c_ends_it(address: str) -> None:
+    """In a process of its own, which is interrupted while its work is on the cluster."""
+    command = [sys.executable, "-m", "fusesoc_firm.cli", "scheduler", "bench", "--policies", "lst", "--sets", "5"]
+    running = subprocess.Popen(
+        [*command, "--requesters", ",".join(map(str, range(2, 65))), "--cluster", address],
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    with distributed.Client(address) as client, running:
+        _wait_until(lambda: any(client.processing().values()))
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=30)
+        assert (running.returncode, out) == (130, "")
+        assert err.endswith("interrupted\n") and "Traceback" not in err
+        # What was handed out is taken back: the cluster is free for others.
+        _wait_until(lambda: not any(client.processing().values()))
+
+
+def _wait_until(is_so: Any, seconds: float = 60) -> None:
+    end = time.monotonic() + seconds
+    while not is_so():
+        assert time.monotonic() < end
+        time.sleep(0.1)
