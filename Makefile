@@ -19,7 +19,7 @@ TOOLS :=
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
-# Parts of the bench, all if empty: BENCH='area manager timing cycles fuzz images systems'.
+# Parts of the bench, all if empty: BENCH='area manager timing use cycles fuzz images systems'.
 BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
@@ -57,7 +57,7 @@ else
 endif
 
 bench: TOOLS = verilator
-bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing cycles fuzz images systems'
+bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing use cycles fuzz images systems'
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md

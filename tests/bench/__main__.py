@@ -1,6 +1,6 @@
 """`make bench`: measure, print the tables, write docs/figures.md and the areas of Manager and schedulers.
 
-    python -m tests.bench [area] [manager] [timing] [cycles] [fuzz] [images] [systems] [--seed N] [--broken N]
+    python -m tests.bench [area] [manager] [timing] [use] [cycles] [fuzz] [images] [systems] [--seed N] [--broken N]
 
 Progress goes to the standard error, tables to the standard output. The exit code is 1 if a design cannot be measured,
 a converter fails or a bar is missed; messages that are not converted yet are none of these.
@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from tests.bench import area, cycles, figures, fuzz, images, manager, systems, timing
+from tests.bench import area, cycles, figures, fuzz, images, manager, systems, timing, use
 from tests.bench.areas import write_areas
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import Table
@@ -56,6 +56,8 @@ def _measure(part: str, seed: int, broken: int) -> list[Table]:
         return manager.measure(yosys, _tell)
     if part == "timing":
         return timing.measure(Nextpnr(yosys), _tell)
+    if part == "use":
+        return use.measure(seed, _tell)
     if part == "images":
         return images.measure(yosys, seed, _tell)
     return cycles.measure(seed, _tell) if part == "cycles" else fuzz.measure(seed, _tell, broken)

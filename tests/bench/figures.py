@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, images, manager, nextpnr, systems, timing, yosys
+from tests.bench import area, cycles, fuzz, images, manager, nextpnr, systems, timing, use, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
@@ -19,6 +19,7 @@ _HEADINGS = {
     "area": "Area",
     "manager": "Area of Manager and schedulers",
     "timing": "Timing",
+    "use": "Channel use",
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
     "images": "Images",
@@ -32,6 +33,7 @@ _METHODS = {
     "timing": f"""The clock's frequency that all paths keep after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
         (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. Another seed gives figures
         some percent away.""",
+    "use": "Counted in the cycle-exact models of the schedulers.",
     "cycles": "Counted in a simulation of the netlist that `ghdl --synth` makes, by Verilator.",
     "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
@@ -39,10 +41,10 @@ _METHODS = {
     "systems": "Time that a user waits for a large system.",
 }
 _INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `cycles`,
-    `fuzz`, `images`, `systems`). 'not converted' is a message that no converter is made of yet, or, for FrankaState,
-    whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell
-    how a row stands to its bar.
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
+    `cycles`, `fuzz`, `images`, `systems`). 'not converted' is a message that no converter is made of yet, or, for
+    FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`. 'met' and
+    'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -53,7 +55,8 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    return area.keys() | manager.keys() | timing.keys() | cycles.keys() | fuzz.keys() | images.keys() | systems.keys()
+    modules = (area, manager, timing, use, cycles, fuzz, images, systems)
+    return {title: rows for module in modules for title, rows in module.keys().items()}
 
 
 def section(part: str, tables: Sequence[Table]) -> str:
@@ -78,6 +81,8 @@ def _section_of(text: str, heading: str) -> str:
 def _versions(part: str) -> str:
     if part == "systems":
         return f"With Python {platform.python_version()} and rosbags {metadata.version('rosbags')}."
+    if part == "use":
+        return f"With Python {platform.python_version()}, NumPy {metadata.version('numpy')}."
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]

@@ -244,8 +244,8 @@ def _edf_resources() -> tuple[Proof, ...]:
         "scheduler_grants": (
             Mutation(
                 file,
-                "grant_select_r <= root_id",
-                "grant_select_r <= not root_id",
+                "grant_select_r <= first_id",
+                "grant_select_r <= not first_id",
                 ("only_to_a_requester",),
             ),
             Mutation(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,7 +15,6 @@ POLICY_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_
 SEED = 20240503
 
 _WITHOUT_POLICIES = ("axis/axis", "sched/package")
-_OF_POLICIES = ("sched/by_policy", "sched/combined")
 
 
 @dataclass(frozen=True)
@@ -68,12 +67,13 @@ def analysed(folder: Path) -> Library:
     return library
 
 
-def analyse_bench(library: Library, by_policy: Path | None = None) -> None:
-    """What stands above the policies, again if one was replaced; `by_policy` is a firm_sched_by_policy to use."""
-    library.analyse(core_files(*_OF_POLICIES))
-    if by_policy is not None:
-        library.analyse([by_policy])
-        library.analyse(core_files("sched/combined"))
+def analyse_bench(library: Library, by_policy: Path | None = None, combined: Path | None = None) -> None:
+    """What stands above the policies, again if one was replaced.
+
+    `by_policy` is a firm_sched_by_policy to use, `combined` a firm_sched_combined.
+    """
+    library.analyse(core_files("sched/by_policy") if by_policy is None else [by_policy])
+    library.analyse(core_files("sched/combined") if combined is None else [combined])
     library.analyse(core_files("sched/combined", fileset="tb"))
 
 
@@ -97,14 +97,37 @@ def model_of(trace: Trace, policy: str, groups: str = "") -> Scheduler:
     return Combined(members, POLICIES[policy](trace.generics.part(slice(0, len(groups)))))
 
 
-_BY_POLICY_GENERICS = """generic (
+def timed_generics(trace: Trace) -> dict[str, str]:
+    """The generics of a policy with deadlines as they are in the trace's bench."""
+    is_implicit = trace.head["deadlines"] == [0]
+    return {
+        "PERIODS": aggregate(trace.head["periods"]),
+        "DEADLINES": "IMPLICIT" if is_implicit else aggregate(trace.head["deadlines"]),
+        "SHORTEST_RUN": str(trace.head["shortest_run"][0]),
+    }
+
+
+def aggregate(values: Iterable[object]) -> str:
+    """An array in VHDL; it may have a single element."""
+    return f"({', '.join(f'{place} => {value}' for place, value in enumerate(values))})"
+
+
+_OWN_GENERICS = {
+    "firm_sched_by_policy": """generic (
     POLICY : policy_t; REQUESTERS : integer; PERIODS, TRANSFER_TIMES, DEADLINES : times_t := IMPLICIT;
-    TIME_BITS, SHORTEST_RUN : integer := 1);"""
+    TIME_BITS, SHORTEST_RUN : integer := 1);""",
+    "firm_sched_combined": """generic (
+    REQUESTERS : integer; SIZES : times_t; POLICIES : policies_t; TOP_POLICY : policy_t;
+    PERIODS, TRANSFER_TIMES, DEADLINES : times_t := IMPLICIT; TIME_BITS, SHORTEST_RUN : integer := 1);""",
+}
 
 
 def wrapper(name: str, entity: str, requesters: int, generics: Mapping[str, str]) -> str:
-    """An entity around a scheduler with its generics; one named firm_sched_by_policy can take that one's place."""
-    own_generics = _BY_POLICY_GENERICS if name == "firm_sched_by_policy" else ""
+    """An entity around a scheduler with its generics.
+
+    One named firm_sched_by_policy or firm_sched_combined has that one's generics, too, and can take its place.
+    """
+    own_generics = _OWN_GENERICS.get(name, "")
     generic_map = ", ".join(f"{generic} => {value}" for generic, value in generics.items())
     return f"""
 library ieee;

@@ -7,9 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fusesoc_firm.scheduling.models.engine import rows_and_columns
 from tests.sim.ghdl import Library
 from tests.sim.sched_trace import Trace, first_difference, most_overtaken
-from tests.sim.schedulers import ENTITIES, analyse_bench, analysed, model_of, trace_of, wrapper
+from tests.sim.schedulers import (
+    ENTITIES,
+    aggregate,
+    analyse_bench,
+    analysed,
+    model_of,
+    timed_generics,
+    trace_of,
+    wrapper,
+)
 
 TIMED = [policy for policy, entity in ENTITIES.items() if entity.has_times]
 # Each policy with each way to keep its tasks: in a heap, in a sorted queue, all at once.
@@ -25,7 +35,7 @@ SIZES = [
     ("lst", LST_IN_HEAP),
     ("lru", 20),
 ]
-# After reset the heap is cleared and stamps are written.
+# After reset the heap is cleared.
 RESET_CYCLES = 300
 
 
@@ -40,8 +50,16 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 def test_runs_are_those_of_the_model(
     library: Library, tmp_path: Path, policy: str, requesters: int, shortest_run: int
 ) -> None:
+    # Tasks preempt each other seldom where deadlines are far apart, and most seldom after just so many beats.
     trace = trace_of(
-        library, tmp_path, POLICY=policy, REQUESTERS=requesters, SHORTEST_RUN=shortest_run, SEGMENTS=10, CYCLES=2000
+        library,
+        tmp_path,
+        POLICY=policy,
+        REQUESTERS=requesters,
+        SHORTEST_RUN=shortest_run,
+        SEED=1,
+        SEGMENTS=10,
+        CYCLES=4000,
     )
     assert first_difference(trace, model_of(trace, policy)) == ""
     shortest = _shortest_broken_run(trace)
@@ -119,6 +137,27 @@ def test_each_other_goes_first_once_at_most(
     assert 0 < most_overtaken(trace) <= requesters - 1
 
 
+@pytest.mark.parametrize("beats", [1, 2, 3])
+@pytest.mark.parametrize("saturated", [False, True])
+@pytest.mark.parametrize("requesters", [20, 100])
+def test_short_tasks_pass_by_few(
+    library: Library, tmp_path: Path, requesters: int, saturated: bool, beats: int
+) -> None:
+    trace = trace_of(
+        library, tmp_path, POLICY="lru", REQUESTERS=requesters, SATURATED=saturated, TASK_BEATS=beats, CYCLES=4000
+    )
+    # The heap is busy with tasks as short as these, so that some wait outside, where there is no order of use.
+    assert 0 < most_overtaken(trace) <= (1.2 if beats == 3 else 2) * requesters
+
+
+@pytest.mark.parametrize(("policy", "requesters"), [("lru", 20), ("lru", 256), ("edf_resources", 256)])
+def test_reset_is_over_soon(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
+    trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters, SATURATED=True, CYCLES=200)
+    # Rows of requesters are cleared, one a cycle; then the first of them is accepted and granted.
+    rows, _ = rows_and_columns(requesters)
+    assert (trace.grant_valid.argmax(axis=1) == rows + 2).all()
+
+
 @pytest.mark.parametrize(("policy", "requesters"), [*SIZES, ("edf_resources", 256), ("edf_latency", 256), ("lru", 256)])
 def test_a_lone_request_is_granted_in_two_cycles(
     library: Library, tmp_path: Path, policy: str, requesters: int
@@ -151,8 +190,8 @@ def test_tasks_follow_each_other(library: Library, tmp_path: Path, policy: str, 
         library, tmp_path, POLICY=policy, REQUESTERS=requesters, SATURATED=True, TASK_BEATS=beats, CYCLES=2000
     )
     share = float(trace.beat[:, RESET_CYCLES:].mean())
-    # LST interrupts tasks, so that what is left of one may be a single beat, too short for the heap to be ready again.
-    assert share >= 0.95 if policy == "lst" and requesters == LST_IN_HEAP else share == 1
+    # LST interrupts tasks, so that what is left of several may be single beats, more than the heap hands over in a row.
+    assert share >= 0.995 if policy == "lst" and requesters == LST_IN_HEAP else share == 1
 
 
 @pytest.mark.parametrize("shortest_run", [1, 3])
@@ -180,17 +219,11 @@ def test_the_netlist_does_the_same(
 
 def _generics(trace: Trace, policy: str) -> dict[str, str]:
     """The generics of a policy's entity as they are in the trace's bench."""
-
-    def times(name: str) -> str:
-        return "(" + ", ".join(f"{place} => {time}" for place, time in enumerate(trace.head[name])) + ")"
-
     generics = {"REQUESTERS": str(trace.requesters)}
     if policy in TIMED:
-        generics["PERIODS"] = times("periods")
-        generics["DEADLINES"] = "IMPLICIT" if trace.head["deadlines"] == [0] else times("deadlines")
-        generics["SHORTEST_RUN"] = str(trace.head["shortest_run"][0])
+        generics |= timed_generics(trace)
     if policy == "lst":
-        generics["TRANSFER_TIMES"] = times("transfer_times")
+        generics["TRANSFER_TIMES"] = aggregate(trace.head["transfer_times"])
     return generics
 
 

@@ -24,13 +24,14 @@ RATES = [(30, 20), FILLING, (20, 90), (100, 100)]
 
 @dataclass(frozen=True)
 class Cycle:
-    """A cycle of the bench's trace; `insert` is (id, key), `root` too."""
+    """A cycle of the bench's trace; `insert` is (id, key), and so is `first`, the item that can be popped."""
 
     insert: tuple[int, int] | None
     pop: bool
     ready: bool
     empty: bool
-    root: tuple[int, int] | None
+    root_valid: bool
+    first: tuple[int, int] | None
 
 
 @dataclass
@@ -101,8 +102,8 @@ def _parse(line: str) -> Cycle:
     if words[0] == "insert":
         insert = (int(words[1]), int(words[2]))
         del words[1:3]
-    root = None if words[4] == "-" else (int(words[4]), int(words[5]))
-    return Cycle(insert, words[1] == "pop", words[2] == "1", words[3] == "1", root)
+    first = None if words[5] == "-" else (int(words[5]), int(words[6]))
+    return Cycle(insert, words[1] == "pop", words[2] == "1", words[3] == "1", words[4] == "1", first)
 
 
 def _judge(cycles: list[Cycle], is_sorted: bool) -> tuple[int, int]:
@@ -110,20 +111,18 @@ def _judge(cycles: list[Cycle], is_sorted: bool) -> tuple[int, int]:
     model = Model()
     unwrap = Unwrapped()
     popped = fullest = 0
-    filling = False
+    # The heap's root is filled anew in the cycle after a pop; if what fills it is popped, two cycles later.
+    filling = owing = is_cleared = False
     for number, cycle in enumerate(cycles):
         where = f"cycle {number}: {cycle}, {model.ordered[:3]}"
-        if cycle.root is not None:
-            item, key = cycle.root
-            assert model.ordered, where
+        assert (cycle.first is None) == (owing or not model.ordered), where
+        if cycle.first is not None:
+            item, key = cycle.first
             assert (key, item) == (model.ordered[0][0] % 2**KEY_BITS, model.ordered[0][1]), where
-        elif filling:
-            assert not cycle.empty, where
-        else:
-            assert not model.ordered, where
-        assert cycle.empty == (cycle.root is None and not filling), where
-        if is_sorted:
-            assert cycle.ready, where
+        assert cycle.root_valid == (cycle.first is not None and not filling), where
+        assert cycle.empty == (not (cycle.root_valid or filling or owing)), where
+        is_cleared = is_cleared or cycle.ready or is_sorted
+        assert cycle.ready == (is_sorted or not (cycle.pop or filling or owing)) or not is_cleared, where
         if cycle.pop:
             model.pop()
             popped += 1
@@ -131,9 +130,8 @@ def _judge(cycles: list[Cycle], is_sorted: bool) -> tuple[int, int]:
             item, key = cycle.insert
             model.insert(unwrap(key), item)
             fullest = max(fullest, len(model.ordered))
-        # The heap's root is filled anew in the cycle after a pop; only then, and while it pops, nothing can enter.
-        assert cycle.ready or cycle.pop or filling or not popped, where
-        filling = cycle.pop and not is_sorted
+        if not is_sorted:
+            filling, owing = (cycle.pop and not filling) or owing, cycle.pop and filling
     return popped, fullest
 
 

@@ -14,6 +14,7 @@ use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
 use firm.firm_sched_pkg.all;
+use firm.firm_sched_queue_pkg.all;
 
 entity firm_sched_arrivals is
   generic (
@@ -21,8 +22,6 @@ entity firm_sched_arrivals is
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
-
-    enable : in std_logic;  -- accept tasks
 
     request : in std_logic_vector(REQUESTERS-1 downto 0);
 
@@ -39,10 +38,9 @@ end entity firm_sched_arrivals;
 
 architecture rtl of firm_sched_arrivals is
 
-  -- Two requesters are a row, of which another one is not used.
   constant ID_BITS     : positive := index_bits(REQUESTERS);
-  constant COLUMN_BITS : positive := max(1, ID_BITS / 2);
-  constant ROW_BITS    : positive := max(1, ID_BITS - COLUMN_BITS);
+  constant COLUMN_BITS : positive := column_bits_of(REQUESTERS);
+  constant ROW_BITS    : positive := row_bits_of(REQUESTERS);
   constant COLUMNS     : positive := 2**COLUMN_BITS;
   constant ROWS        : positive := 2**ROW_BITS;
   subtype row_t is std_logic_vector(ROW_BITS-1 downto 0);
@@ -123,7 +121,7 @@ begin
   row_known    <= row_accepted xor row_finished;
   row_new      <= row_asks and not row_known and not finished_column when found_row = finished_row else
                   row_asks and not row_known;
-  load         <= enable and not any_of(batch_r) and not clearing;
+  load         <= not (any_of(batch_r) or clearing);
 
   accept_row   <= load or clearing;
   new_accepted <= row_finished when clearing = '1' else row_finished xor (row_known or row_new);

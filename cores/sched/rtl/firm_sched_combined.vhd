@@ -40,8 +40,19 @@ architecture rtl of firm_sched_combined is
 
   constant GROUPS      : positive := max(1, SIZES'length);
   constant SELECT_BITS : positive := index_bits(REQUESTERS);
-  constant IS_LEGAL    : boolean  := fault_of_size(REQUESTERS) = "" and
-                                    fault_of_groups(REQUESTERS, SIZES, POLICIES, TOP_POLICY) = "";
+
+  function found_fault return string is
+  begin
+    if fault_of_size(REQUESTERS) /= "" then
+      return fault_of_size(REQUESTERS);
+    elsif fault_of_groups(REQUESTERS, SIZES, POLICIES, TOP_POLICY) /= "" then
+      return fault_of_groups(REQUESTERS, SIZES, POLICIES, TOP_POLICY);
+    end if;
+    return fault_of_group_times(REQUESTERS, POLICIES, PERIODS, TRANSFER_TIMES, DEADLINES, TIME_BITS, SHORTEST_RUN);
+  end function found_fault;
+
+  constant FAULT    : string  := found_fault;
+  constant IS_LEGAL : boolean := FAULT = "";
 
   signal group_valid   : std_logic_vector(GROUPS-1 downto 0);
   signal group_request : std_logic_vector(GROUPS-1 downto 0);
@@ -52,12 +63,8 @@ architecture rtl of firm_sched_combined is
 
 begin
 
-  assert fault_of_size(REQUESTERS) = ""
-    report "firm_sched_combined: " & fault_of_size(REQUESTERS)
-    severity failure;
-
-  assert fault_of_groups(REQUESTERS, SIZES, POLICIES, TOP_POLICY) = ""
-    report "firm_sched_combined: " & fault_of_groups(REQUESTERS, SIZES, POLICIES, TOP_POLICY)
+  assert FAULT = ""
+    report "firm_sched_combined: " & FAULT
     severity failure;
 
   group_beat <= decode(top_select, beat, GROUPS);

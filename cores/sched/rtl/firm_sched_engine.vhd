@@ -9,7 +9,8 @@
 --
 -- When a task finishes, the next is the queue's root; if the queue is empty B, else who arrives. If there is
 -- nobody, the grant stays where it is, parked: its requester may begin a task before that is accepted, which then
--- has no key yet and keeps the grant until it has. While the queue fills its root, nobody is granted.
+-- has no key yet and keeps the grant until it has. While the queue has no root for it fills it, B or who arrives goes
+-- first where the root can preempt it after a beat; else nobody is granted.
 -- A task with a smaller key (EDF, LST) takes the grant; the one that had it goes back into the queue through B.
 --
 -- Keys are compared as numbers that wrap around. So that they stay less than half their range apart whatever the
@@ -63,7 +64,6 @@ architecture rtl of firm_sched_engine is
   subtype key_t is std_logic_vector(KEY_BITS-1 downto 0);
 
   -- The first task of the arrivals, A.
-  signal accept     : std_logic;
   signal a_valid    : std_logic;
   signal a_id       : id_t;
   signal a_key      : key_t;
@@ -83,6 +83,9 @@ architecture rtl of firm_sched_engine is
   signal root_valid   : std_logic;
   signal root_id      : id_t;
   signal root_key     : key_t;
+  signal first_valid  : std_logic;
+  signal first_id     : id_t;
+  signal first_key    : key_t;
   signal pop          : std_logic;
   signal empty        : std_logic;
 
@@ -95,6 +98,7 @@ architecture rtl of firm_sched_engine is
 
   signal finished  : std_logic;
   signal choose    : std_logic;  -- nobody has the grant in the next cycle by right
+  signal gives_way : std_logic;  -- the queue, to who is on the way to it
   signal take_root : std_logic;
   signal take_b    : std_logic;
   signal take_a    : std_logic;
@@ -116,7 +120,6 @@ begin
     port map (
       clk            => clk,
       rst_n          => rst_n,
-      enable         => accept,
       request        => request,
       valid          => a_valid,
       id             => a_id,
@@ -150,7 +153,6 @@ begin
   begin
     a_key     <= std_logic_vector(unsigned(time_r) + unsigned(OFFSET_OF(to_integer(unsigned(a_id)))));
     key_ready <= '1';
-    accept    <= '1';
 
     -- The heap after reset; B may wait for it.
     is_clearing   <= empty and not insert_ready;
@@ -171,8 +173,6 @@ begin
   end generate timed;
 
   stamped : if HAS_STAMPS generate
-    signal initialised : std_logic;
-  begin
     u_stamps : entity firm.firm_sched_stamps
       generic map (
         REQUESTERS => REQUESTERS,
@@ -180,7 +180,6 @@ begin
       port map (
         clk          => clk,
         rst_n        => rst_n,
-        initialised  => initialised,
         completed    => finished,
         completed_id => grant_select_r,
         read         => a_valid,
@@ -188,7 +187,6 @@ begin
         read_ready   => key_ready,
         stamp        => a_key);
 
-    accept  <= initialised;
     advance <= '0';
   end generate stamped;
 
@@ -212,6 +210,9 @@ begin
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
+        first_valid  => first_valid,
+        first_id     => first_id,
+        first_key    => first_key,
         pop          => pop,
         empty        => empty);
   end generate of_few_luts;
@@ -231,6 +232,9 @@ begin
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
+        first_valid  => first_valid,
+        first_id     => first_id,
+        first_key    => first_key,
         pop          => pop,
         empty        => empty);
   end generate of_few_cycles;
@@ -238,9 +242,9 @@ begin
   -- Who is granted next.
 
   choose    <= finished or not (running_r or beat);
-  take_root <= choose and root_valid;
-  take_b    <= choose and empty and b_valid_r;
-  take_a    <= choose and empty and not b_valid_r and a_valid and not (finished and a_is_own);
+  take_root <= choose and first_valid;
+  take_b    <= choose and gives_way and b_valid_r;
+  take_a    <= choose and gives_way and not b_valid_r and a_valid and not (finished and a_is_own);
   get_key   <= a_valid and a_is_own and not choose;
 
   preemptive : if not HAS_STAMPS generate
@@ -249,10 +253,13 @@ begin
   begin
     root_is_before <= root_valid and is_before(root_key, key_r);
     b_has_room     <= '1' when IS_SORTED else not b_valid_r;
+    -- Better who may come first than nobody, since who should have takes the grant from it after a beat.
+    gives_way      <= not first_valid when SHORTEST_RUN <= 1 else empty;
     preempt        <= running_r and keyed_r and root_is_before and b_has_room and may_leave and not finished;
   end generate preemptive;
   non_preemptive : if HAS_STAMPS generate
-    preempt <= '0';
+    gives_way <= empty;
+    preempt   <= '0';
   end generate non_preemptive;
 
   runs_of_one : if SHORTEST_RUN <= 1 generate
@@ -304,7 +311,10 @@ begin
   end process hold_b;
 
   sends_own_time : if POLICY = LST generate
-    next_key <= std_logic_vector(unsigned(key_r) + 1) when beat = '1' and advance = '1' else key_r;
+    signal step : unsigned(0 downto 0);
+  begin
+    step(0)  <= beat and advance;
+    next_key <= std_logic_vector(unsigned(key_r) + step);
   end generate sends_own_time;
   keeps_key : if POLICY /= LST generate
     next_key <= key_r;
@@ -320,7 +330,7 @@ begin
         keyed_r        <= '0';
       else
         if pop = '1' then
-          grant_select_r <= root_id;
+          grant_select_r <= first_id;
         elsif take_b = '1' then
           grant_select_r <= b_id_r;
         elsif take_a = '1' then
@@ -335,7 +345,7 @@ begin
         keyed_r   <= take_root or take_b or take_a or (not choose and (keyed_r or get_key));
       end if;
       if pop = '1' then
-        key_r <= root_key;
+        key_r <= first_key;
       elsif take_b = '1' then
         key_r <= b_key_r;
       elsif take_a = '1' or get_key = '1' then

@@ -6,7 +6,7 @@
 -- first stays, the other goes on along its own path. After a pop the hole is filled with the smaller of the two
 -- nodes below, whose hole is filled in turn. Each operation is at one level a cycle, and several follow each other
 -- down. The root is a register: it is always the item that comes first, but for the cycle after a pop, when it is
--- filled anew.
+-- filled anew. What fills it can be popped in that cycle, too; then the root is filled two cycles later.
 --
 -- The RAM keeps what was there before a reset. So the nodes are cleared after it, a path to a pair of leaves a cycle.
 library ieee;
@@ -34,7 +34,11 @@ entity firm_sched_heap is
     root_valid : out std_logic;
     root_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     root_key   : out std_logic_vector(KEY_BITS-1 downto 0);
-    pop        : in  std_logic;    -- takes the root; only while it is valid
+    -- The same where it is there, else the item that becomes the root in this cycle.
+    first_valid : out std_logic;
+    first_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
+    first_key   : out std_logic_vector(KEY_BITS-1 downto 0);
+    pop        : in  std_logic;    -- takes that item; only while it is valid
     empty      : out std_logic);   -- nothing is in the queue; while '0', a root is there or comes
 end entity firm_sched_heap;
 
@@ -49,7 +53,9 @@ architecture rtl of firm_sched_heap is
   signal root_valid_r : std_logic;
   signal root_id_r    : id_t;
   signal root_key_r   : key_t;
-  signal filling_r    : std_logic;  -- the root was popped in the last cycle
+  signal filling_r    : std_logic;  -- the level below tells what the root is from the next cycle on
+  signal owing_r      : std_logic;  -- that was popped in the last cycle
+  signal fill         : std_logic;
 
   signal cleared_r : unsigned(LEVELS downto 0);  -- the next index whose path is to be cleared; the highest bit: all are
   signal clearing  : std_logic;
@@ -72,8 +78,9 @@ architecture rtl of firm_sched_heap is
 begin
 
   clearing     <= not cleared_r(LEVELS);
-  insert_ready <= not (pop or filling_r or clearing);
-  insert       <= insert_valid and not (pop or filling_r or clearing);
+  insert_ready <= not (pop or filling_r or owing_r or clearing);
+  insert       <= insert_valid and not (pop or filling_r or owing_r or clearing);
+  fill         <= (pop and not filling_r) or owing_r;
   root_stays   <= root_valid_r and is_before(root_key_r & root_id_r, insert_key & insert_id);
 
   hold_root : process (clk)
@@ -82,9 +89,11 @@ begin
       if rst_n = '0' then
         root_valid_r <= '0';
         filling_r    <= '0';
+        owing_r      <= '0';
         cleared_r    <= (others => '0');
       else
-        filling_r <= pop;
+        filling_r <= fill;
+        owing_r   <= pop and filling_r;
         if clearing = '1' then
           cleared_r <= cleared_r + 2;
         end if;
@@ -107,7 +116,7 @@ begin
   end process hold_root;
 
   down_insert(1) <= insert and root_valid_r;
-  down_fill(1)   <= pop;
+  down_fill(1)   <= fill;
   down_clear(1)  <= clearing;
   down_id(1)     <= std_logic_vector(cleared_r(LEVELS-1 downto 0)) when clearing = '1' else
                     insert_id when root_stays = '1' else
@@ -159,6 +168,9 @@ begin
   root_valid <= root_valid_r;
   root_id    <= root_id_r;
   root_key   <= root_key_r;
-  empty      <= not (root_valid_r or filling_r);
+  first_valid <= root_valid_r or (filling_r and up_valid(0));
+  first_id    <= up_id(0)  when filling_r = '1' else root_id_r;
+  first_key   <= up_key(0) when filling_r = '1' else root_key_r;
+  empty      <= not (root_valid_r or filling_r or owing_r);
 
 end architecture rtl;

@@ -189,7 +189,7 @@ begin
     if takes_second = '1' then
       smaller := right;
     end if;
-    smaller_valid    <= smaller(NODE_BITS-1);
+    smaller_valid    <= left(NODE_BITS-1) or right(NODE_BITS-1);
     smaller_key      <= smaller(NODE_BITS-2 downto LOW_BITS);
     smaller_id       <= id_r;
     smaller_id(SIDE) <= takes_second;

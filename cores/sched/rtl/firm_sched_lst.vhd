@@ -32,8 +32,7 @@ architecture rtl of firm_sched_lst is
   constant FEW : positive := 8;
 
   constant FAULT : string := fault_of_deadlines(REQUESTERS, PERIODS, DEADLINES, TIME_BITS, SHORTEST_RUN);
-  constant FAULT_OF_TRANSFER : string :=
-    fault_of_times("TRANSFER_TIMES", "transfer time", TRANSFER_TIMES, REQUESTERS, TIME_BITS);
+  constant TRANSFER_FAULT : string := fault_of_transfer(TRANSFER_TIMES, REQUESTERS, TIME_BITS);
 
   -- A task's slack: what remains to its deadline if it is sent at once.
   constant OFFSETS : times_t :=
@@ -45,8 +44,8 @@ begin
     report "firm_sched_lst: " & FAULT
     severity failure;
 
-  assert FAULT /= "" or FAULT_OF_TRANSFER = ""
-    report "firm_sched_lst: " & FAULT_OF_TRANSFER
+  assert FAULT /= "" or TRANSFER_FAULT = ""
+    report "firm_sched_lst: " & TRANSFER_FAULT
     severity failure;
 
   of_few : if REQUESTERS >= 1 and REQUESTERS <= FEW generate

@@ -1,10 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The scheduler of a policy with deadlines for few requesters: all tasks' keys in registers, compared with each
--- other in every cycle by a tree. The keys are those of firm_sched_engine.
+-- The scheduler of a policy with deadlines for few requesters: how urgent all tasks are in registers, compared with
+-- each other in every cycle by a tree.
 --
 -- A task is accepted in the cycle in which it is first seen, whoever else asks, and takes part in the choice in the
--- next. The smallest key has the grant; of equal keys the one of the task that has it, else that of the lowest
--- index. Nobody accepted: the grant stays.
+-- next. The most urgent one has the grant; of equal ones the task that has it, else that of the lowest index. Nobody
+-- accepted: the grant stays.
+--
+-- Urgency is the time by which a task is past its deadline (EDF) or its latest start (LST), negative before: the
+-- order is that of the keys of firm_sched_engine. It begins with a constant of the requester and grows by one a cycle,
+-- so each is a counter that is reset, which takes its carry chain and hardly a LUT. No task grows more urgent while one
+-- is overdue, so order is right whatever the host does.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -16,8 +21,8 @@ use firm.firm_sched_queue_pkg.all;
 entity firm_sched_parallel is
   generic (
     REQUESTERS     : integer := 2;
-    SENDS_OWN_TIME : boolean := false;  -- the key of the task that sends grows by one a beat
-    OFFSETS        : times_t := IMPLICIT;  -- from the time at which a task comes to its key
+    SENDS_OWN_TIME : boolean := false;  -- a task grows no more urgent by the cycles in which it sends
+    OFFSETS        : times_t := IMPLICIT;  -- from the cycle in which a task comes until it is urgent by 0
     TIME_BITS      : integer := 16;
     SHORTEST_RUN   : integer := 1);
   port (
@@ -34,21 +39,22 @@ end entity firm_sched_parallel;
 
 architecture rtl of firm_sched_parallel is
 
-  constant KEY_BITS : positive := max(TIME_BITS, 3);
-  constant LEVELS   : positive := index_bits(REQUESTERS);
-  constant LEAVES   : positive := 2**LEVELS;
-  subtype key_t is std_logic_vector(KEY_BITS-1 downto 0);
+  -- No two differ by half of this range: none begins with a quarter of it or more, and none grows beyond that.
+  constant URGENCY_BITS : positive := max(TIME_BITS-1, 2);
+  constant LEVELS       : positive := index_bits(REQUESTERS);
+  constant LEAVES       : positive := 2**LEVELS;
+  subtype urgency_t is std_logic_vector(URGENCY_BITS-1 downto 0);
   subtype id_t is std_logic_vector(LEVELS-1 downto 0);
 
   -- Node 1 is the root, node n has the children 2n and 2n+1, of which the first has the lower indices.
-  -- Behind the key a bit that is '0' for the task that has the grant, so that it goes before equal ones.
-  type ranks_t is array (1 to 2*LEAVES-1) of std_logic_vector(KEY_BITS downto 0);
+  -- Behind the urgency a bit that is '1' for the task that has the grant, so that it goes before equal ones.
+  type ranks_t is array (1 to 2*LEAVES-1) of std_logic_vector(URGENCY_BITS downto 0);
   type ids_t is array (1 to 2*LEAVES-1) of id_t;
   signal valid : std_logic_vector(1 to 2*LEAVES-1);
   signal rank  : ranks_t;
   signal id    : ids_t;
 
-  signal time_r  : key_t;
+  signal overdue : std_logic_vector(LEAVES-1 downto 0);  -- urgent by a quarter of the range
   signal advance : std_logic;
 
   signal idle_r   : std_logic_vector(LEAVES-1 downto 0);  -- no task is accepted
@@ -63,23 +69,17 @@ begin
 
   finished <= beat and last;
   current  <= decode(grant_select_r, '1', LEAVES);
-  advance  <= not (valid(1) and is_overdue(rank(1)(KEY_BITS downto 1), time_r));
-
-  count_time : process (clk)
-  begin
-    if rising_edge(clk) then
-      if rst_n = '0' then
-        time_r <= (others => '0');
-      elsif advance = '1' then
-        time_r <= std_logic_vector(unsigned(time_r) + 1);
-      end if;
-    end if;
-  end process count_time;
+  advance  <= not any_of(overdue);
 
   leaves_of_tree : for leaf in 0 to LEAVES-1 generate
     used : if leaf < REQUESTERS generate
-      signal key_r : key_t;
+      constant FIRST_URGENCY : urgency_t := std_logic_vector(to_signed(-time_of(leaf, OFFSETS), URGENCY_BITS));
+
+      signal urgency_r : urgency_t;
+      signal grows     : std_logic;
     begin
+      grows <= advance and not (current(leaf) and beat) when SENDS_OWN_TIME else advance;
+
       hold_task : process (clk)
       begin
         if rising_edge(clk) then
@@ -88,21 +88,22 @@ begin
           else
             idle_r(leaf) <= (idle_r(leaf) and not request(leaf)) or (current(leaf) and finished);
           end if;
-          -- Until a task comes its key is that of one that comes now.
           if idle_r(leaf) = '1' then
-            key_r <= std_logic_vector(unsigned(time_r) + unsigned(to_signed(time_of(leaf, OFFSETS), KEY_BITS)));
-          elsif SENDS_OWN_TIME and current(leaf) = '1' and beat = '1' and advance = '1' then
-            key_r <= std_logic_vector(unsigned(key_r) + 1);
+            urgency_r <= FIRST_URGENCY;
+          elsif grows = '1' then
+            urgency_r <= std_logic_vector(unsigned(urgency_r) + 1);
           end if;
         end if;
       end process hold_task;
 
+      overdue(leaf)      <= urgency_r(URGENCY_BITS-2) and not urgency_r(URGENCY_BITS-1);
       valid(LEAVES+leaf) <= not idle_r(leaf) and not (current(leaf) and finished);
-      rank(LEAVES+leaf)  <= key_r & not current(leaf);
+      rank(LEAVES+leaf)  <= urgency_r & current(leaf);
     end generate used;
 
     unused : if leaf >= REQUESTERS generate
       idle_r(leaf)       <= '1';
+      overdue(leaf)      <= '0';
       valid(LEAVES+leaf) <= '0';
       rank(LEAVES+leaf)  <= (others => '0');
     end generate unused;
@@ -114,7 +115,7 @@ begin
     nodes : for node in natural range 2**level to 2**(level+1)-1 generate
       signal takes_right : std_logic;
     begin
-      takes_right <= valid(2*node+1) and (not valid(2*node) or is_before(rank(2*node+1), rank(2*node)));
+      takes_right <= valid(2*node+1) and (not valid(2*node) or is_before(rank(2*node), rank(2*node+1)));
 
       valid(node) <= valid(2*node) or valid(2*node+1);
       rank(node)  <= rank(2*node+1) when takes_right = '1' else rank(2*node);

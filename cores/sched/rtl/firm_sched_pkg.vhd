@@ -57,7 +57,13 @@ package firm_sched_pkg is
   -- Of all generics of a policy with deadlines but the transfer times.
   function fault_of_deadlines(requesters : integer; periods, deadlines : times_t; time_bits, shortest_run : integer)
     return string;
+  -- Of the times of a policy that weighs them against deadlines.
+  function fault_of_transfer(transfer_times : times_t; requesters, time_bits : integer) return string;
   function fault_of_groups(requesters : integer; sizes : times_t; policies : policies_t; top_policy : policy_t)
+    return string;
+  -- Of the times of all groups, if the policy of one knows them.
+  function fault_of_group_times(requesters : integer; policies : policies_t;
+                                periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
     return string;
 
 end package firm_sched_pkg;
@@ -268,6 +274,11 @@ package body firm_sched_pkg is
     return fault_of_times("DEADLINES", "deadline", deadlines, requesters, time_bits);
   end function fault_of_deadlines;
 
+  function fault_of_transfer(transfer_times : times_t; requesters, time_bits : integer) return string is
+  begin
+    return fault_of_times("TRANSFER_TIMES", "transfer time", transfer_times, requesters, time_bits);
+  end function fault_of_transfer;
+
   function fault_of_groups(requesters : integer; sizes : times_t; policies : policies_t; top_policy : policy_t)
     return string is
   begin
@@ -289,5 +300,23 @@ package body firm_sched_pkg is
     end if;
     return "";
   end function fault_of_groups;
+
+  function fault_of_group_times(requesters : integer; policies : policies_t;
+                                periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
+    return string is
+    variable any_deadlines : boolean := false;
+    variable any_transfer  : boolean := false;
+  begin
+    for place in policies'range loop
+      any_deadlines := any_deadlines or has_deadlines(policies(place));
+      any_transfer  := any_transfer or policies(place) = LST;
+    end loop;
+    if any_deadlines and fault_of_deadlines(requesters, periods, deadlines, time_bits, shortest_run) /= "" then
+      return fault_of_deadlines(requesters, periods, deadlines, time_bits, shortest_run);
+    elsif any_transfer then
+      return fault_of_transfer(transfer_times, requesters, time_bits);
+    end if;
+    return "";
+  end function fault_of_group_times;
 
 end package body firm_sched_pkg;

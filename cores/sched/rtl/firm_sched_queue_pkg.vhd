@@ -1,10 +1,17 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The order of numbers that wrap around, such as times of a counter.
+-- The order of numbers that wrap around, such as times of a counter; and how requesters stand in rows.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
+library firm;
+use firm.firm_axis_pkg.all;
 
 package firm_sched_queue_pkg is
+
+  -- Where there is much to say of each requester, it stands in rows: bits of a row's number and of a column's, of half
+  -- an index each. One row and one column are two at least, so two requesters are a row, of which another is not used.
+  function column_bits_of(requesters : integer) return positive;
+  function row_bits_of(requesters : integer) return positive;
 
   -- '1' if `left` comes before `right`, both of the same length and less than half their range apart. With an index
   -- behind it, a key has an order without ties: the keys decide, and the index where they are equal.
@@ -17,6 +24,16 @@ package firm_sched_queue_pkg is
 end package firm_sched_queue_pkg;
 
 package body firm_sched_queue_pkg is
+
+  function column_bits_of(requesters : integer) return positive is
+  begin
+    return max(1, index_bits(requesters) / 2);
+  end function column_bits_of;
+
+  function row_bits_of(requesters : integer) return positive is
+  begin
+    return max(1, index_bits(requesters) - column_bits_of(requesters));
+  end function row_bits_of;
 
   function is_before(left, right : std_logic_vector) return std_logic is
     variable difference : unsigned(left'length-1 downto 0);

@@ -29,7 +29,11 @@ entity firm_sched_sorted_queue is
     root_valid : out std_logic;
     root_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     root_key   : out std_logic_vector(KEY_BITS-1 downto 0);
-    pop        : in  std_logic;    -- takes the root; only while it is valid
+    -- The same: the root never has to be waited for.
+    first_valid : out std_logic;
+    first_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
+    first_key   : out std_logic_vector(KEY_BITS-1 downto 0);
+    pop        : in  std_logic;    -- takes that item; only while it is valid
     empty      : out std_logic);   -- nothing is in the queue; while '0', a root is there or comes
 end entity firm_sched_sorted_queue;
 
@@ -107,6 +111,9 @@ begin
   root_valid   <= valid_r(0);
   root_id      <= item_r(0)(ID_BITS-1 downto 0);
   root_key     <= item_r(0)(item_t'high downto ID_BITS);
+  first_valid   <= valid_r(0);
+  first_id      <= item_r(0)(ID_BITS-1 downto 0);
+  first_key     <= item_r(0)(item_t'high downto ID_BITS);
   empty        <= not valid_r(0);
 
 end architecture rtl;

@@ -4,14 +4,17 @@
 -- The count wraps around, so stamps must not grow too old. A sweep goes round and renews those that are older than
 -- a quarter of the range; the count moves on at most four times a step of the sweep. Those that were idle for so
 -- long keep no order among each other, but come before all that were not. The memory has one port: a completion
--- goes first, then a sweep that is due, then whoever reads.
--- After reset the sweep goes round once and writes each requester's index: the lower ones count as less recently
--- used.
+-- goes first, then a sweep that is due, then whoever reads. A step of the sweep reads a stamp in one cycle and writes
+-- it, if need be, in a later one, which keeps the path through the memory short.
+--
+-- Who has no stamp since reset counts with its index: the lower ones were used less recently. Marks tell who has, in
+-- rows as those of firm_sched_arrivals; after reset they are cleared, a row a cycle, while nobody arrives.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 library firm;
 use firm.firm_axis_pkg.all;
+use firm.firm_sched_queue_pkg.all;
 
 entity firm_sched_stamps is
   generic (
@@ -20,8 +23,6 @@ entity firm_sched_stamps is
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
-
-    initialised : out std_logic;
 
     completed    : in std_logic;
     completed_id : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
@@ -34,32 +35,52 @@ end entity firm_sched_stamps;
 
 architecture rtl of firm_sched_stamps is
 
-  constant ID_BITS : positive := index_bits(REQUESTERS);
+  constant COLUMN_BITS : positive := column_bits_of(REQUESTERS);
+  constant ROW_BITS    : positive := row_bits_of(REQUESTERS);
+  constant ID_BITS     : positive := ROW_BITS + COLUMN_BITS;  -- those of an index, or more of two requesters
+  constant COLUMNS     : positive := 2**COLUMN_BITS;
+  subtype id_t is std_logic_vector(ID_BITS-1 downto 0);
+  subtype columns_t is std_logic_vector(COLUMNS-1 downto 0);
+
   constant QUARTER : unsigned(STAMP_BITS-1 downto 0) := to_unsigned(2**(STAMP_BITS-2), STAMP_BITS);
 
   signal count_r : unsigned(STAMP_BITS-1 downto 0);
-  signal sweep_r : unsigned(ID_BITS downto 0);     -- the highest bit: it has gone round
-  signal steps_r : unsigned(1 downto 0);           -- of the count since the last one of the sweep
-  signal due_r   : std_logic;                      -- those are four
+  signal sweep_r : unsigned(ID_BITS downto 0);     -- the highest bit: all marks are cleared
+  signal swept_r : std_logic_vector(STAMP_BITS-1 downto 0);  -- the sweep's stamp, where it has been read
+  signal known_r : std_logic;
+  signal steps_r : unsigned(2 downto 0);           -- of the count since the last one of the sweep, at most four
+  signal due     : std_logic;
 
-  signal is_initial   : std_logic;
+  signal clearing     : std_logic;
   signal reads        : std_logic;
   signal sweeps       : std_logic;
-  signal age          : unsigned(STAMP_BITS-1 downto 0);
-  signal address      : std_logic_vector(ID_BITS-1 downto 0);
+  signal address      : id_t;
+  signal row          : std_logic_vector(ROW_BITS-1 downto 0);
+  signal column       : std_logic_vector(COLUMN_BITS-1 downto 0);
   signal read_word    : std_logic_vector(STAMP_BITS-1 downto 0);
   signal write_word   : std_logic_vector(STAMP_BITS-1 downto 0);
   signal write_enable : std_logic;
+  signal marks        : columns_t;
+  signal new_marks    : columns_t;
+  signal write_marks  : std_logic;
+  signal is_marked    : std_logic_vector(0 downto 0);
+  signal found_stamp  : std_logic_vector(STAMP_BITS-1 downto 0);
+  signal age          : unsigned(STAMP_BITS-1 downto 0);  -- of the sweep's stamp
+  signal is_old       : std_logic;
+  signal moves        : std_logic;  -- the sweep, to the next requester
 
 begin
 
-  is_initial <= not sweep_r(ID_BITS);
-  reads      <= read and not (completed or due_r or is_initial);
-  sweeps     <= not (completed or reads);
+  clearing <= not sweep_r(ID_BITS);
+  due      <= steps_r(2);
+  reads    <= read and not (completed or due);
+  sweeps   <= not (completed or reads);
 
-  address <= completed_id when completed = '1' else
-             read_id when reads = '1' else
+  address <= std_logic_vector(resize(unsigned(completed_id), ID_BITS)) when completed = '1' else
+             std_logic_vector(resize(unsigned(read_id), ID_BITS)) when reads = '1' else
              std_logic_vector(sweep_r(ID_BITS-1 downto 0));
+  row     <= address(ID_BITS-1 downto COLUMN_BITS);
+  column  <= address(COLUMN_BITS-1 downto 0);
 
   u_stamps : entity firm.firm_sched_ram
     generic map (
@@ -72,51 +93,83 @@ begin
       write_enable => write_enable,
       write_word   => write_word);
 
-  age <= count_r - unsigned(read_word);
+  new_marks   <= marks or decode(column, '1', COLUMNS) when clearing = '0' else (others => '0');
+  write_marks <= write_enable or clearing;
 
-  choose_write : process (completed, sweeps, is_initial, age, count_r, sweep_r)
-  begin
-    write_enable <= completed;
-    write_word   <= std_logic_vector(count_r);
-    if sweeps = '1' then
-      write_enable <= is_initial or age(STAMP_BITS-1) or age(STAMP_BITS-2);
-      write_word   <= std_logic_vector(count_r - QUARTER);
-      if is_initial = '1' then
-        write_word <= std_logic_vector(resize(sweep_r, STAMP_BITS));
-      end if;
-    end if;
-  end process choose_write;
+  u_marks : entity firm.firm_sched_ram
+    generic map (
+      ADDRESS_BITS => ROW_BITS,
+      WORD_BITS    => COLUMNS)
+    port map (
+      clk          => clk,
+      address      => row,
+      read_word    => marks,
+      write_enable => write_marks,
+      write_word   => new_marks);
 
-  count_and_sweep : process (clk)
+  u_is_marked : entity firm.firm_axis_select
+    generic map (
+      WORDS => COLUMNS,
+      WIDTH => 1)
+    port map (
+      words_in => marks,
+      index    => column,
+      word     => is_marked);
+
+  found_stamp <= read_word when is_marked(0) = '1' else std_logic_vector(resize(unsigned(address), STAMP_BITS));
+
+  age    <= count_r - unsigned(swept_r);
+  is_old <= age(STAMP_BITS-1) or age(STAMP_BITS-2);
+  moves  <= known_r and (sweeps or not is_old);
+
+  write_enable <= completed or (sweeps and known_r and is_old);
+  write_word   <= std_logic_vector(count_r) when completed = '1' else std_logic_vector(count_r - QUARTER);
+
+  count : process (clk)
+    variable steps : unsigned(2 downto 0);
   begin
     if rising_edge(clk) then
+      steps := steps_r;
+      if moves = '1' then
+        steps := (others => '0');
+      end if;
+      if completed = '1' and due = '0' then
+        steps   := steps + 1;
+        count_r <= count_r + 1;
+      end if;
+      steps_r <= steps;
       if rst_n = '0' then
         count_r <= to_unsigned(2**ID_BITS, STAMP_BITS);
-        sweep_r <= (others => '0');
         steps_r <= (others => '0');
-        due_r   <= '0';
-      else
-        if completed = '1' and due_r = '0' then
-          count_r <= count_r + 1;
-          steps_r <= steps_r + 1;
-          if steps_r = 3 then
-            due_r <= '1';
-          end if;
-        end if;
-        if sweeps = '1' then
-          sweep_r <= sweep_r + 1;
-          if is_initial = '0' then
-            sweep_r(ID_BITS) <= '1';
-          end if;
-          steps_r <= (others => '0');
-          due_r   <= '0';
-        end if;
       end if;
     end if;
-  end process count_and_sweep;
+  end process count;
 
-  initialised <= not is_initial;
-  read_ready  <= reads;
-  stamp       <= read_word;
+  sweep : process (clk)
+  begin
+    if rising_edge(clk) then
+      if clearing = '1' then
+        sweep_r <= sweep_r + COLUMNS;
+      elsif moves = '1' then
+        sweep_r          <= sweep_r + 1;
+        sweep_r(ID_BITS) <= '1';
+      end if;
+      if known_r = '0' then
+        swept_r <= found_stamp;
+      end if;
+      -- What was read is no longer so if its requester completes a task.
+      known_r <= not clearing and (sweeps or known_r) and not moves;
+      if completed = '1' and unsigned(completed_id) = sweep_r(ID_BITS-1 downto 0) then
+        known_r <= '0';
+      end if;
+      if rst_n = '0' then
+        sweep_r <= (others => '0');
+        known_r <= '0';
+      end if;
+    end if;
+  end process sweep;
+
+  read_ready <= reads;
+  stamp      <= found_stamp;
 
 end architecture rtl;

@@ -38,6 +38,9 @@ architecture simulation of firm_sched_queue_tb is
   signal root_valid   : std_logic;
   signal root_id      : std_logic_vector(ID_BITS-1 downto 0);
   signal root_key     : std_logic_vector(KEY_BITS-1 downto 0);
+  signal first_valid  : std_logic;
+  signal first_id     : std_logic_vector(ID_BITS-1 downto 0);
+  signal first_key    : std_logic_vector(KEY_BITS-1 downto 0);
   signal pop_wanted   : std_logic := '0';
   signal pop          : std_logic;
   signal empty        : std_logic;
@@ -59,6 +62,9 @@ begin
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
+        first_valid  => first_valid,
+        first_id     => first_id,
+        first_key    => first_key,
         pop          => pop,
         empty        => empty);
   end generate heap;
@@ -78,11 +84,14 @@ begin
         root_valid   => root_valid,
         root_id      => root_id,
         root_key     => root_key,
+        first_valid  => first_valid,
+        first_id     => first_id,
+        first_key    => first_key,
         pop          => pop,
         empty        => empty);
   end generate sorted_queue;
 
-  pop <= pop_wanted and root_valid;
+  pop <= pop_wanted and first_valid;
 
   drive : process
 
@@ -126,9 +135,10 @@ begin
         else
           write(trace_line, string'(" - "));
         end if;
-        write(trace_line, std_logic'image(insert_ready)(2) & " " & std_logic'image(empty)(2));
-        if root_valid = '1' then
-          write(trace_line, " " & integer'image(number_of(root_id)) & " " & integer'image(number_of(root_key)));
+        write(trace_line, std_logic'image(insert_ready)(2) & " " & std_logic'image(empty)(2) & " " &
+          std_logic'image(root_valid)(2));
+        if first_valid = '1' then
+          write(trace_line, " " & integer'image(number_of(first_id)) & " " & integer'image(number_of(first_key)));
         else
           write(trace_line, string'(" -"));
         end if;
@@ -165,8 +175,11 @@ begin
         inside(number_of(insert_id)) := true;
       end if;
       if pop = '1' then
-        inside(number_of(root_id)) := false;
+        inside(number_of(first_id)) := false;
       end if;
+      assert rst_n = '0' or root_valid = '0' or
+        (first_valid = '1' and first_id = root_id and first_key = root_key)
+        report "the root is not the first item" severity failure;
       if cycle = 3 or cycle = RESET_IN + 1 then
         rst_n  <= '1' after 1 ns;
         inside := (others => false);
@@ -177,8 +190,8 @@ begin
       elsif rst_n = '1' and (insert_valid = '0' or insert_ready = '1') then
         offer_item;
       end if;
-      if root_valid /= '1' or (base - number_of(root_key)) mod RANGE_OF < RANGE_OF/4 or
-        (base - number_of(root_key)) mod RANGE_OF > RANGE_OF/2
+      if first_valid /= '1' or (base - number_of(first_key)) mod RANGE_OF < RANGE_OF/4 or
+        (base - number_of(first_key)) mod RANGE_OF > RANGE_OF/2
       then
         draw(2, number);
         base := (base + number) mod RANGE_OF;

@@ -22,14 +22,19 @@ def index_bits(requesters: int) -> int:
     return max(1, (requesters - 1).bit_length())
 
 
+def rows_and_columns(requesters: int) -> tuple[int, int]:
+    """How many rows the requesters stand in, and columns, as the functions in firm_sched_queue_pkg."""
+    bits = index_bits(requesters)
+    column_bits = max(1, bits // 2)
+    rows: int = 2 ** max(1, bits - column_bits)
+    return rows, 2**column_bits
+
+
 class Arrivals:
     """firm_sched_arrivals: accepts tasks row by row. `valid` and `first` (B,) are the one that leaves next."""
 
     def __init__(self, batch: int, requesters: int) -> None:
-        bits = index_bits(requesters)
-        column_bits = max(1, bits // 2)
-        self._columns: int = 2**column_bits
-        self._rows: int = 2 ** max(1, bits - column_bits)
+        self._rows, self._columns = rows_and_columns(requesters)
         self._requesters = requesters
         self._members = np.arange(batch)
         # Bits of a row's columns, the lowest column lowest.
@@ -53,7 +58,7 @@ class Arrivals:
         first: Ints = np.where(self.valid, self._row * self._columns + self._lowest[self._accepted], 0)
         return first
 
-    def step(self, enable: bool, request: Bools, leaves: Bools, finished: Bools, finished_id: Ints) -> None:
+    def step(self, request: Bools, leaves: Bools, finished: Bools, finished_id: Ints) -> None:
         """A rising edge. A task of `finished_id` that is known is not any more where `finished` is true."""
         finished_row = finished_id // self._columns
         finished_bit = np.where(finished, 1 << (finished_id % self._columns), 0)
@@ -63,7 +68,7 @@ class Arrivals:
         self._known[self._members, finished_row] &= ~finished_bit
         if self._clearing:
             self._clearing -= 1
-        elif enable:
+        else:
             self._accept(request, self._accepted == 0, accepted, finished_row, finished_bit)
         self._accepted = accepted
 
@@ -88,6 +93,9 @@ class Arrivals:
 class Queue(ABC):
     """A priority queue of items that each have an index of their own. `root_*` and `ready` are as in the current cycle.
 
+    The root may be on its way; then `root_id` and `root_key` tell already what it will be, as the core's first_id and
+    first_key, and what `pop` takes.
+
     Entries are ranks, key * size + index, so that the smallest is the smallest key and of equal ones the lowest index.
     """
 
@@ -110,6 +118,11 @@ class Queue(ABC):
 
     @property
     @abstractmethod
+    def first_valid(self) -> Bools:
+        """Where an item can be popped: a root, or what becomes one in this cycle."""
+
+    @property
+    @abstractmethod
     def empty(self) -> Bools:
         """Whether nothing is inside, not even a root that is about to come."""
 
@@ -129,7 +142,7 @@ class Queue(ABC):
 
     @abstractmethod
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
-        """A rising edge. `insert` only where it is ready, `pop` only where the root is valid."""
+        """A rising edge. `insert` only where it is ready, `pop` only where `first_valid` is true."""
 
     def _insert(self, insert: Bools, index: Ints, key: Ints) -> None:
         rank = key * self._size + index
@@ -137,24 +150,31 @@ class Queue(ABC):
         self._root = np.where(insert, np.minimum(self._root, rank), self._root)
 
     def _pop(self, pop: Bools) -> None:
-        self._ranks[self._members[pop], self.root_id[pop]] = _NOBODY
-
-    def _fill(self, where: Bools) -> None:
-        self._root[where] = self._ranks[where].min(axis=1)
+        if pop.any():
+            self._ranks[self._members[pop], self.root_id[pop]] = _NOBODY
+            self._root[pop] = self._ranks[pop].min(axis=1)
 
 
 class Heap(Queue):
-    """firm_sched_heap: the root is filled anew in the cycle behind a pop."""
+    """firm_sched_heap: the root is filled anew in the cycle behind a pop, or two cycles behind two in a row."""
 
     def __init__(self, batch: int, items: int) -> None:
         super().__init__(batch, items)
         self._filling: Bools = np.zeros(batch, np.bool_)
+        # What would have filled the root was popped in the last cycle.
+        self._owing: Bools = np.zeros(batch, np.bool_)
         self._clearing: int = 2 ** (index_bits(items) - 1)
+
+    @property
+    def first_valid(self) -> Bools:
+        """See `Queue`."""
+        first_valid: Bools = self.root_valid | (self._filling & (self._root != _NOBODY))
+        return first_valid
 
     @property
     def empty(self) -> Bools:
         """See `Queue`."""
-        return ~(self.root_valid | self._filling)
+        return ~(self.root_valid | self._filling | self._owing)
 
     @property
     def clearing(self) -> bool:
@@ -168,21 +188,26 @@ class Heap(Queue):
 
     def ready(self, pop: Bools) -> Bools:
         """See `Queue`."""
-        return ~(pop | self._filling | self.clearing)
+        return ~(pop | self._filling | self._owing | self.clearing)
 
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
         """See `Queue`."""
         self._insert(insert, index, key)
-        if self._filling.any():
-            self._fill(self._filling)
         self._pop(pop)
-        self.root_valid = ~pop & (self._root != _NOBODY)
-        self._filling = pop
+        fill = (pop & ~self._filling) | self._owing
+        self._owing = pop & self._filling
+        self._filling = fill
+        self.root_valid = ~(fill | self._owing) & (self._root != _NOBODY)
         self._clearing = max(0, self._clearing - 1)
 
 
 class SortedQueue(Queue):
     """firm_sched_sorted_queue: the next root is there in the next cycle."""
+
+    @property
+    def first_valid(self) -> Bools:
+        """See `Queue`."""
+        return self.root_valid
 
     @property
     def empty(self) -> Bools:
@@ -206,19 +231,12 @@ class SortedQueue(Queue):
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
         """See `Queue`."""
         self._pop(pop)
-        if pop.any():
-            self._fill(pop)
         self._insert(insert, index, key)
         self.root_valid = self._root != _NOBODY
 
 
 class Keys(ABC):
     """Where the keys of tasks come from."""
-
-    @property
-    @abstractmethod
-    def initialised(self) -> bool:
-        """Whether tasks may be accepted."""
 
     @abstractmethod
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
@@ -253,11 +271,6 @@ class Times(Keys):
         self._members = np.arange(len(offsets))
         self._time: Ints = np.zeros(len(offsets), np.int64)
         self._eighth = None if time_bits is None else time_bits - 3
-
-    @property
-    def initialised(self) -> bool:
-        """See `Keys`."""
-        return True
 
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
         """See `Keys`."""
@@ -319,9 +332,11 @@ class Engine(Scheduler):
         advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
 
         choose = finished | ~(self._running | beat)
-        take_root = choose & root_valid
-        take_b = choose & empty & self._b_valid
-        take_a = choose & empty & ~self._b_valid & a_valid & ~(finished & a_is_own)
+        # A task that can be preempted after a beat need not wait for a root that is on its way.
+        gives_way = ~queue.first_valid if self._is_preemptive and self._rules.shortest_run == 1 else empty
+        take_root = choose & queue.first_valid
+        take_b = choose & gives_way & self._b_valid
+        take_a = choose & gives_way & ~self._b_valid & a_valid & ~(finished & a_is_own)
         get_key = a_valid & a_is_own & ~choose
         preempt = self._preempt(request, beat, finished, root_valid, root_key)
 
@@ -332,7 +347,7 @@ class Engine(Scheduler):
         next_key = self._key + (beat & advance) if self._rules.sends_own_time else self._key
 
         queue.step(insert, self._b_id, self._b_key, pop)
-        arrivals.step(keys.initialised, request, take_a | get_key | a_enters_b, finished, self.grant_select)
+        arrivals.step(request, take_a | get_key | a_enters_b, finished, self.grant_select)
         keys.step(advance, a_valid, finished, self.grant_select)
 
         b_id, b_key = self._b_id, self._b_key

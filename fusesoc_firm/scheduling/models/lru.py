@@ -6,7 +6,7 @@ import numpy as np
 
 from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
-from fusesoc_firm.scheduling.models.engine import Engine, Heap, Keys, index_bits
+from fusesoc_firm.scheduling.models.engine import Engine, Heap, Keys, index_bits, rows_and_columns
 
 _NEVER = np.iinfo(np.int64).max
 
@@ -44,14 +44,12 @@ class Stamps(Keys):
         self._members = np.arange(batch)
         self._stamps: Ints = np.tile(np.arange(self._size), (batch, 1))
         self._count: Ints = np.full(batch, self._size)
+        # The sweep's requester, its stamp, and where that has been read.
         self._sweep: Ints = np.zeros(batch, np.int64)
+        self._swept: Ints = np.zeros(batch, np.int64)
+        self._known: Bools = np.zeros(batch, np.bool_)
         self._steps: Ints = np.zeros(batch, np.int64)
-        self._initial_cycles: int = self._size
-
-    @property
-    def initialised(self) -> bool:
-        """See `Keys`."""
-        return self._initial_cycles == 0
+        self._clearing, _ = rows_and_columns(requesters)
 
     def _reads(self, wanted: Bools, finished: Bools) -> Bools:
         is_due: Bools = self._steps == self._STEPS
@@ -67,19 +65,22 @@ class Stamps(Keys):
 
     def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
         """See `Keys`."""
-        if self._initial_cycles:
-            self._initial_cycles -= 1
+        if self._clearing:
+            self._clearing -= 1
             return
         sweeps = ~(finished | self._reads(wanted, finished))
-        swept = self._stamps[self._members, self._sweep]
-        is_old = sweeps & (self._count - swept >= self._quarter)
-        place = np.where(finished, finished_id, self._sweep)
-        stamp = np.where(finished, self._count, np.where(is_old, self._count - self._quarter, swept))
-        self._stamps[self._members, place] = np.where(finished | sweeps, stamp, self._stamps[self._members, place])
+        is_old = self._known & (self._count - self._swept >= self._quarter)
+        renews = sweeps & is_old
+        moves = self._known & (sweeps | ~is_old)
+        self._swept = np.where(self._known, self._swept, self._stamps[self._members, self._sweep])
+        self._stamps[self._members[renews], self._sweep[renews]] = (self._count - self._quarter)[renews]
+        self._stamps[self._members[finished], finished_id[finished]] = self._count[finished]
+        is_lost = finished & (finished_id == self._sweep)
+        self._known = (sweeps | self._known) & ~moves & ~is_lost
         counts = finished & (self._steps < self._STEPS)
         self._count = self._count + counts
-        self._steps = np.where(sweeps, 0, self._steps + counts)
-        self._sweep = (self._sweep + sweeps) % self._size
+        self._steps = np.where(moves, 0, self._steps) + counts
+        self._sweep = (self._sweep + moves) % self._size
 
 
 def lru(batch: int, requesters: int) -> Scheduler:

@@ -1,17 +1,20 @@
-"""firm_sched_parallel: a policy with deadlines for few requesters, all of whose keys are compared in every cycle."""
+"""firm_sched_parallel: a policy with deadlines for few requesters, all of whom are compared in every cycle."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
-from fusesoc_firm.scheduling.models.engine import is_overdue
 
-_NOBODY = np.iinfo(np.int64).max
+_NOBODY = np.iinfo(np.int64).min
 
 
 class Parallel(Scheduler):
-    """`offsets` (B, N) are from a task's time to its key; see `Engine` for the rest."""
+    """The most urgent task goes first.
+
+    Urgency (B, N) is -`offsets` (B, N) when a task comes, and grows by one a cycle. It stands still while somebody has
+    reached an eighth of the range of `time_bits`.
+    """
 
     MAX_REQUESTERS = 8
 
@@ -20,12 +23,11 @@ class Parallel(Scheduler):
     ) -> None:
         super().__init__(*offsets.shape)
         self._offsets = offsets
-        self._eighth = None if time_bits is None else time_bits - 3
+        self._overdue = None if time_bits is None else 2 ** (time_bits - 3)
         self._sends_own_time = sends_own_time
         self._shortest_run = shortest_run
-        self._time: Ints = np.zeros(self.batch, np.int64)
         self._known: Bools = np.zeros(offsets.shape, np.bool_)
-        self._keys: Ints = offsets.copy()
+        self._urgency: Ints = -offsets
         self._beats: Ints = np.zeros(self.batch, np.int64)
 
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
@@ -35,20 +37,18 @@ class Parallel(Scheduler):
         eligible = self._without_granted(self._known, finished)
         beats = np.minimum(self._beats + beat, self._shortest_run)
         kept = (beats > 0) & (beats < self._shortest_run) & self._of_granted(request) & ~finished
-        # Twice the key, so that the task that has the grant fits in front of equal ones.
-        ranks = np.where(eligible, 2 * self._keys + 1, _NOBODY)
-        ranks[self._members, granted] -= eligible[self._members, granted]
-        first: Ints = ranks.argmin(axis=1)
-        is_any = eligible.any(axis=1)
-        self._grant(first, is_any & ~kept)
+        # Twice the urgency, so that the task that has the grant fits in front of equal ones.
+        ranks = np.where(eligible, 2 * self._urgency, _NOBODY)
+        ranks[self._members, granted] += eligible[self._members, granted]
+        first: Ints = ranks.argmax(axis=1)
+        self._grant(first, eligible.any(axis=1) & ~kept)
         self._beats = np.where(finished | (self.grant_select != granted), 0, beats)
 
-        advance: Bools = np.ones(self.batch, np.bool_)
-        if self._eighth is not None:
-            advance = ~(is_any & is_overdue(self._keys[self._members, first], self._time, self._eighth))
+        grows: Bools = np.ones(self._known.shape, np.bool_)
         if self._sends_own_time:
-            self._keys[self._members, granted] += beat & advance
-        self._keys = np.where(self._known, self._keys, self._time[:, np.newaxis] + self._offsets)
+            grows[self._members, granted] = ~beat
+        if self._overdue is not None:
+            grows &= ~(self._urgency >= self._overdue).any(axis=1, keepdims=True)
+        self._urgency = np.where(self._known, self._urgency + grows, -self._offsets)
         self._known = self._known | request
         self._known[self._members, granted] &= ~finished
-        self._time += advance

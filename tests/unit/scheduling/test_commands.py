@@ -38,6 +38,13 @@ def spec(tmp_path: Path) -> Path:
     return path
 
 
+def with_a_third(spec: str) -> str:
+    """With two others in turn, the fast publisher would come too late: it needs a priority."""
+    spec = spec.replace("{name: b}]", "{name: b}, {name: c}]").replace("deadline: 40", "deadline: 30")
+    third = "{name: third, middleware: ROS2, mode: publisher, message: geometry_msgs/Point, period: 1 kHz}"
+    return f"{spec}  - {{name: c, type: copy, outgoing: [{{name: third}}]}}\n  - {third}\n"
+
+
 def small_bench(*more: str) -> int:
     few = ("--requesters", "2,3", "--policies", "lru,fixed_priority", "--sets", "2", "--cycles", "500", "--jobs", "1")
     return main(["scheduler", "bench", *few, *more])
@@ -121,16 +128,18 @@ def test_longer_runs_and_what_a_resumption_costs(tmp_path: Path, capsys: Capture
 
 
 def test_choose_tells_the_policy_and_why(spec: Path, capsys: Captured) -> None:
+    spec.write_text(with_a_third(SPEC))
     assert main(["scheduler", "choose", str(spec)]) == 0
     out = capsys.readouterr().out
     assert out.startswith("scheduler: fixed_priority\n")
     # 5 bytes of header and 28 of payload in beats of 4; 100,000 cycles are 1 ms.
     assert "| slow      | 100000 |             9 |   100000 |" in out
-    assert "priorities, the highest first: fast, slow." in out
+    assert "priorities, the highest first: fast, slow, third." in out
 
 
 def test_choose_sees_that_publishers_stand_in_order(spec: Path, capsys: Captured) -> None:
-    spec.write_text(SPEC.replace("period: 1 kHz", "period: 50, deadline: 30"))
+    in_order = SPEC.replace("period: 1 kHz", "period: 100, deadline: 28").replace("deadline: 40", "deadline: 60")
+    spec.write_text(with_a_third(in_order))
     assert main(["scheduler", "choose", str(spec)]) == 0
     assert "Its priorities are the order in which the publishers stand." in capsys.readouterr().out
 

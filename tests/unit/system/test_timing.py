@@ -115,7 +115,7 @@ def test_a_scheduler_without_times_shows_none(tmp_path: Path) -> None:
 
 def test_auto_takes_the_smallest_that_holds_all_deadlines(tmp_path: Path) -> None:
     relaxed = system(tmp_path, "scheduler: auto", "period: 500", "period: 700").scheduling
-    assert relaxed.policy == "fixed_priority"
+    assert relaxed.policy == "round_robin"
     # The second one's deadline is shorter than the first one's frame, and it has the lower priority.
     urgent = system(
         tmp_path, "scheduler: auto", "message: geometry_msgs/Pose, period: 2000", "period: 100, deadline: 60"
