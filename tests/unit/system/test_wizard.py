@@ -174,8 +174,8 @@ def test_a_specification_that_is_there_is_extended(tmp_path: Path) -> None:
     [
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
-        (["robot", "", "", "", "", "", "", "", "no", "a", "b"], "answer 11: 'type' cannot be 'b'"),
-        (["robot", "", "", "", "", "", "", "", "no", "a", "", "ROS", "subscriber", ""], "answer 14: 'message' is needed"),
+        (["robot", *[""] * 7, "no", "a", "b"], "answer 11: 'type' cannot be 'b'"),
+        (["robot", *[""] * 7, "no", "a", "", "ROS", "subscriber", ""], "answer 14: 'message' is needed"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:
