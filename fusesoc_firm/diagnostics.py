@@ -116,5 +116,7 @@ def nearest(word: str, choices: Iterable[str]) -> str:
 def closest(word: str, choices: Iterable[str]) -> str | None:
     """The word that was probably meant, whichever letters are capitals; None if none is near."""
     lowered = {choice.lower(): choice for choice in sorted(set(choices))}
-    close = difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    # Two letters exchanged are nearer than a letter lost: `clocsk` is `clocks`, not `clock`.
+    close = [choice for choice in lowered if sorted(choice) == sorted(word.lower())]
+    close = close or difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
     return lowered[close[0]] if close else None

@@ -72,6 +72,11 @@ def generate(request: Request) -> GeneratedCore:
 
 def _check_simulator(system: DerivedSystem, simulator: str) -> None:
     """Fail if an accelerator is written in what the simulator does not understand, or the host's end of a link is."""
+    if simulator != GHDL and system.clocks:
+        fail(
+            f"{simulator} cannot simulate a system of several clocks",
+            hint="the clocks beside the host's are made in VHDL: --target=sim",
+        )
     if simulator != GHDL and system.link:
         fail(
             f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",

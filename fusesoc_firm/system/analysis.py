@@ -18,6 +18,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MIDDLEWARES, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.system.clocks import clocks_of
 from fusesoc_firm.system.connections import Wiring, places
 from fusesoc_firm.system.derived import (
     AcceleratorBlock,
@@ -73,6 +74,7 @@ def derive(
     analysis.check_names()
     analysis.resolve_accelerators()
     analysis.resolve_blocks()
+    clocks = clocks_of(specification, faults)
     names = message_names(analysis.blocks, analysis.inputs, analysis.outputs)
     parts = analysis.parts(analysis.wiring().connect(), names)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
@@ -96,6 +98,7 @@ def derive(
         publishers=publishers,
         accelerators=analysis.instances(is_software=False),
         connections=connections,
+        clocks=clocks,
         software=parts.software,
         names=names,
         link=link,
@@ -158,13 +161,14 @@ class _Analysis:
             if inputs is None or outputs is None or not accelerator.interface.is_sound or not accelerator.name:
                 continue
             sources = [self.folder / source for source in accelerator.sources]
-            found = AcceleratorType(accelerator, inputs, outputs, declares_width(accelerator, sources))
+            width = accelerator.width or self.specification.project.width
+            found = AcceleratorType(accelerator, inputs, outputs, width, declares_width(accelerator, sources))
             self.types.setdefault(accelerator.name, found)
             if accelerator.type == "HLS" and accelerator.sources:
                 check_kernel(found, self.faults)
             if accelerator.is_software and accelerator.sources:
                 check_function(found, sources[0], self.faults)
-            check_pins(found, self.specification.project.width, self.faults)
+            check_pins(found, self.faults)
 
     def _check_sources(self, accelerator: Accelerator) -> None:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())
@@ -300,7 +304,7 @@ class _Analysis:
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
         """The accelerators' blocks, as far as their types are known, in one part of the system."""
         found = [
-            AcceleratorBlock(str(block.name), self.types[block.type])
+            AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
             for block in self.blocks.values()
             if block.type in self.types
         ]

@@ -103,6 +103,18 @@ def on_board(specification: Specification, board: Board) -> Specification:
     return replace(specification, project=project)
 
 
+def check_fits(system: DerivedSystem, board: Board) -> None:
+    """Raise `InputError` for what a system has and a board's file cannot say."""
+    faults = Diagnostics()
+    for clock in system.clocks:
+        faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="a board has one clock, clk")
+    for block in system.accelerators:
+        for pin in block.type.accelerator.pins:
+            message = f"pin '{pin.name}' of '{block.block}' has no place on board '{board.name}'"
+            faults.error(message, pin.name.source, "write a top level of your own around the system's")
+    faults.raise_if_any()
+
+
 def board_entity(system: DerivedSystem, board: Board) -> str:
     """The top level of a system on a board."""
     return f"{system.name}_{board.name}"

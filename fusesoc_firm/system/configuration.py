@@ -20,13 +20,16 @@ from fusesoc_firm.system.instances import (
 )
 from fusesoc_firm.system.interconnect import interconnect_configuration
 from fusesoc_firm.system.maps import port_map
-from fusesoc_firm.system.names import Names, blocks
+from fusesoc_firm.system.names import RELEASED, Names, blocks, reset_label, seen_reset
 from fusesoc_firm.system.scheduler import scheduler_configuration
 from fusesoc_firm.system.sides import SidePort
 from fusesoc_firm.system.specification import DIRECTIONS
 from fusesoc_firm.system.wires import connections
 
 Configuration = dict[str, Any]
+
+# Of the simulated host's clock, in ps.
+_HOST_PERIOD = 10_000
 
 SYSTEM_TEMPLATE = "vhdl/system.vhd"
 TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
@@ -40,16 +43,18 @@ def system_configuration(system: DerivedSystem) -> Configuration:
         "name": system.name,
         **interconnect_configuration(system),
         **scheduler_configuration(system),
+        "clocks": _clocks(system),
+        "resets": _resets(system),
         "publisher_errors": [
             {"bit": bit, "block": block}
             for bit, block in enumerate(system.error_blocks)
             if bit >= len(system.subscribers)
         ],
-        "components": [component(type_, system.width) for type_ in system.accelerator_types if type_.is_component],
+        "components": [component(type_) for type_ in system.accelerator_types if type_.is_component],
         "signals": [_signals(names, *block) for block in blocks(system)],
         "subscribers": [subscriber_instance(names, converter, system) for converter in system.subscribers],
         "publishers": [publisher_instance(names, converter, system) for converter in system.publishers],
-        "accelerators": [accelerator_instance(names, block, system.width) for block in system.accelerators],
+        "accelerators": [accelerator_instance(names, block, system) for block in system.accelerators],
         "pins": pin_groups(names, system),
         "connections": connections(names, system),
     }
@@ -63,11 +68,20 @@ def test_bench_configuration(
     That is an entity with `clk`, `rst_n` and the pins, each in the other direction.
     """
     pins = pin_groups(Names(system), system)
-    formals = ["clk", "rst_n", *(str(port["formal"]) for group in pins for port in group["ports"])]
+    formals = [
+        "clk",
+        "rst_n",
+        *(clock.port for clock in system.clocks),
+        *(str(port["formal"]) for group in pins for port in group["ports"]),
+    ]
     # A link carries bytes.
     host_width = 8 if system.link else system.width
     return {
         "pins": pins,
+        "clocks": [
+            {**clock, "period": max(2, round(_HOST_PERIOD / item.ratio)), "number": number}
+            for number, (clock, item) in enumerate(zip(_clocks(system), system.clocks, strict=True), start=1)
+        ],
         "environment": {"entity": environment, "ports": port_map((name, name) for name in formals)}
         if environment
         else None,
@@ -80,6 +94,43 @@ def test_bench_configuration(
         "stall_percent": stall_percent,
         "is_preemptive": system.scheduling.is_preemptive,
         "from": "burst" if system.scheduling.is_preemptive else "from",
+    }
+
+
+def _clocks(system: DerivedSystem) -> list[Configuration]:
+    """Every further clock as a port of the top level."""
+    column = max([len("frame_error_code"), *(len(clock.port) for clock in system.clocks)])
+    return [
+        {
+            "name": clock.port.ljust(column),
+            "port": clock.port,
+            "megahertz": f"{float(clock.frequency / 10**6):g}",
+            "blocks": ", ".join(block.block for block in system.accelerators if block.clock == clock.name),
+        }
+        for clock in system.clocks
+    ]
+
+
+def _resets(system: DerivedSystem) -> Configuration | None:
+    """The resets of further clocks: each domain sees it, one after the other, and clk's; then all let go."""
+    if not system.clocks:
+        return None
+    before: list[tuple[str, str]] = []
+    instances = []
+    for clock in system.clocks:
+        instances.append(_reset(clock.port, before, seen_reset(clock)))
+        before = [("release", seen_reset(clock))]
+    instances.append(_reset("clk", before, RELEASED))
+    instances += [_reset(clock.port, [("release", RELEASED)], clock.reset) for clock in system.clocks]
+    signals = [RELEASED, *(name for clock in system.clocks for name in (seen_reset(clock), clock.reset))]
+    column = max(map(len, signals))
+    return {"signals": [{"name": name.ljust(column)} for name in signals], "instances": instances}
+
+
+def _reset(clock: str, release: list[tuple[str, str]], reset: str) -> Configuration:
+    return {
+        "label": reset_label(reset),
+        "ports": port_map([("clk", clock), ("rst_n", "rst_n"), *release, ("synced_rst_n", reset)]),
     }
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from fractions import Fraction
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -85,11 +86,12 @@ class MessageSide:
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with its messages resolved; `has_width` if its entity is to be told the streams' width."""
+    """An accelerator with its messages resolved; its streams have `width` bits, which it is told if `has_width`."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
     outputs: tuple[MessageSide, ...]
+    width: int
     has_width: bool = False
 
     @property
@@ -106,10 +108,11 @@ class AcceleratorType:
 
 @dataclass(frozen=True)
 class AcceleratorBlock:
-    """An instance of an accelerator."""
+    """An instance of an accelerator; `clock` is the name of the one it runs at, empty for that of the system."""
 
     block: str
     type: AcceleratorType
+    clock: str = ""
 
 
 @dataclass(frozen=True)
@@ -195,11 +198,30 @@ class Software:
 
 
 @dataclass(frozen=True)
-class DerivedSystem:
-    """The whole system; `name` is an identifier, `width` the streams' bits. Without a `link` its streams are ports.
+class Clock:
+    """A clock beside that of the system: its `frequency` in Hz, and `ratio` of its edges to those of clk."""
 
-    Converters, accelerators and connections are those of the hardware. `names` are what messages at accelerators are
-    called outside of these: `<block>_in`, `<block>_out1` and so on.
+    name: str
+    frequency: Fraction
+    ratio: Fraction
+
+    @property
+    def port(self) -> str:
+        """The clock at the top level."""
+        return f"clk_{self.name}"
+
+    @property
+    def reset(self) -> str:
+        """The reset of its domain, synchronous and low."""
+        return f"rst_{self.name}_n"
+
+
+@dataclass(frozen=True)
+class DerivedSystem:
+    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` those beside clk.
+
+    Without a `link` its streams are ports. Converters, accelerators and connections are those of the hardware. `names`
+    are what messages at accelerators are called outside of these: `<block>_in`, `<block>_out1` and so on.
     """
 
     name: str
@@ -213,6 +235,16 @@ class DerivedSystem:
     software: Software
     names: Mapping[End, str]
     link: Link | None = None
+    clocks: tuple[Clock, ...] = ()
+
+    def clock_of(self, block: str) -> Clock | None:
+        """The clock that a block runs at; None for that of the system."""
+        name = next((item.clock for item in self.accelerators if item.block == block), "")
+        return next((clock for clock in self.clocks if clock.name == name), None)
+
+    def width_of(self, block: str) -> int:
+        """The bits of a block's streams."""
+        return next((item.type.width for item in self.accelerators if item.block == block), self.width)
 
     @property
     def entity(self) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.system.crossings import crossings
 from fusesoc_firm.system.derived import AcceleratorBlock, Connection, DerivedSystem
 from fusesoc_firm.system.sides import side_ports
 
@@ -21,6 +22,7 @@ _ACCELERATOR = {"shape": "box", "style": "filled,rounded", "fillcolor": "#d5e8d4
 _SOFTWARE = {"shape": "box", "style": "filled,rounded", "fillcolor": "#ffe6cc"}
 _FPGA = {"name": "cluster_fpga", "graph_attr": {"label": "FPGA", "style": "dashed"}}
 _STREAM = {"penwidth": "2"}
+_CROSSING = {"style": "dashed"}
 
 
 def diagram(system: DerivedSystem, output_format: str) -> str:
@@ -35,7 +37,7 @@ def diagram(system: DerivedSystem, output_format: str) -> str:
         _draw_blocks(fpga, system)
     _draw_streams(graph, system)
     for connection in system.connections:
-        _draw_connection(graph, connection, system.width)
+        _draw_connection(graph, connection, system)
     _draw_software(graph, system)
     if output_format == "dot":
         return str(graph.source)
@@ -53,7 +55,7 @@ def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
         label = f"{converter.block}\n{converter.frame.message}\n{converter.frame.ros.title}"
         graph.node(_node(converter.block), label, **_CONVERTER)
     for block in system.accelerators:
-        graph.node(_node(block.block), _accelerator(block), **_ACCELERATOR)
+        graph.node(_node(block.block), _accelerator(block) + _differences(system, block), **_ACCELERATOR)
 
 
 def _accelerator(block: AcceleratorBlock) -> str:
@@ -89,13 +91,22 @@ def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
             graph.edge(start, end, label="\n".join([*names, str(frame.message)]))
 
 
-def _draw_connection(graph: Digraph, connection: Connection, width: int) -> None:
-    for sink, frame in zip(connection.sinks, connection.frames, strict=True):
-        ports = side_ports(frame, width, gives=True, has_valid=False)
+def _differences(system: DerivedSystem, block: AcceleratorBlock) -> str:
+    """In what a block is not as the system, a line each."""
+    clock = system.clock_of(block.block)
+    at_clock = f"\n{clock.port}: {float(clock.frequency / 10**6):g} MHz" if clock else ""
+    return at_clock + (f"\n{block.type.width} bits" if block.type.width != system.width else "")
+
+
+def _draw_connection(graph: Digraph, connection: Connection, system: DerivedSystem) -> None:
+    for sink, frame, crossing in zip(connection.sinks, connection.frames, crossings(system, connection), strict=True):
+        ports = side_ports(frame, system.width, gives=True, has_valid=False)
         streams = [port.name.removesuffix("_axis_tdata") for port in ports if port.name.endswith("_axis_tdata")]
         bits = sum(port.width or 1 for port in ports if "_axis_t" not in port.name and not _is_handshake(port.name))
         label = f"{frame.message}\n{bits} bits{_with(streams)}"
-        graph.edge(_node(connection.source.block), _node(sink.block), label=label)
+        way = "".join(f"\n{words}" for words in (crossing.clocks, crossing.widths) if words) if crossing else ""
+        style = _CROSSING if crossing else {}
+        graph.edge(_node(connection.source.block), _node(sink.block), label=f"{label}{way}", **style)
 
 
 def _is_handshake(port: str) -> bool:

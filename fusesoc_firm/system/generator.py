@@ -28,6 +28,7 @@ from fusesoc_firm.system.board import (
     board_configuration,
     board_entity,
     board_path,
+    check_fits,
     on_board,
     read_board,
 )
@@ -163,7 +164,7 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
     for type_ in system.accelerator_types:
         if type_.accelerator.type == "HLS":
-            configuration = wrapper_configuration(type_, system.width)
+            configuration = wrapper_configuration(type_)
             yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
     yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
 
@@ -184,6 +185,7 @@ def generate(request: Request) -> GeneratedCore:
 
 def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
     """The board's top level, and the constraints of its ports."""
+    check_fits(loaded.system, board)
     configuration = board_configuration(loaded.system, board)
     form, file_type = FLOWS[board.flow]
     return {

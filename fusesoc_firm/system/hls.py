@@ -128,10 +128,10 @@ def _problems(frame: Frame) -> list[str]:
     return [f"single values, not the array {port.comment}" for port in field_ports(frame) if port.field.is_array]
 
 
-def wrapper_configuration(accelerator: AcceleratorType, width: int) -> Configuration:
+def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
     """The configuration of the wrapper that gives the kernel the message sides of an accelerator."""
     inputs, outputs = arguments(accelerator)
-    ports = accelerator_ports(accelerator, width)
+    ports = accelerator_ports(accelerator)
     names = [f"{prefix}{port.name}" for prefix, port in ports]
     column = max(len(name) for name in [*names, "rst_n"])
     return {

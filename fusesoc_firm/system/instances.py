@@ -109,25 +109,33 @@ def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[s
     }
 
 
-def accelerator_instance(names: Names, block: AcceleratorBlock, width: int) -> dict[str, Any]:
+def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedSystem) -> dict[str, Any]:
     """An accelerator with its message sides and pins."""
-    formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type, width)]
+    clock = system.clock_of(block.block)
+    differences = [clock.port] if clock else []
+    differences += [f"{block.type.width} bits"] if block.type.width != system.width else []
+    formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type)]
     formals += [str(pin.name) for pin in block.type.accelerator.pins]
     return {
         **_instance(names, block.block, block.type.entity),
         "unit": f"component {block.type.entity}" if block.type.is_component else f"entity work.{block.type.entity}",
         "has_width": block.type.has_width,
-        "width": width,
+        "width": block.type.width,
+        "differences": {"words": ", ".join(differences)} if differences else None,
         "ports": port_map(
-            [("clk", "clk"), ("rst_n", "rst_n"), *((formal, names.port(block.block, formal)) for formal in formals)]
+            [
+                ("clk", clock.port if clock else "clk"),
+                ("rst_n", clock.reset if clock else "rst_n"),
+                *((formal, names.port(block.block, formal)) for formal in formals),
+            ]
         ),
     }
 
 
-def component(type_: AcceleratorType, width: int) -> dict[str, Any]:
+def component(type_: AcceleratorType) -> dict[str, Any]:
     """The declaration of an accelerator that is no entity."""
     ports: list[tuple[str, bool, int | None]] = [("clk", False, None), ("rst_n", False, None)]
-    ports += [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_, width)]
+    ports += [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_)]
     ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
     column = max(len(name) for name, *_ in ports)
     return {

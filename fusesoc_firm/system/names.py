@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.payload_length import length_entity
 from fusesoc_firm.naming import distinct_identifiers
-from fusesoc_firm.system.derived import Connection, DerivedSystem, End, LengthSource
+from fusesoc_firm.system.crossings import Crossing, all_crossings
+from fusesoc_firm.system.derived import Clock, Connection, DerivedSystem, End, LengthSource
 from fusesoc_firm.system.sides import PAYLOAD_LENGTH, Handshake, SidePort, accelerator_ports, handshakes, side_ports
 
 # Names of the top level's own, and of its test bench: no block's signal or pin may be called so.
@@ -28,6 +29,8 @@ _TAKEN = """
     std standard std_logic std_logic_vector
 """.split()
 AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
+# Low until every clock domain has been reset.
+RELEASED = "domains_rst_n"
 # Between a publisher and its buffer.
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in (*AXIS, "error", "error_code"))
 
@@ -47,6 +50,7 @@ class Names:
             if item.length and item.length.source is LengthSource.COMPUTED
         ]
         labels += [("u", block, "buffer") for block in buffered]
+        labels += [("u", *_crossing_key(item, word)) for item in all_crossings(system) for word in item.instances()]
         label_names = distinct_identifiers(labels, _TAKEN)
         self._labels = dict(zip(labels, label_names, strict=True))
 
@@ -54,12 +58,15 @@ class Names:
         entities |= {publisher_entity(item.frame, item.suffix) for item in system.publishers}
         entities |= {item.entity for item in system.accelerator_types}
         entities |= {length_entity(frame, suffix) for frame, suffix in system.computed_lengths.items()}
-        reserved = {*_TAKEN, system.entity, *entities, *label_names}
+        reserved = {*_TAKEN, system.entity, *entities, *label_names, *clock_names(system)}
         # What stands between blocks has keys of three parts, so no field of a message can have the same.
         ports = [(block, f"{prefix}{port.name}") for block, sides in found for prefix, port in sides]
-        signals = [_fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)]
+        signals: list[tuple[str, ...]] = [
+            _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
+        ]
         signals += [(block, "", word) for block in buffered for word in FRAME_SIGNALS]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
+        signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
         # Pins first: who connects them should find them under the names they ask for.
         pins = [(block.block, pin.name) for block in system.accelerators for pin in block.type.accelerator.pins]
         keys: list[tuple[str, ...]] = [*pins, *ports, *signals]
@@ -92,6 +99,14 @@ class Names:
         source = connection.source
         return self._signals[_length_key(source)] if is_found_out(connection) else self.at(source, PAYLOAD_LENGTH)
 
+    def crossing(self, crossing: Crossing, word: str) -> str:
+        """A signal of a crossing."""
+        return self._signals[_crossing_key(crossing, word)]
+
+    def crossing_label(self, crossing: Crossing, word: str) -> str:
+        """The label of an instance of a crossing."""
+        return self._labels["u", *_crossing_key(crossing, word)]
+
     def frame(self, block: str, signal: str) -> str:
         """A signal between a publisher and its buffer."""
         return self._signals[block, "", f"frame_{signal}"]
@@ -104,7 +119,7 @@ def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]
         ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
         blocks.append((converter.block, [("", port) for port in ports]))
     for block in system.accelerators:
-        blocks.append((block.block, accelerator_ports(block.type, system.width)))
+        blocks.append((block.block, accelerator_ports(block.type)))
     for converter in system.publishers:
         ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
         blocks.append((converter.block, [("", port) for port in ports]))
@@ -122,6 +137,29 @@ def forked(connection: Connection) -> Iterator[Handshake]:
 def is_found_out(connection: Connection) -> bool:
     """Whether the length of a connection's payloads does not come from its source."""
     return connection.length is not None and connection.length.source is not LengthSource.GIVEN
+
+
+def clock_names(system: DerivedSystem) -> list[str]:
+    """What the top level has for further clocks: ports, resets, and the labels of what makes these."""
+    if not system.clocks:
+        return []
+    resets = [RELEASED, *(name for clock in system.clocks for name in (clock.reset, seen_reset(clock)))]
+    return [*(clock.port for clock in system.clocks), *resets, *map(reset_label, resets)]
+
+
+def reset_label(reset: str) -> str:
+    """The label of what makes a reset."""
+    return f"u_{reset.removesuffix('_n')}"
+
+
+def seen_reset(clock: Clock) -> str:
+    """Low until a clock domain, and those before it, have been reset."""
+    return f"seen_{clock.name}_n"
+
+
+def _crossing_key(crossing: Crossing, word: str) -> tuple[str, ...]:
+    source, sink = crossing.source, crossing.sink
+    return source.block, source.prefix, "to", sink.block, sink.prefix, word
 
 
 def _length_key(end: End) -> tuple[str, str, str]:

@@ -15,15 +15,15 @@ _OWN_PORTS = ("clk", "rst_n")
 _WITHOUT_PINS = {"HLS": "ports but those of its messages", SOFTWARE: "ports"}
 
 
-def check_pins(type_: AcceleratorType, width: int, faults: Diagnostics) -> None:
-    """Note every pin that cannot be a port of its accelerator; `width` is that of the project's streams."""
+def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:
+    """Note every pin that cannot be a port of its accelerator."""
     accelerator = type_.accelerator
     if accelerator.type in _WITHOUT_PINS and accelerator.pins:
         message = f"'{accelerator.name}' is of type {accelerator.type}, which has no {_WITHOUT_PINS[accelerator.type]}"
         faults.error(message, accelerator.pins[0].source, "write this accelerator in VHDL")
         return
     taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")
-    taken |= {f"{prefix}{port.name}".lower(): "a port of a message" for prefix, port in accelerator_ports(type_, width)}
+    taken |= {f"{prefix}{port.name}".lower(): "a port of a message" for prefix, port in accelerator_ports(type_)}
     for pin in accelerator.pins:
         _check_pin(pin, taken, faults)
 

@@ -9,6 +9,7 @@ from fusesoc_firm.converter.configuration import publisher_entity, subscriber_en
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.system.configuration import top_level_pins
+from fusesoc_firm.system.crossings import all_crossings
 from fusesoc_firm.system.derived import (
     AcceleratorBlock,
     Connection,
@@ -35,6 +36,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
             "width": system.width,
             "interconnect": system.link.kind.value if system.link else AXI_STREAM,
             **_scheduling(system.scheduling),
+            **_clocks(system),
         },
         "Converters": {
             "AXIS_to_msg": [
@@ -53,13 +55,41 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
                 "entity": block.type.entity,
                 "type": str(block.type.accelerator.type),
                 "sources": [str(source) for source in block.type.accelerator.sources],
+                **_domain(system, block),
                 **_pins(block, top_level_pins(system)),
             }
             for block in system.accelerators
         ],
         "Connections": list(_connections(system.connections, system.width)),
         **_software(system),
+        **_crossings(system),
     }
+
+
+def _clocks(system: DerivedSystem) -> dict[str, Any]:
+    """The further clocks, each with its port and its frequency in Hz."""
+    clocks = [{"name": item.name, "port": item.port, "hertz": float(item.frequency)} for item in system.clocks]
+    return {"clocks": clocks} if clocks else {}
+
+
+def _domain(system: DerivedSystem, block: AcceleratorBlock) -> dict[str, Any]:
+    """In what a block is not as the system: its clock, and the width of its streams."""
+    clock = system.clock_of(block.block)
+    shown: dict[str, Any] = {"clock": clock.port} if clock else {}
+    return shown | ({"width": block.type.width} if block.type.width != system.width else {})
+
+
+def _crossings(system: DerivedSystem) -> dict[str, Any]:
+    """Where the ends of a connection differ."""
+    found = []
+    for item in all_crossings(system):
+        ends = {"from": _side(item.source), "to": _side(item.sink)}
+        found.append(ends | {name: words for name in ("clocks", "widths") if (words := getattr(item, name))})
+    return {"Crossings": found} if found else {}
+
+
+def _side(end: End) -> str:
+    return f"{end.block}/{end.prefix.rstrip('_')}".rstrip("/")
 
 
 def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict[str, Any]:

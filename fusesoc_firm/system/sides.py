@@ -59,7 +59,7 @@ def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> lis
     return ports
 
 
-def accelerator_ports(accelerator: AcceleratorType, width: int) -> list[tuple[str, SidePort]]:
+def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]]:
     """Every port of an accelerator's message sides with its prefix, in the order of the interface.
 
     The length of what it gives is one only if the accelerator is where that comes from.
@@ -67,12 +67,12 @@ def accelerator_ports(accelerator: AcceleratorType, width: int) -> list[tuple[st
     taken = [
         (side.prefix, port)
         for side in accelerator.inputs
-        for port in side_ports(side.frame, width, gives=False, has_valid=True)
+        for port in side_ports(side.frame, accelerator.width, gives=False, has_valid=True)
     ]
     given = [
         (side.prefix, port)
         for side in accelerator.outputs
-        for port in side_ports(side.frame, width, gives=True, has_valid=False)
+        for port in side_ports(side.frame, accelerator.width, gives=True, has_valid=False)
         if port.name != PAYLOAD_LENGTH or side.length is None or side.length.source is LengthSource.GIVEN
     ]
     return taken + given

@@ -69,14 +69,14 @@ def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
         paths = [folder / source for source in type_.accelerator.sources]
         # Software elsewhere has none.
         if paths and not any(path.exists() for path in paths):
-            texts[paths[0]] = skeleton(type_, system.width)
+            texts[paths[0]] = skeleton(type_)
     return texts
 
 
-def skeleton(type_: AcceleratorType, width: int) -> str:
-    """The text of an accelerator's source; streams have `width` bits."""
+def skeleton(type_: AcceleratorType) -> str:
+    """The text of an accelerator's source."""
     if language := _LANGUAGES.get(type_.accelerator.type):
-        template, configuration = language.template, _entity(type_, width, language)
+        template, configuration = language.template, _entity(type_, language)
     elif type_.accelerator.type == SOFTWARE:
         template, configuration = _SOFTWARE_TEMPLATE, python_skeleton(type_)
     else:
@@ -101,8 +101,8 @@ def _function(type_: AcceleratorType) -> Configuration:
     }
 
 
-def _entity(type_: AcceleratorType, width: int, language: _Language) -> Configuration:
-    ports = accelerator_ports(type_, width)
+def _entity(type_: AcceleratorType, language: _Language) -> Configuration:
+    ports = accelerator_ports(type_)
     of_side = {
         side.prefix: [port for prefix, port in ports if prefix == side.prefix]
         for side in (*type_.inputs, *type_.outputs)

@@ -26,8 +26,8 @@ SOURCE_SUFFIXES = {
 }
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
-# A block that is no accelerator.
-CONVERTER = "converter"
+# A block that is no accelerator, and one that is.
+CONVERTER, ACCELERATOR = "converter", "accelerator"
 # Cores of robot:sched, each with the policy it is called after.
 SCHEDULERS = (
     "fixed_priority",
@@ -52,6 +52,14 @@ _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
 
 @dataclass(frozen=True)
+class ClockDomain(Section):
+    """A clock beside that of the system."""
+
+    name: Text = key("the clock's name; its port at the top level is clk_<name>", is_required=True)
+    frequency: Text = key("its frequency, such as 150 MHz", is_required=True)
+
+
+@dataclass(frozen=True)
 class Project(Section):
     """What holds for the whole system."""
 
@@ -73,7 +81,8 @@ class Project(Section):
         choices=(AXI_STREAM, *LINKS),
         default=Text(AXI_STREAM),
     )
-    clock: Text | None = key("frequency of clk, such as 100 MHz, for times that are not in cycles")
+    clock: Text | None = key("frequency of clk, such as 100 MHz, for times that are not in cycles and for clocks")
+    clocks: tuple[ClockDomain, ...] = key("further clocks, for accelerators", form="sections", section=ClockDomain)
 
 
 @dataclass(frozen=True)
@@ -120,6 +129,7 @@ class Accelerator(Section):
         "its source files, relative to the specification", form="texts", is_required=True, unless=("type", SOFTWARE)
     )
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
+    width: int | None = key("bits of its streams; those of the project unless given", form="integer", choices=WIDTHS)
     pins: tuple[Pin, ...] = key("its ports that lead out of the system", form="sections", section=Pin)
 
     @property
@@ -143,6 +153,9 @@ class Block(Section):
 
     name: Text = key("the block's name", is_required=True)
     type: Text | None = key("the accelerator it is an instance of; empty for a converter")
+    clock: Text | None = key(
+        "which of the project's clocks an accelerator runs at; clk unless given", only_of=ACCELERATOR
+    )
     middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES), only_of=CONVERTER)
     mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
     message: Text | None = key("a converter's message", only_of=CONVERTER)

@@ -121,13 +121,14 @@ def _time_bits(times: Iterable[PublisherTimes]) -> int:
 
 def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
     """The clock's frequency in Hz; None if it is not given, or wrong, which is noted."""
-    if project.clock is None:
-        return None
-    found = _QUANTITY.fullmatch(project.clock)
+    return None if project.clock is None else frequency("clock", project.clock, faults)
+
+
+def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
+    """A frequency in Hz, or None if what stands at `key` is none, which is noted."""
+    found = _QUANTITY.fullmatch(text)
     if not found or found[2] not in _HERTZ or not Fraction(found[1]):
-        faults.error(
-            f"'clock' cannot be '{project.clock}'", project.clock.source, "a frequency, such as 100 MHz or 12.5 MHz"
-        )
+        faults.error(f"'{key}' cannot be '{text}'", text.source, "a frequency, such as 100 MHz or 12.5 MHz")
         return None
     return Fraction(found[1]) * _HERTZ[found[2]]
 

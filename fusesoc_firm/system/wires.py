@@ -10,10 +10,12 @@ from typing import Any
 
 from fusesoc_firm.converter.payload_length import length_entity, length_ports
 from fusesoc_firm.converter.ports import field_ports, vhdl_type
+from fusesoc_firm.system.crossing_wires import SourceSide, crossing_configuration, field_pairs
+from fusesoc_firm.system.crossings import Crossing, crossings, port_of
 from fusesoc_firm.system.derived import Connection, DerivedSystem, End, LengthSource, PayloadLength
 from fusesoc_firm.system.maps import port_map
 from fusesoc_firm.system.names import Names, forked, is_found_out
-from fusesoc_firm.system.sides import PAYLOAD_LENGTH, Handshake, side_ports
+from fusesoc_firm.system.sides import PAYLOAD_LENGTH, Handshake, handshakes, side_ports
 
 
 def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
@@ -21,12 +23,14 @@ def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
     waiting: dict[End, list[str]] = {}
     for connection in system.connections:
         if connection.frame.is_fixed_size:
-            for sink, (valid, _) in zip(connection.sinks, _handshakes(names, connection), strict=True):
+            for sink, (valid, _) in zip(connection.sinks, _arriving(names, system, connection), strict=True):
                 waiting.setdefault(sink, []).append(valid)
-    return [_connection(names, connection, system.width, waiting) for connection in system.connections]
+    return [_connection(names, connection, system, waiting) for connection in system.connections]
 
 
-def _connection(names: Names, connection: Connection, width: int, waiting: Mapping[End, list[str]]) -> dict[str, Any]:
+def _connection(
+    names: Names, connection: Connection, system: DerivedSystem, waiting: Mapping[End, list[str]]
+) -> dict[str, Any]:
     """The assignments of a connection; with several sinks, forks let each take the message in its own time.
 
     `waiting` are the valids of all sources of each sink; what they make together is assigned with the last one.
@@ -37,10 +41,10 @@ def _connection(names: Names, connection: Connection, width: int, waiting: Mappi
         # As long as it gets.
         pairs.append((names.length(connection), 'x"FFFFFFFF"'))
     if connection.frame.is_fixed_size:
-        pairs += _fixed_pairs(names, connection, waiting)
+        pairs += _fixed_pairs(names, system, connection, waiting)
     else:
-        for number in range(len(connection.sinks)):
-            pairs += _pairs(names, connection, number, width)
+        for number, crossing in enumerate(crossings(system, connection)):
+            pairs += _pairs(names, connection, number, system, crossing)
     column = max(len(target) for target, _ in pairs)
     return {
         "message": str(connection.frame.message),
@@ -49,16 +53,23 @@ def _connection(names: Names, connection: Connection, width: int, waiting: Mappi
         "length_note": f"; its length is {length.source.value}" if length else "",
         "length_signal": {"name": names.length(connection)} if is_found_out(connection) else None,
         "length": _length(names, connection) if _is(LengthSource.COMPUTED, length) else None,
-        "forks": [_fork(names, connection, fork) for fork in forked(connection)],
+        "forks": [_fork(names, connection, fork, system) for fork in forked(connection)],
+        "crossings": [
+            crossing_configuration(names, crossing, _source_side(names, connection, number, system))
+            for number, crossing in enumerate(crossings(system, connection))
+            if crossing
+        ],
         "assignments": [{"target": target.ljust(column), "source": value} for target, value in pairs],
     }
 
 
-def _fixed_pairs(names: Names, connection: Connection, waiting: Mapping[End, list[str]]) -> Iterator[tuple[str, str]]:
+def _fixed_pairs(
+    names: Names, system: DerivedSystem, connection: Connection, waiting: Mapping[End, list[str]]
+) -> Iterator[tuple[str, str]]:
     """The assignments of a message of fixed size."""
     source = connection.source
-    handshakes = _handshakes(names, connection)
-    for sink, frame, (valid, ready) in zip(connection.sinks, connection.frames, handshakes, strict=True):
+    arriving = _arriving(names, system, connection)
+    for sink, frame, (valid, ready) in zip(connection.sinks, connection.frames, arriving, strict=True):
         yield from ((names.at(sink, port.name), names.at(source, port.name)) for port in field_ports(frame))
         sink_valid, sink_ready = f"{names.at(sink, 'segment_valid')}(0)", names.at(sink, "msg_ready")
         if valid == waiting[sink][-1]:
@@ -69,8 +80,16 @@ def _fixed_pairs(names: Names, connection: Connection, waiting: Mapping[End, lis
         yield ready, sink_ready if len(waiting[sink]) == 1 else f"{sink_ready} and {sink_valid}"
 
 
-def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
+def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> list[tuple[str, str]]:
     """Where each sink of a message of fixed size has its valid from, and its ready goes to."""
+    return [
+        (names.crossing(crossing, "valid"), names.crossing(crossing, "ready")) if crossing else handshake
+        for crossing, handshake in zip(crossings(system, connection), _handshakes(names, connection), strict=True)
+    ]
+
+
+def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
+    """What the source of a message of fixed size shows each sink as valid, and takes as ready."""
     source = connection.source
     for fork in forked(connection):
         valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
@@ -78,24 +97,44 @@ def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
     return [(f"{names.at(source, 'segment_valid')}(0)", names.at(source, "msg_ready"))]
 
 
-def _pairs(names: Names, connection: Connection, number: int, width: int) -> list[tuple[str, str]]:
-    """The same of one of variable size between the source and a sink; a handshake that is forked goes by its fork."""
-    source, sink = connection.source, connection.sinks[number]
-    behind_fork: dict[str, str] = {}
-    for fork in forked(connection):
-        low, high = fork.segments * number, fork.segments * (number + 1) - 1
-        behind_fork[fork.valid] = f"{names.forked(source, fork, 'valid')}({number})"
-        behind_fork[fork.ready] = f"{names.forked(source, fork, 'ready')}({number})"
-        if fork.segment_valid is not None:
-            behind_fork[fork.segment_valid] = f"{names.forked(source, fork, 'segment_valid')}({high} downto {low})"
+def _pairs(
+    names: Names, connection: Connection, number: int, system: DerivedSystem, crossing: Crossing | None
+) -> list[tuple[str, str]]:
+    """The same of one of variable size between the source and a sink, as far as no instance stands there."""
+    sink, source = connection.sinks[number], _source_side(names, connection, number, system)
+    if crossing and crossing.is_clocked:
+        return list(field_pairs(names, crossing, source))
     pairs = []
-    for port in side_ports(connection.frames[number], width, gives=True, has_valid=True):
-        at_source = behind_fork.get(port.name) or (
-            names.length(connection) if port.name == PAYLOAD_LENGTH else names.at(source, port.name)
-        )
-        at_sink = names.at(sink, port.name)
+    for port in side_ports(connection.frames[number], system.width, gives=True, has_valid=True):
+        if crossing and port.name.rpartition("_")[0].endswith("_axis"):
+            continue
+        at_source, at_sink = source.ports[port.name], names.at(sink, port.name)
         pairs.append((at_sink, at_source) if port.is_output else (at_source, at_sink))
     return pairs
+
+
+def _source_side(names: Names, connection: Connection, number: int, system: DerivedSystem) -> SourceSide:
+    """What the source shows a sink; a handshake that is forked goes by its fork."""
+    source = connection.source
+    if connection.frame.is_fixed_size:
+        valid, ready = _handshakes(names, connection)[number]
+        return SourceSide({"segment_valid": valid, "msg_ready": ready}, {})
+    ports = {
+        port.name: names.length(connection) if port.name == PAYLOAD_LENGTH else names.at(source, port.name)
+        for port in side_ports(connection.frames[number], system.width, gives=True, has_valid=True)
+    }
+    begun = {
+        item.part: f"{ports[item.segment_valid]}(0)" for item in handshakes(connection.frame) if item.segment_valid
+    }
+    for fork in forked(connection):
+        low, high = fork.segments * number, fork.segments * (number + 1) - 1
+        ports[fork.valid] = f"{names.forked(source, fork, 'valid')}({number})"
+        ports[fork.ready] = f"{names.forked(source, fork, 'ready')}({number})"
+        if fork.segment_valid is not None:
+            segment_valid = names.forked(source, fork, "segment_valid")
+            ports[fork.segment_valid] = f"{segment_valid}({high} downto {low})"
+            begun[fork.part] = f"{segment_valid}({low})"
+    return SourceSide(ports, begun)
 
 
 def _length(names: Names, connection: Connection) -> dict[str, Any]:
@@ -109,15 +148,16 @@ def _length(names: Names, connection: Connection) -> dict[str, Any]:
     }
 
 
-def _fork(names: Names, connection: Connection, fork: Handshake) -> dict[str, Any]:
+def _fork(names: Names, connection: Connection, fork: Handshake, system: DerivedSystem) -> dict[str, Any]:
     source, count = connection.source, len(connection.sinks)
+    clock = system.clock_of(source.block)
     valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
     source_valid = names.at(source, fork.valid)
     signals = [(valid, count), (ready, count)]
     generics = [("SINKS", str(count))]
     ports = [
-        ("clk", "clk"),
-        ("rst_n", "rst_n"),
+        ("clk", port_of(clock)),
+        ("rst_n", clock.reset if clock else "rst_n"),
         ("source_valid", f"{source_valid}(0)" if connection.frame.is_fixed_size else source_valid),
         ("source_ready", names.at(source, fork.ready)),
         ("sink_valid", valid),

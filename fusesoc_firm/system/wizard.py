@@ -16,6 +16,7 @@ from ruamel.yaml.comments import CommentedMap
 
 from fusesoc_firm.prompts import Asker, Question
 from fusesoc_firm.system.specification import (
+    ACCELERATOR,
     CONVERTER,
     PUBLISHER,
     Accelerator,
@@ -143,6 +144,9 @@ class _Wizard:
             return self.message_names()
         if section is Block and name == "type":
             return self._names("accelerators")
+        if section is Block and name == "clock":
+            project = self.content.get("project") or {}
+            return [str(clock["name"]) for clock in project.get("clocks") or []]
         if section is Outgoing and name == "name":
             return self._names("blocks")
         return ()
@@ -175,7 +179,7 @@ class _Draft:
             return True
         if entry.only_of == PUBLISHER:
             return bool(self.made.get("mode") == PUBLISHER)
-        return "type" not in self.made
+        return ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, entry: Key) -> bool:
         """Whether a key must be there: a converter has all of one word that the grammar leaves open to a block."""

@@ -12,7 +12,15 @@ from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.sim.schedulers import POLICY_CORES
 
 DATA = Path(__file__).parent / "data"
-RUNTIME = ("axis/axis", "sched/package", *(f"sched/{core}" for core in POLICY_CORES), "manager/manager", "board/link")
+RUNTIME = (
+    "axis/axis",
+    "sim/sync",
+    "cdc/cdc",
+    "sched/package",
+    *(f"sched/{core}" for core in POLICY_CORES),
+    "manager/manager",
+    "board/link",
+)
 SIMULATION = ("sim/host", "sim/link")
 
 

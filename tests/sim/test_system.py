@@ -383,7 +383,8 @@ def cores_in_order() -> Iterator[tuple[str, dict[str, dict[str, list[str]]]]]:
         core = yaml.safe_load(path.read_text(encoding="utf-8"))
         name = core["name"].rpartition(":")[0]
         paths[name], filesets[name] = path.relative_to(CORES).with_suffix("").as_posix(), core["filesets"]
-    graph = {name: found["rtl"].get("depend", []) for name, found in filesets.items()}
+    # Also those that it depends on for some targets only.
+    graph = {name: re.findall(r"robot:\w+:\w+", str(found["rtl"].get("depend"))) for name, found in filesets.items()}
     for name in TopologicalSorter(graph).static_order():
         yield paths[name], filesets[name]
 

@@ -17,6 +17,7 @@ from fusesoc_firm.system.board import (
     Board,
     board_configuration,
     boards,
+    check_fits,
     on_board,
     read_board,
 )
@@ -29,6 +30,21 @@ project: {{name: robot, clock: 100 MHz, scheduler: {scheduler}}}
 blocks:
   - {{name: in, middleware: ROS, mode: subscriber, message: geometry_msgs/Point, outgoing: [{{name: out}}]}}
   - {{name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point, period: 1 ms}}
+"""
+WITH_PINS = """\
+project: {name: robot, clock: 100 MHz, clocks: [{name: fast, frequency: 200 MHz}]}
+accelerators:
+  - name: copy
+    type: VHDL
+    sources: copy.vhd
+    interface:
+      input: [{middleware: ROS, message: geometry_msgs/Point}]
+      output: [{middleware: ROS, message: geometry_msgs/Point}]
+    pins: [{name: lamp, direction: out}]
+blocks:
+  - {name: in, middleware: ROS, mode: subscriber, message: geometry_msgs/Point, outgoing: [{name: block}]}
+  - {name: block, type: copy, clock: fast, outgoing: [{name: out}]}
+  - {name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point}
 """
 BOARD = """
 description: A board
@@ -127,6 +143,19 @@ def test_an_unknown_board_names_the_nearest(tmp_path: Path) -> None:
 def test_a_preemptive_scheduler_does_not_fit_on_a_link(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot carry the bursts of scheduler 'lst'"):
         on(tmp_path, written(tmp_path, BOARD), "lst")
+
+
+def test_pins_and_further_clocks_have_no_place_on_a_board(tmp_path: Path) -> None:
+    (tmp_path / "copy.vhd").write_text("entity copy is end;", encoding="ascii")
+    (tmp_path / "spec.yaml").write_text(WITH_PINS, encoding="utf-8")
+    board = written(tmp_path, BOARD)
+    faults = Diagnostics()
+    specification = read_specification(tmp_path / "spec.yaml", "spec.yaml", faults)
+    system = derive(on_board(specification, board), tmp_path, LIBRARIES, faults)
+    with pytest.raises(InputError) as raised:
+        check_fits(system, board)
+    assert "board 'board' has no clock 'fast'" in str(raised.value)
+    assert "spec.yaml:9:16: error: pin 'lamp' of 'block' has no place on board 'board'" in str(raised.value)
 
 
 def test_a_clock_that_is_none(tmp_path: Path) -> None:

@@ -24,6 +24,12 @@ class Answers:
         self._answers = {name.replace("_", " "): [*given] for name, given in answers.items()}
         self.asked: list[Question] = []
 
+    def add(self, **answers: list[str]) -> None:
+        """Further answers; those of a question that is there begin with its first one."""
+        for name, given in answers.items():
+            before = self._answers.get(name.replace("_", " "), [])
+            self._answers[name.replace("_", " ")] = given + before[1:]
+
     def ask(self, question: Question) -> str:
         self.asked.append(question)
         given = self._answers.get(question.name.replace("'", ""), [])
@@ -117,6 +123,19 @@ def test_what_a_block_is_decides_what_is_asked(tmp_path: Path) -> None:
     # Of the three blocks two are converters, and one of these is a publisher; two accelerators' messages ask, too.
     assert (asked.count("mode"), asked.count("period"), asked.count("buffer")) == (2, 1, 1)
     assert asked.count("middleware") == 4
+    # The project has a clock, and an accelerator may have one.
+    assert asked.count("clock") == 2
+
+
+def test_a_block_may_have_a_clock_of_the_project(tmp_path: Path) -> None:
+    answers = turner()
+    answers.add(
+        name=["turn", "camera"], add_to_clocks=["yes", "no"], frequency=["150 MHz"], clock=["100 MHz", "camera"]
+    )
+    system = derived(tmp_path, run(tmp_path / "robot.yaml", answers))
+    assert [clock.port for clock in system.clocks] == ["clk_camera"]
+    assert system.accelerators[0].clock == "camera"
+    assert [question.words for question in answers.asked if question.name == "clock"][1] == ["camera"]
 
 
 def test_answers_are_completed(tmp_path: Path) -> None:
@@ -155,8 +174,8 @@ def test_a_specification_that_is_there_is_extended(tmp_path: Path) -> None:
     [
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
-        (["robot", "", "", "", "", "", "", "no", "a", "b"], "answer 10: 'type' cannot be 'b'"),
-        (["robot", "", "", "", "", "", "", "no", "a", "", "ROS", "subscriber", ""], "answer 13: 'message' is needed"),
+        (["robot", *[""] * 7, "no", "a", "b"], "answer 11: 'type' cannot be 'b'"),
+        (["robot", *[""] * 7, "no", "a", "", "ROS", "subscriber", ""], "answer 14: 'message' is needed"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:
@@ -168,6 +187,6 @@ def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], messa
 
 def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
-    answers = ["robot", *[""] * 6, "no", "a", "", "ROS", "subscriber", POINT, "", "", "no", "yes", "a"]
-    with pytest.raises(InputError, match="answer 18: there is 'a' already"):
+    answers = ["robot", *[""] * 7, "no", "a", "", "ROS", "subscriber", POINT, "", "", "no", "yes", "a"]
+    with pytest.raises(InputError, match="answer 19: there is 'a' already"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)

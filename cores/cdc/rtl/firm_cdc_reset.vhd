@@ -1,0 +1,43 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- A reset for another clock domain: it begins with `rst_n` at once, whatever the clock does, and ends with a rising edge,
+-- three or more of them after both `rst_n` and `release` are high. So a reset is never too short to be seen, and when it
+-- ends, what came through synchronisers before it is gone from them.
+--
+-- Constraint: the paths to the registers' clear and into the first register are asynchronous (docs/clocks.md).
+library ieee;
+use ieee.std_logic_1164.all;
+
+entity firm_cdc_reset is
+  port (
+    clk   : in std_logic;
+    -- From a register, as it clears asynchronously.
+    rst_n : in std_logic;
+    -- Of any domain; it is low while `rst_n` is, and for as long as the reset has to last.
+    release : in std_logic := '1';
+
+    synced_rst_n : out std_logic);
+end entity firm_cdc_reset;
+
+architecture rtl of firm_cdc_reset is
+
+  signal stages_r : std_logic_vector(2 downto 0);
+
+  attribute async_reg : string;
+  attribute preserve  : boolean;
+  attribute async_reg of stages_r : signal is "true";
+  attribute preserve of stages_r  : signal is true;
+
+begin
+
+  pass_on : process (clk, rst_n)
+  begin
+    if rst_n = '0' then
+      stages_r <= (others => '0');
+    elsif rising_edge(clk) then
+      stages_r <= stages_r(1 downto 0) & release;
+    end if;
+  end process pass_on;
+
+  synced_rst_n <= stages_r(2);
+
+end architecture rtl;

@@ -1,0 +1,53 @@
+-- SPDX-License-Identifier: Apache-2.0
+-- Brings levels into another clock domain: each bit passes a row of registers, in which it has time to settle. Every bit
+-- must come from a register of its own domain, with no logic behind it, and no two bits arrive together for certain.
+--
+-- Constraint: the path into the first register is asynchronous (docs/clocks.md).
+library ieee;
+use ieee.std_logic_1164.all;
+
+entity firm_cdc_sync is
+  generic (
+    BITS : integer := 1;
+    -- Registers in a row, 2 or more.
+    STAGES : integer := 2);
+  port (
+    clk    : in  std_logic;
+    level  : in  std_logic_vector(BITS-1 downto 0);
+    synced : out std_logic_vector(BITS-1 downto 0));
+end entity firm_cdc_sync;
+
+architecture rtl of firm_cdc_sync is
+
+  -- The first stage lies lowest. All are to be placed side by side, and never to become a shift register in RAM.
+  signal stages_r : std_logic_vector(STAGES*BITS-1 downto 0);
+
+  attribute async_reg     : string;
+  attribute shreg_extract : string;
+  attribute preserve      : boolean;
+  attribute altera_attribute : string;
+  attribute async_reg of stages_r     : signal is "true";
+  attribute shreg_extract of stages_r : signal is "no";
+  attribute preserve of stages_r      : signal is true;
+  attribute altera_attribute of stages_r : signal is
+    "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS";
+
+begin
+
+  assert BITS >= 1
+    report "firm_cdc_sync: BITS is " & integer'image(BITS) & "; legal: 1 and more"
+    severity failure;
+  assert STAGES >= 2
+    report "firm_cdc_sync: STAGES is " & integer'image(STAGES) & "; legal: 2 and more"
+    severity failure;
+
+  pass_on : process (clk)
+  begin
+    if rising_edge(clk) then
+      stages_r <= stages_r((STAGES-1)*BITS-1 downto 0) & level;
+    end if;
+  end process pass_on;
+
+  synced <= stages_r(STAGES*BITS-1 downto (STAGES-1)*BITS);
+
+end architecture rtl;
