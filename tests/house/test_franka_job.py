@@ -20,6 +20,14 @@ string[] errors
 """
 
 
+def write_definition(folder: Path) -> Path:
+    """A franka_msgs/FrankaState of our own, which has the fields that are taken; the folder for ROS_PACKAGE_PATH."""
+    package = folder / "ros" / "franka_msgs" / "msg"
+    package.mkdir(parents=True)
+    (package / "FrankaState.msg").write_text(_STATE, encoding="utf-8")
+    return folder / "ros"
+
+
 def passes(definitions: Path, build_root: Path) -> bool:
     done = run(CORE, build_root, environment={"ROS_PACKAGE_PATH": str(definitions)})
     print(done.stdout)
@@ -27,11 +35,7 @@ def passes(definitions: Path, build_root: Path) -> bool:
 
 
 def test_it_passes_with_a_definition_of_a_sourced_ros(tmp_path: Path) -> None:
-    """One of our own, which has the fields that are taken."""
-    folder = tmp_path / "ros" / "franka_msgs" / "msg"
-    folder.mkdir(parents=True)
-    (folder / "FrankaState.msg").write_text(_STATE, encoding="utf-8")
-    assert passes(tmp_path / "ros", tmp_path / "build")
+    assert passes(write_definition(tmp_path), tmp_path / "build")
 
 
 def test_it_passes_with_the_definition_of_franka_ros(tmp_path: Path) -> None:

@@ -155,7 +155,7 @@ def test_pins_and_further_clocks_have_no_place_on_a_board(tmp_path: Path) -> Non
     with pytest.raises(InputError) as raised:
         check_fits(system, board)
     assert "board 'board' has no clock 'fast'" in str(raised.value)
-    assert "spec.yaml:9:16: error: pin 'lamp' of 'block' has no place on board 'board'" in str(raised.value)
+    assert "spec.yaml:9:19: error: pin 'lamp' of 'block' has no place on board 'board'" in str(raised.value)
 
 
 def test_a_clock_that_is_none(tmp_path: Path) -> None:

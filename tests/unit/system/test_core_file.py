@@ -10,11 +10,15 @@ import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.system.board import boards
 from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
+from tests.house.test_franka_job import write_definition
 from tests.unit.system.systems import accelerator, converter, derived, instance, specification
 
 SPECS = Path(__file__).resolve().parents[3] / "specs"
 CORES = sorted(SPECS.glob("*/*.core"))
+SYNTHESIS = {*(f"synth_{family}" for family in ("xilinx", "ecp5", "ice40", "gowin")), *boards()}
+SIMULATION = {"sim", "sim_icarus", "sim_verilator"}
 
 
 def blocks() -> str:
@@ -45,7 +49,10 @@ def test_there_are_cores() -> None:
 
 
 @pytest.mark.parametrize("core", CORES, ids=lambda path: path.stem)
-def test_a_checked_in_core_is_what_the_command_writes(core: Path, tmp_path: Path) -> None:
+def test_a_checked_in_core_is_what_the_command_writes(
+    core: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(write_definition(tmp_path)))
     text = core.read_text(encoding="utf-8")
     made = tmp_path / core.name
     # Of the targets, nothing is taken over.
@@ -86,7 +93,7 @@ def test_a_new_core_without_options_is_whole(tmp_path: Path) -> None:
     found = content(new_core(system(tmp_path), "robot.yaml", CoreOptions()))
     assert found["name"] == "robot:sys:robot:0.1.0"
     assert found["generate"]["simulation"]["parameters"]["stimuli"] == "stimuli.yaml"
-    assert set(found["targets"]) == {"default", "sim", "sim_icarus", "sim_verilator", "lint"}
+    assert set(found["targets"]) == {"default", "lint", *SIMULATION, *SYNTHESIS}
     assert all("description" in target for name, target in found["targets"].items() if name != "default")
     assert found["targets"]["sim"]["flow_options"]["tool"] == "ghdl"
 
@@ -117,7 +124,7 @@ def test_what_is_the_authors_own_stays(tmp_path: Path) -> None:
     assert "description: Mine  # and this" in updated
     assert "tool: modelsim" not in updated
     assert updated.endswith(f"\n\n{target}{parameters}")
-    assert set(content(updated)["targets"]) == {"default", "sim", "sim_icarus", "sim_verilator", "lint", "desk"}
+    assert set(content(updated)["targets"]) == {"default", "lint", "desk", *SIMULATION, *SYNTHESIS}
     assert updated_core(system(tmp_path), path) == updated
 
 
@@ -126,7 +133,7 @@ def test_without_a_simulation_there_is_no_target_for_it(tmp_path: Path) -> None:
     text = new_core(system(tmp_path), "robot.yaml", CoreOptions())
     path.write_text(text[: text.index("  simulation:")] + text[text.index("\ntargets:") :])
     path.write_text(path.read_text()[: path.read_text().index("\ntargets:")])
-    assert set(content(updated_core(system(tmp_path), path))["targets"]) == {"default", "lint"}
+    assert set(content(updated_core(system(tmp_path), path))["targets"]) == {"default", "lint", *SYNTHESIS}
 
 
 @pytest.mark.parametrize(
