@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.frame.length import length_of
@@ -24,6 +25,10 @@ from fusesoc_firm.system.derived import (
 from fusesoc_firm.system.python_function import function_name
 from fusesoc_firm.system.sides import side_ports
 from fusesoc_firm.system.specification import AXI_STREAM
+from fusesoc_firm.system.timing import bounds_of
+
+if TYPE_CHECKING:
+    from fusesoc_firm.scheduling.analysis import Bound
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
@@ -46,7 +51,8 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
                 _converter(item, publisher_entity(item.frame, item.suffix))
                 | _length(item, system.length_to(item))
                 | _times(times)
-                for item, times in zip(system.publishers, system.scheduling.times, strict=True)
+                | _bound(bound)
+                for item, times, bound in zip_longest(system.publishers, system.scheduling.times, bounds_of(system))
             ],
         },
         "Accelerators": [
@@ -188,6 +194,19 @@ def _times(times: PublisherTimes) -> dict[str, int]:
     """A publisher's times in cycles, as far as they are known."""
     found = {"periodCycles": times.period, "wcetCycles": times.transfer_time, "deadlineCycles": times.deadline}
     return {name: cycles for name, cycles in found.items() if cycles is not None}
+
+
+def _bound(bound: Bound | None) -> dict[str, int | str]:
+    """What is certain of a publisher's frames, and what its accelerator may have to keep while one is late."""
+    if bound is None:
+        return {}
+    if bound.response is None or bound.lateness is None or bound.buffer is None:
+        return {"worstLatenessCycles": "no bound: it may never be served"}
+    return {
+        "worstResponseCycles": bound.response,
+        "worstLatenessCycles": bound.lateness,
+        "latenessBufferBytes": bound.buffer,
+    }
 
 
 def _connections(connections: Iterable[Connection], width: int) -> Iterator[dict[str, str]]:

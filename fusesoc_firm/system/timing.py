@@ -22,7 +22,7 @@ from fusesoc_firm.system.specification import AUTO_SCHEDULER, SCHEDULERS, Block,
 from fusesoc_firm.yaml_text import Text
 
 if TYPE_CHECKING:
-    from fusesoc_firm.scheduling.analysis import Channel
+    from fusesoc_firm.scheduling.analysis import Bound, Channel
 
 # Policies that may interrupt a frame, that compare deadlines, and that compare what is left of them.
 PREEMPTIVE = ("fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
@@ -81,6 +81,19 @@ def channel_of(system: DerivedSystem) -> Channel:
     from fusesoc_firm.scheduling.analysis import Channel
 
     return Channel(system.width // 8, system.scheduling.shortest_run)
+
+
+def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
+    """What is certain of each publisher under the system's scheduler, in the order of their ids.
+
+    Nothing, unless all their times are known.
+    """
+    tasks = _tasks(system.publishers, system.scheduling.times)
+    if len(tasks) < len(system.publishers):
+        return ()
+    from fusesoc_firm.scheduling.analysis import analyse
+
+    return analyse(system.scheduling.policy, tasks, channel_of(system), is_ordered=True).bounds
 
 
 def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> tuple[Task, ...]:

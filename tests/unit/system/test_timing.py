@@ -10,7 +10,7 @@ from fusesoc_firm.system.configuration import system_configuration
 from fusesoc_firm.system.derived import DerivedSystem, PublisherTimes, Scheduling
 from fusesoc_firm.system.show import derived_description
 from fusesoc_firm.system.specification import SCHEDULERS
-from fusesoc_firm.system.timing import frame_beats
+from fusesoc_firm.system.timing import bounds_of, frame_beats
 from tests.unit.system.systems import converter, derived, specification
 
 PREEMPTIVE = {"fixed_priority_preemptive", "edf_resources", "edf_latency", "lst"}
@@ -127,3 +127,33 @@ def test_auto_takes_the_smallest_that_holds_all_deadlines(tmp_path: Path) -> Non
         tmp_path, "scheduler: auto", "period: 100, deadline: 60", "message: geometry_msgs/Pose, period: 2000"
     )
     assert first.scheduling.policy == "fixed_priority_preemptive"
+
+
+def test_what_is_certain_of_each_publisher_is_shown(tmp_path: Path) -> None:
+    """Points of 29 beats: the second waits for the first, the first for a frame of the second that has begun."""
+    publishers = ("period: 100, deadline: 60", "period: 100, deadline: 50")
+    found = derived_description(system(tmp_path, "scheduler: fixed_priority", *publishers))
+    first, second = found["Converters"]["msg_to_AXIS"]
+    bounds = bounds_of(system(tmp_path, "scheduler: fixed_priority", *publishers))
+    assert [bound.task.name for bound in bounds] == ["p0", "p1"]
+    for shown, bound in zip((first, second), bounds, strict=True):
+        assert shown["worstResponseCycles"] == bound.response
+        assert shown["worstLatenessCycles"] == bound.lateness
+        assert shown["latenessBufferBytes"] == bound.buffer
+    assert 58 <= first["worstResponseCycles"] <= 60
+    # It is late by what the first one takes, and a byte may come in each cycle of that.
+    assert second["latenessBufferBytes"] == second["worstLatenessCycles"] > 0
+
+
+def test_who_may_starve_has_no_bound(tmp_path: Path) -> None:
+    publishers = ("period: 29", "period: 1000")
+    _, second = derived_description(system(tmp_path, "scheduler: fixed_priority", *publishers))["Converters"][
+        "msg_to_AXIS"
+    ]
+    assert second["worstLatenessCycles"] == "no bound: it may never be served"
+
+
+def test_without_all_times_nothing_is_certain(tmp_path: Path) -> None:
+    found = system(tmp_path, "scheduler: fixed_priority", "period: 500", "deadline: 80")
+    assert bounds_of(found) == ()
+    assert "worstLatenessCycles" not in derived_description(found)["Converters"]["msg_to_AXIS"][0]
