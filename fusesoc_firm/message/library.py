@@ -10,6 +10,7 @@ import difflib
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail, nearest
@@ -60,8 +61,7 @@ class MessageLibrary:
         _check_folders(path for path in paths if not any(found[path].values()))
         self._sources: dict[MessageName, _Source] = {}
         self._interfaces: dict[Interface, Path] = {}
-        messages = {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
-        self._has_events = ros is RosVersion.ROS2 and EVENT_INFO in messages | self._store.names
+        self._messages = {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
         for folder in reversed(self._folders):
             self._add(found[folder])
         # A definition or None, with the faults of its text: a faulty file is reported on every request.
@@ -131,6 +131,11 @@ class MessageLibrary:
         """The files that these messages are read from, in the order of names; messages of a distribution have none."""
         paths = [self._sources[name].paths[0] for name in sorted(set(names)) if name in self._sources]
         return list(dict.fromkeys(paths))  # the messages of a service share its file
+
+    @cached_property
+    def _has_events(self) -> bool:
+        # Only if a service asks: whoever speaks the other ROS does without the time that a distribution takes to load.
+        return self.ros is RosVersion.ROS2 and (EVENT_INFO in self._messages or EVENT_INFO in self._store.names)
 
     def _is_message(self, name: MessageName) -> bool:
         return name in self._sources or name in self._store.names
