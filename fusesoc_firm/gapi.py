@@ -19,10 +19,11 @@ import yaml
 from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
 from fusesoc_firm.netlist.programs import explanation, missing_programs
+from fusesoc_firm.own_code import digests, used_code
 from fusesoc_firm.parameters import Parameter, check_parameters
 from fusesoc_firm.render import write_if_changed
 from fusesoc_firm.requesting_core import find_requesting_core
-from fusesoc_firm.store import Store, default_root, store_key
+from fusesoc_firm.store import Entry, Files, Key, Made, default_store, request_digest
 
 # The largest that `math_real.uniform` takes, which draws the stalls.
 _LARGEST_SEED = 2147483562
@@ -33,13 +34,15 @@ class Generator:
     """A generator: its parameters, the files whose content it depends on, what it makes of them, and what that needs.
 
     `inputs` is cheap, since it is asked on every run; a path in it need not exist. `generate` raises `InputError` for
-    what its user did wrong. `missing_programs` are those without which what was made cannot be run.
+    what its user did wrong. `missing_programs` are those without which what was made cannot be run. `tools` are the
+    versions of programs that make part of it.
     """
 
     parameters: tuple[Parameter, ...]
     inputs: Callable[[Request], list[Path]]
     generate: Callable[[Request], GeneratedCore]
     missing_programs: Callable[[Request], list[str]] = lambda _: []
+    tools: Callable[[Request], Mapping[str, str]] = lambda _: {}
 
 
 def _converter_inputs(request: Request) -> list[Path]:
@@ -70,6 +73,14 @@ def _generate_system(request: Request) -> GeneratedCore:
 
 def _simulator_programs(request: Request) -> list[str]:
     return missing_programs(str(request.parameters["simulator"])) if _is_simulation(request) else []
+
+
+def _compiler(request: Request) -> Mapping[str, str]:
+    if not _is_simulation(request):
+        return {}
+    from fusesoc_firm.host.kernel import toolchain
+
+    return toolchain()
 
 
 def _is_simulation(request: Request) -> bool:
@@ -127,25 +138,30 @@ GENERATORS: Mapping[str, Generator] = {
         _system_inputs,
         _generate_system,
         _simulator_programs,
+        _compiler,
     ),
 }
 
 
 def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GENERATORS) -> int:
-    """Run the generator `command` on the file that FuseSoC names; the exit status is 1 if the input has faults."""
+    """Run the generator `command` on the file that FuseSoC names; the exit status is 1 for faults, 130 for Ctrl-C."""
     start = time.monotonic()
     try:
         if len(argv) != 1:
             fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
         request = read_request(command, Path(argv[0]), generators[command].parameters)
-        is_from_store = _write(request, generators[command])
+        entry = obtain(request, generators[command])
+        _write(entry.files)
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
     # It can be generated and not be run.
     if missing := generators[command].missing_programs(request):
         print(f"{command}: {explanation(missing)}", flush=True)
-    origin = "from store" if is_from_store else "generated"
+    origin = "from store" if entry.is_from_store else "generated"
     print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
     return 0
 
@@ -164,16 +180,33 @@ def read_request(command: str, path: Path, parameters: tuple[Parameter, ...]) ->
     return Request(command, vlnv, files_root, checked, places)
 
 
-def _write(request: Request, generator: Generator) -> bool:
-    """Write the core into the current folder; tell whether it came from the store."""
-    key = store_key(
-        {"command": request.command, "vlnv": request.vlnv, "parameters": dict(request.parameters)},
-        {_name(path, request): _content(path) for path in generator.inputs(request)},
+def obtain(request: Request, generator: Generator) -> Entry:
+    """The files of the core that a request asks for, out of the store if it has them. Raises `InputError`."""
+    return default_store().obtain(
+        lambda: _key(request, generator), lambda: Made(as_files(generator.generate(request), request), used_code())
     )
-    entry = Store(default_root()).obtain(key, lambda: as_files(generator.generate(request), request))
-    for name, content in entry.files.items():
-        write_if_changed(Path(name), content)
-    return entry.is_from_store
+
+
+def _key(request: Request, generator: Generator) -> Key:
+    # First, as later the modules are imported that they belong to.
+    code = digests()
+    asked = {
+        "command": request.command,
+        "vlnv": request.vlnv,
+        "parameters": dict(request.parameters),
+        "tools": dict(generator.tools(request)),
+    }
+    inputs = {_name(path, request): _content(path) for path in generator.inputs(request)}
+    return Key(request_digest(asked, inputs, code), code, {"core": request.vlnv, "generator": request.command})
+
+
+def _write(files: Files) -> None:
+    """Write a core into the current folder, the `.core` last."""
+    for name, content in files.items():
+        try:
+            write_if_changed(Path(name), content)
+        except OSError as error:
+            fail(f"cannot write {Path(name).absolute()}: {error.strerror}")
 
 
 def _name(path: Path, request: Request) -> str:

@@ -23,6 +23,8 @@ from pathlib import Path
 from chevron.tokenizer import ChevronError, tokenize
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
+# Those of them that this process has read: what it made depends on no others.
+_READ: set[str] = set()
 
 
 class TemplateError(Exception):
@@ -76,9 +78,21 @@ def render(template_name: str, context: Mapping[str, object], templates: Path = 
     """
     try:
         _require_plain(context, "")
-        return _Expansion(templates).expand(_parse(templates / f"{template_name}.mustache"), _Scope(context), True)
+        return _Expansion(templates).expand(_parse(template_name, templates), _Scope(context), True)
     except TemplateError as error:
         raise TemplateError(f"template {template_name}: {error}") from error
+
+
+def template_text(name: str, templates: Path = TEMPLATES) -> str:
+    """The text of `templates/<name>.mustache`. Raises `OSError`."""
+    if templates == TEMPLATES:
+        _READ.add(f"{name}.mustache")
+    return (templates / f"{name}.mustache").read_text(encoding="utf-8")
+
+
+def templates_read() -> frozenset[str]:
+    """Which files below `TEMPLATES` this process has read so far."""
+    return frozenset(_READ)
 
 
 def write_if_changed(path: Path, content: str | bytes) -> bool:
@@ -121,7 +135,7 @@ class _Expansion:
             case _Section():
                 return self._section(node, scope, is_taken)
             case _Partial(name, indentation):
-                text = self.expand(_parse(self.templates / "partials" / f"{name}.mustache"), scope, is_taken)
+                text = self.expand(_parse(f"partials/{name}", self.templates), scope, is_taken)
                 return _indented(text, indentation)
 
     def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
@@ -193,14 +207,15 @@ def _require_plain(value: object, path: str) -> None:
 
 
 @cache
-def _parse(path: Path) -> tuple[_Node, ...]:
+def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
     """The tree of a template file."""
+    file = f"{name.rpartition('/')[2]}.mustache"
     try:
-        tokens = iter(list(tokenize(path.read_text(encoding="utf-8"))))
+        tokens = iter(list(tokenize(template_text(name, templates))))
     except OSError as error:
-        raise TemplateError(f"cannot read {path.name}: {error.strerror}") from error
+        raise TemplateError(f"cannot read {file}: {error.strerror}") from error
     except ChevronError as error:
-        raise TemplateError(f"{path.name}: {' '.join(str(error).split())}") from error
+        raise TemplateError(f"{file}: {' '.join(str(error).split())}") from error
     return _nodes(tokens)
 
 

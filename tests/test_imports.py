@@ -39,7 +39,8 @@ ALLOWED: dict[str, set[str]] = {
     # Edalize's tool runs it beside a build, which knows files and no systems.
     "netlist": set(),
     "render": set(),
-    "store": set(),
+    "own_code": {"render"},
+    "store": {"diagnostics"},
     "library_path": set(),
     "workers": {"diagnostics"},
     "launcher": {"diagnostics"},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from fusesoc_firm.render import TEMPLATES
+from fusesoc_firm.render import template_text
 
 # What a template uses by the names of others.
 _USED = frozenset(
@@ -27,8 +27,7 @@ def reserved_names(*templates: str) -> frozenset[str]:
     """In lower case, the names in the VHDL templates; those made of a tag have no place here, as they are numbered."""
     found = set(_USED)
     for template in templates:
-        text = (TEMPLATES / f"{template}.mustache").read_text(encoding="utf-8")
-        text = _TAG.sub("\N{REPLACEMENT CHARACTER}", _COMMENT.sub("", text))
+        text = _TAG.sub("\N{REPLACEMENT CHARACTER}", _COMMENT.sub("", template_text(template)))
         for names in _DECLARED.findall(text):
             found |= {name.strip().lower() for group in names for name in group.split(",") if name.strip()}
     return frozenset(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import re
 import subprocess
 import tempfile
@@ -40,6 +41,15 @@ _FLAGS = (
 # A file in a rule of make; a blank in its name is escaped.
 _WORD = re.compile(r"(?:\\ |\S)+")
 _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
+
+
+def toolchain() -> dict[str, str]:
+    """Versions of the compiler and of the C library, without which the library may not be loaded elsewhere."""
+    try:
+        shown = subprocess.run([_COMPILER, "--version"], capture_output=True, text=True, check=False).stdout
+    except FileNotFoundError:
+        shown = ""
+    return {_COMPILER: shown.partition("\n")[0], "libc": " ".join(platform.libc_ver())}
 
 
 def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:

@@ -62,6 +62,10 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["scheduler"],
         ["scheduler", "bench"],
         ["scheduler", "choose"],
+        ["cache"],
+        ["cache", "show"],
+        ["cache", "clean"],
+        ["cache", "verify"],
     ],
     ids=" ".join,
 )

@@ -150,6 +150,53 @@ def test_the_core_is_written_last(bench: Bench, monkeypatch: pytest.MonkeyPatch)
     assert written == ["rtl/b.vhd", "a.bin", "arm-system.core"] * 2
 
 
+def test_a_full_disk_is_a_fault_and_leaves_no_core(
+    bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[str] = []
+
+    def fill(path: Path, content: str | bytes) -> bool:
+        if written:
+            raise OSError(28, "No space left on device")
+        written.append(path.name)
+        return True
+
+    monkeypatch.setattr("fusesoc_firm.gapi.write_if_changed", fill)
+    assert bench.run(spec="spec.yaml") == 1
+    assert capsys.readouterr().err == f"error: cannot write {bench.work / 'a.bin'}: No space left on device\n"
+    assert not list(bench.work.glob("*.core"))
+
+
+def test_ctrl_c_leaves_no_core_and_is_not_remembered(
+    bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(_: Request) -> GeneratedCore:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bench.echo, "generate", interrupt)
+        assert bench.run(spec="spec.yaml") == 130
+    assert capsys.readouterr().err == "interrupted\n"
+    assert not list(bench.work.glob("*.core"))
+    assert bench.run(spec="spec.yaml") == 0
+    assert bench.echo.calls == 1
+
+
+def test_an_input_that_is_edited_while_it_is_read_is_read_again(bench: Bench) -> None:
+    generate = bench.echo.generate
+
+    def edit(request: Request) -> GeneratedCore:
+        (bench.project / "spec.yaml").write_text("edited")
+        return generate(request)
+
+    bench.echo.generate = edit  # type: ignore[method-assign]
+    bench.run(spec="spec.yaml")
+    (bench.project / "spec.yaml").write_text("hello")
+    bench.echo.generate = generate  # type: ignore[method-assign]
+    bench.run(spec="spec.yaml")
+    assert (bench.work / "rtl" / "b.vhd").read_text() == "hello at 8"
+
+
 def test_a_fault_of_the_input_is_printed_without_traceback(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
     assert bench.run(spec="nothing.yaml") == 1
     assert capsys.readouterr().err == "error: no file nothing.yaml\n"

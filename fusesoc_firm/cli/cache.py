@@ -1,0 +1,102 @@
+"""`firm cache`: the store of what was generated."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+from fusesoc_firm.cli.common import command
+from fusesoc_firm.diagnostics import fail
+
+_UNIT = 1024
+
+
+def add_cache(commands: Any) -> None:
+    """Declare the command and its actions."""
+    cache = command(commands, "cache", "look at the store of what was generated", "firm cache show")
+    actions = cache.add_subparsers(title="actions", metavar="ACTION", required=True)
+    show = command(
+        actions, "show", "print where the store is and what it holds", "firm cache show --entries", _show_cache
+    )
+    show.add_argument("--entries", action="store_true", help="every entry, too, the one that was used last first")
+    clean = command(
+        actions,
+        "clean",
+        "remove what is stored, that of former versions too; runs at the same time are not disturbed",
+        "firm cache clean --to 200M",
+        _clean_cache,
+    )
+    clean.add_argument(
+        "--to",
+        type=_size,
+        metavar="SIZE",
+        help="only what was not used for longest, until so much is left, such as 200M",
+    )
+    command(
+        actions,
+        "verify",
+        "check every entry against its digest, and remove those that are damaged",
+        "firm cache verify",
+        _verify_cache,
+    )
+
+
+def _size(text: str) -> int:
+    from fusesoc_firm.store import parse_size
+
+    if (size := parse_size(text)) is None:
+        raise argparse.ArgumentTypeError(f"'{text}' is no size: bytes, or such as 500M or 2G")
+    return size
+
+
+def _show_cache(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.store import default_store, read_entry
+
+    store = default_store()
+    entries = store.entries()
+    print(f"folder   {store.root}")
+    print(f"entries  {len(entries)}")
+    print(f"size     {_shown(store.size())} of {_shown(store.limit)}")
+    for file in entries if arguments.entries else ():
+        used = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.used))
+        entry = read_entry(file.path)
+        about = f"{entry.about['generator']}  {entry.about['core']}" if entry else "damaged"
+        print(f"{used}  {_shown(file.size):>10}  {about}")
+
+
+def _clean_cache(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.store import default_store
+
+    store = default_store()
+    try:
+        removed = store.clean() if arguments.to is None else store.shrink(arguments.to)
+    except OSError as error:
+        fail(f"cannot clean {store.root}: {error.strerror}")
+    print(f"{_shown(removed)} removed from {store.root}")
+
+
+def _verify_cache(_: argparse.Namespace) -> None:
+    from fusesoc_firm.store import default_store
+
+    store = default_store()
+    try:
+        damaged = store.remove_damaged()
+    except OSError as error:
+        fail(f"cannot remove a damaged entry of {store.root}: {error.strerror}")
+    if damaged:
+        files = "\n".join(map(str, damaged))
+        entries = "1 entry was" if len(damaged) == 1 else f"{len(damaged)} entries were"
+        fail(f"{entries} damaged, and removed:\n{files}")
+    print(f"{store.root}: every entry is whole")
+
+
+def _shown(size: float) -> str:
+    """A number of bytes for people to read."""
+    if size < _UNIT:
+        return f"{size} bytes"
+    for unit in ("KiB", "MiB", "GiB"):
+        size /= _UNIT
+        if size < _UNIT:
+            return f"{size:.1f} {unit}"
+    return f"{size / _UNIT:.1f} TiB"

@@ -1,0 +1,46 @@
+"""Which of this package's own files a result was made with, so that an edit makes anew just what it can change.
+
+These are the modules that were imported, the data files beside them, and the templates that were read, all of them for
+the whole process. A generator call has one to itself; a process that does more counts too many, never too few.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from pathlib import Path
+
+from fusesoc_firm.render import TEMPLATES, templates_read
+
+PACKAGE = Path(__file__).resolve().parent
+_DATA = (".yaml", ".csv")
+_COUNTED = (".py", ".mustache", *_DATA)
+
+
+def digests(package: Path = PACKAGE) -> dict[str, str]:
+    """The SHA-256 of every module, data file and template of a package's folder, its library left out, by name."""
+    return {name: hashlib.sha256((package / name).read_bytes()).hexdigest() for name in _names(package)}
+
+
+def used_code() -> list[str]:
+    """Those of the names in `digests` that this process has used so far, sorted."""
+    files = [getattr(module, "__file__", None) for module in [*sys.modules.values()]]
+    modules = {path for file in files if file and (path := Path(file).resolve()).is_relative_to(PACKAGE)}
+    folders = {path.parent for path in modules}
+    used = modules | {TEMPLATES / name for name in templates_read()}
+    return sorted(name for name in _names(PACKAGE) if (path := PACKAGE / name) in used or _is_data(path, folders))
+
+
+def _is_data(path: Path, folders: set[Path]) -> bool:
+    return path.suffix in _DATA and path.parent in folders
+
+
+def _names(package: Path) -> list[str]:
+    found: list[str] = []
+    for folder, folders, files in os.walk(package):
+        # In the library lie cores, and links to folders of any size.
+        folders[:] = [name for name in folders if name not in ("library", "__pycache__")]
+        paths = (Path(folder, name) for name in files)
+        found += [path.relative_to(package).as_posix() for path in paths if path.suffix in _COUNTED]
+    return sorted(found)
