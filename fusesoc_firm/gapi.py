@@ -174,6 +174,13 @@ def read_request(command: str, path: Path, parameters: tuple[Parameter, ...]) ->
         given = call.get("parameters") or {}
     except (OSError, yaml.YAMLError, KeyError, TypeError) as error:
         fail(f"{path} is no file of FuseSoC's generator call: {error}")
+    return make_request(command, vlnv, files_root, given, parameters)
+
+
+def make_request(
+    command: str, vlnv: str, files_root: Path, given: Mapping[str, Any], parameters: tuple[Parameter, ...]
+) -> Request:
+    """A request for the core `vlnv` with checked parameters. Raises `InputError`."""
     origin = find_requesting_core(files_root, vlnv.split(":")[2])
     checked = check_parameters(given, parameters, origin)
     places = {name: origin.items(name) for name, value in checked.items() if isinstance(value, list)}
@@ -185,6 +192,11 @@ def obtain(request: Request, generator: Generator) -> Entry:
     return default_store().obtain(
         lambda: _key(request, generator), lambda: Made(as_files(generator.generate(request), request), used_code())
     )
+
+
+def used_before(request: Request, generator: Generator) -> list[str] | None:
+    """Names of our own files that answered a request when it was last made; None if the store does not know it."""
+    return default_store().uses(_key(request, generator))
 
 
 def _key(request: Request, generator: Generator) -> Key:

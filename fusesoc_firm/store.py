@@ -180,15 +180,20 @@ class Store:
                     Path(folder).rmdir()
         return removed
 
-    def _find(self, key: Key) -> Files | None:
-        uses = self._path(key.request, _USES)
+    def uses(self, key: Key) -> list[str] | None:
+        """Which of our own files were used for what was asked for when it was last made; None if that is not known."""
         try:
-            full = key.with_code(json.loads(uses.read_bytes()))
-        except (OSError, ValueError, TypeError):
+            names = json.loads(self._path(key.request, _USES).read_bytes())
+        except (OSError, ValueError):
             return None
+        return names if isinstance(names, list) and all(isinstance(name, str) for name in names) else None
+
+    def _find(self, key: Key) -> Files | None:
+        uses = self.uses(key)
+        full = None if uses is None else key.with_code(uses)
         if full is None or (found := read_entry(self._path(full, _ENTRY))) is None:
             return None
-        for path in (self._path(full, _ENTRY), uses):
+        for path in (self._path(full, _ENTRY), self._path(key.request, _USES)):
             # What cannot be written can be read all the same.
             with suppress(OSError):
                 os.utime(path)

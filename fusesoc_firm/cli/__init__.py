@@ -11,6 +11,7 @@ from fusesoc_firm import __version__
 from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
 from fusesoc_firm.cli.message import add_message
+from fusesoc_firm.cli.project import add_project
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
@@ -51,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     add_message(commands)
     add_system(commands)
     add_scheduler(commands)
+    add_project(commands)
     add_cache(commands)
     add_tool(commands)
     return parser

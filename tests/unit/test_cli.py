@@ -62,6 +62,8 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["scheduler"],
         ["scheduler", "bench"],
         ["scheduler", "choose"],
+        ["graph"],
+        ["affected"],
         ["cache"],
         ["cache", "show"],
         ["cache", "clean"],

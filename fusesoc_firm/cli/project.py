@@ -1,0 +1,118 @@
+"""`firm graph` and `firm affected`: how the cores of a project hang together."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fusesoc_firm.cli.common import command, write
+from fusesoc_firm.diagnostics import InputError
+
+if TYPE_CHECKING:
+    from fusesoc_firm.generation import Request
+    from fusesoc_firm.project import Instance, ProjectCore
+
+
+def add_project(commands: Any) -> None:
+    """Declare the commands."""
+    graph = command(
+        commands,
+        "graph",
+        "draw what a core depends on: cores, what is generated for them, and of which files",
+        "firm graph robot:sys:quat2euler --target sim -o quat2euler.svg",
+        _draw_cores,
+    )
+    graph.add_argument("core", metavar="CORE", help="its name as FuseSoC has it")
+    graph.add_argument("--target", default="default", metavar="NAME", help="the target meant (default: default)")
+    graph.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where to write it (default: print it)")
+    graph.add_argument("--format", choices=("svg", "dot"), default="svg", help="of the picture (default: svg)")
+    affected = command(
+        commands,
+        "affected",
+        "list the cores that an edit touches, each with the reason",
+        "firm affected --since main",
+        _list_affected,
+    )
+    affected.add_argument("--since", default="HEAD", metavar="REV", help="the revision before it (default: HEAD)")
+
+
+def _draw_cores(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.project import core_graph, svg
+
+    def sources(instance: Instance) -> list[str]:
+        request = _request(instance)
+        files = [] if request is None else _inputs(request)
+        root = instance.files_root.resolve()
+        return [str(file.relative_to(root) if file.is_relative_to(root) else file) for file in files]
+
+    dot = core_graph(arguments.core, arguments.target, sources)
+    picture = dot if arguments.format == "dot" else svg(dot)
+    if arguments.output:
+        write(arguments.output, picture)
+    else:
+        print(picture, end="")
+
+
+def _list_affected(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.project import affected, changed_files, project_cores
+
+    changed = dict.fromkeys(path.resolve() for path in changed_files(arguments.since, Path.cwd()))
+    found = affected(project_cores(), _touched(changed))
+    width = max(map(len, found), default=0)
+    for name, reason in found.items():
+        print(f"{name:{width}}  {reason}")
+
+
+def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
+    """What tells by which of the changed files a core itself is touched."""
+
+    def touched(core: ProjectCore) -> str | None:
+        files = set(core.files)
+        for instance in core.instances:
+            files |= _files_behind(instance, changed)
+        first = next((path for path in changed if path in files), None)
+        return None if first is None else _shown(first)
+
+    return touched
+
+
+def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
+    """All that a generated core is made of, our own files too."""
+    from fusesoc_firm.gapi import GENERATORS, used_before
+    from fusesoc_firm.own_code import PACKAGE, digests
+
+    try:
+        request = _request(instance)
+        if request is None:
+            return set()
+        files = set(_inputs(request))
+        used = used_before(request, GENERATORS[request.command])
+    except InputError:
+        # It cannot be made: whatever changed beside it, or in our own files, may be why.
+        roots = (instance.files_root.resolve(), PACKAGE)
+        return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
+    # What was not made before may use any.
+    return files | {PACKAGE / name for name in (digests() if used is None else used)}
+
+
+def _request(instance: Instance) -> Request | None:
+    """The request that FuseSoC would make; None for a generator that is not ours."""
+    from fusesoc_firm.gapi import GENERATORS, make_request
+
+    if instance.generator not in GENERATORS:
+        return None
+    known = GENERATORS[instance.generator].parameters
+    return make_request(instance.generator, instance.vlnv, instance.files_root, instance.parameters, known)
+
+
+def _inputs(request: Request) -> list[Path]:
+    from fusesoc_firm.gapi import GENERATORS
+
+    return [path.resolve() for path in GENERATORS[request.command].inputs(request)]
+
+
+def _shown(path: Path) -> str:
+    here = Path.cwd().resolve()
+    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

@@ -1,0 +1,186 @@
+"""How the cores of a project hang together: `firm graph` and `firm affected`."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.cli import main
+from fusesoc_firm.library_path import library_root
+from fusesoc_firm.own_code import PACKAGE
+from fusesoc_firm.project import project_cores
+
+LEAF = """\
+CAPI=2:
+name: me:p:leaf:1.0
+filesets: {rtl: {files: [leaf.vhd: {file_type: vhdlSource-93}, "target_sim ? (bench.vhd)"]}}
+targets: {default: {filesets: [rtl]}}
+"""
+BRANCH = """\
+CAPI=2:
+name: me:p:branch:1.0
+virtual: [me:p:tree]
+filesets: {base: {depend: ["target_sim ? (me:p:leaf)"]}}
+targets: {default: &default {filesets: [base]}, sim: {<<: *default}}
+"""
+TOP = """\
+CAPI=2:
+name: me:p:top:1.0
+filesets: {base: {depend: ["me:p:tree", "robot:firm:generators"]}}
+generate:
+  size: {generator: firm, parameters: {message: my_msgs/Size, ros: 2, paths: [msg]}}
+  foreign: {generator: another, parameters: {message: nothing}}
+targets:
+  default: {filesets: [base], generate: [size]}
+  point: {filesets: [base], generate: [size: {message: geometry_msgs/Point}]}
+"""
+OTHER = """\
+CAPI=2:
+name: me:p:other:1.0
+targets: {default: {}}
+"""
+FILES = {
+    "leaf/leaf.core": LEAF,
+    "leaf/leaf.vhd": "",
+    "leaf/bench.vhd": "",
+    "branch.core": BRANCH,
+    "top/top.core": TOP,
+    "top/msg/my_msgs/msg/Size.msg": "uint8 a\n",
+    "top/msg/my_msgs/msg/Unused.msg": "uint8 a\n",
+    "other/other.core": OTHER,
+}
+Captured = pytest.CaptureFixture[str]
+
+
+def git(*arguments: str) -> None:
+    subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@b", *arguments], check=True, capture_output=True)
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A repository of four cores, as the current folder, beside our library."""
+    for name in ("HOME", "XDG_CONFIG_HOME", "FUSESOC_FIRM_CACHE"):
+        monkeypatch.setenv(name, str(tmp_path / "home"))
+    root = tmp_path / "project"
+    for name, text in FILES.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text)
+    libraries = {"p": ".", "firm": library_root() / "generators", "cores": library_root() / "cores"}
+    conf = "".join(f"[library.{name}]\nlocation = {place}\n" for name, place in libraries.items())
+    (root / "fusesoc.conf").write_text(conf)
+    monkeypatch.chdir(root)
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-qm", "all")
+    return root
+
+
+def touched(capsys: Captured, *arguments: str) -> dict[str, str]:
+    """The affected cores of the project by name, with the reasons."""
+    assert main(["affected", *arguments]) == 0
+    lines = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    return {name.split(":")[2]: reason for name, reason in lines}
+
+
+def test_nothing_is_touched(project: Path, capsys: Captured) -> None:
+    assert touched(capsys) == {}
+
+
+@pytest.mark.parametrize("name", ["leaf/leaf.vhd", "leaf/bench.vhd", "leaf/leaf.core"])
+def test_an_edit_touches_all_that_depend_on_it(project: Path, capsys: Captured, name: str) -> None:
+    (project / name).write_text(f"{FILES[name]}# edited\n")
+    found = {"branch": "by me:p:leaf:1.0", "leaf": name, "top": "by me:p:branch:1.0"}
+    assert touched(capsys) == found
+    git("commit", "-qam", "edit")
+    assert touched(capsys) == {}
+    assert touched(capsys, "--since", "HEAD~1") == found
+
+
+def test_a_message_touches_what_is_made_of_it(project: Path, capsys: Captured) -> None:
+    size = project / "top/msg/my_msgs/msg/Size.msg"
+    size.with_name("Unused.msg").write_text("uint8 b\n")
+    assert touched(capsys) == {}
+    size.write_text("uint8 b\n")
+    assert touched(capsys) == {"top": "top/msg/my_msgs/msg/Size.msg"}
+    size.unlink()
+    assert list(touched(capsys)) == ["top"]
+
+
+def test_a_new_file_that_hides_another_one_counts(project: Path, capsys: Captured) -> None:
+    point = project / "top/msg/geometry_msgs/msg/Point.msg"
+    point.parent.mkdir(parents=True)
+    point.write_text("uint8 a\n")
+    assert touched(capsys) == {"top": "top/msg/geometry_msgs/msg/Point.msg"}
+
+
+def test_our_own_files_count_where_they_were_used(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def edited(name: str) -> dict[str, str]:
+        monkeypatch.setattr("fusesoc_firm.project.changed_files", lambda *_: [PACKAGE / name])
+        return touched(capsys)
+
+    # What was never made may use any of them.
+    assert "top" in edited("templates/core/system.core.mustache")
+    monkeypatch.setattr("fusesoc_firm.gapi.used_before", lambda *_: ["naming.py"])
+    assert edited("templates/core/system.core.mustache") == {}
+    assert list(edited("naming.py"))[-1] == "top"
+
+
+def test_what_is_no_revision_or_no_repository_is_a_fault(project: Path, capsys: Captured) -> None:
+    assert main(["affected", "--since", "nowhere"]) == 1
+    assert capsys.readouterr().err.startswith("error: git rev-parse: ")
+    shutil.rmtree(project / ".git")
+    assert main(["affected"]) == 1
+    assert "not a git repository" in capsys.readouterr().err
+
+
+def test_files_of_all_targets_and_flags_are_found(project: Path) -> None:
+    cores = {core.vlnv.split(":")[2]: core for core in project_cores()}
+    assert [path.name for path in cores["leaf"].files] == ["leaf.core", "leaf.vhd", "bench.vhd"]
+    assert cores["branch"].depends == {"me:p:leaf"}
+    assert cores["branch"].names == {"me:p:branch", "me:p:tree"}
+    assert [item.parameters.get("message") for item in cores["top"].instances] == [
+        "my_msgs/Size",
+        "nothing",
+        "geometry_msgs/Point",
+    ]
+    assert "far_generator.py" in {path.name for path in cores["generators"].files}
+
+
+def test_graph(project: Path, capsys: Captured) -> None:
+    assert main(["graph", "me:p:top", "--format", "dot"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert '  "me:p:top:1.0" -> "me:p:top-size:1.0"' in lines
+    assert '  "me:p:top-size:1.0" -> "msg/my_msgs/msg/Size.msg"' in lines
+    assert '  "me:p:top:1.0" -> "me:p:branch:1.0"' in lines
+    assert '  "me:p:leaf:1.0" [shape=box]' not in lines
+    assert main(["graph", "me:p:branch", "--target", "sim", "--format", "dot"]) == 0
+    assert '  "me:p:branch:1.0" -> "me:p:leaf:1.0"' in capsys.readouterr().out.splitlines()
+
+
+@pytest.mark.skipif(not shutil.which("dot"), reason="Graphviz is not installed")
+def test_graph_as_a_picture(project: Path) -> None:
+    assert main(["graph", "me:p:branch", "-o", "pictures/branch.svg"]) == 0
+    assert "</svg>" in (project / "pictures/branch.svg").read_text()
+
+
+def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(project))
+    assert main(["graph", "me:p:branch"]) == 1
+    assert capsys.readouterr().err.startswith("error: pictures need the program 'dot' of Graphviz")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["me:p:bush"], "'me:p:bush' is no core that FuseSoC knows here"),
+        (["me:p:top", "--target", "fly"], "'me:p:top:1.0' has no target 'fly'"),
+    ],
+)
+def test_what_is_unknown_is_a_fault(project: Path, capsys: Captured, arguments: list[str], message: str) -> None:
+    assert main(["graph", *arguments]) == 1
+    assert message in capsys.readouterr().err
