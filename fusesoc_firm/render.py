@@ -15,7 +15,9 @@ templates, and the tree is expanded here, by these rules:
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -29,6 +31,31 @@ _READ: set[str] = set()
 
 class TemplateError(Exception):
     """A template and its context do not fit: a fault of this package, never of its user."""
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A template below `TEMPLATES`, and the context that it was rendered for."""
+
+    template: str
+    context: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class TracedLine:
+    """A line of a rendered text, the line of the template file it comes from, and the scope's path in the context."""
+
+    text: str
+    template: str
+    line: int
+    scope: str
+
+
+_RECORDS: list[dict[str, Rendering]] = []
+# Private characters, which no template holds, around the place of a line.
+_MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
+# A line that is left out as a whole, whatever it gives.
+_STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
 
 
 @dataclass(frozen=True)
@@ -78,9 +105,37 @@ def render(template_name: str, context: Mapping[str, object], templates: Path = 
     """
     try:
         _require_plain(context, "")
-        return _Expansion(templates).expand(_parse(template_name, templates), _Scope(context), True)
+        text = _Expansion(templates).expand(_parse(template_name, templates), _Scope(context), True)
     except TemplateError as error:
         raise TemplateError(f"template {template_name}: {error}") from error
+    for renderings in _RECORDS:
+        renderings[text] = Rendering(template_name, context)
+    return text
+
+
+@contextmanager
+def recorded() -> Iterator[dict[str, Rendering]]:
+    """Within it, every text that is rendered is noted with what it is made of."""
+    renderings: dict[str, Rendering] = {}
+    _RECORDS.append(renderings)
+    try:
+        yield renderings
+    finally:
+        _RECORDS.remove(renderings)
+
+
+def traced_lines(rendering: Rendering) -> list[TracedLine]:
+    """Each line of what `render` makes of it, with where it comes from."""
+    name = rendering.template
+    marked = _TracedExpansion(TEMPLATES).expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
+    lines: list[TracedLine] = []
+    place = (f"{name}.mustache", 1, "")
+    for text in marked.splitlines():
+        # A value may be of several lines, and a blank line has no mark: they belong to the one above.
+        if found := _MARK.search(text):
+            place = (found["file"], int(found["line"]), found["scope"])
+        lines.append(TracedLine(_MARK.sub("", text), *place))
+    return lines
 
 
 def template_text(name: str, templates: Path = TEMPLATES) -> str:
@@ -128,15 +183,21 @@ class _Expansion:
     def _node(self, node: _Node, scope: _Scope, is_taken: bool) -> str:
         match node:
             case _Literal(text):
-                return text
+                return self._literal(text, scope)
             case _Value(key):
                 value = _look_up(key, scope)
                 return _printed(value, scope.path_to(key)) if is_taken else ""
             case _Section():
                 return self._section(node, scope, is_taken)
             case _Partial(name, indentation):
-                text = self.expand(_parse(f"partials/{name}", self.templates), scope, is_taken)
+                text = self.expand(self._parse(f"partials/{name}"), scope, is_taken)
                 return _indented(text, indentation)
+
+    def _parse(self, name: str) -> tuple[_Node, ...]:
+        return _parse(name, self.templates)
+
+    def _literal(self, text: str, _: _Scope) -> str:
+        return text
 
     def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
         value = _look_up(section.key, scope)
@@ -147,6 +208,16 @@ class _Expansion:
             self.expand(section.body, inner, is_taken and is_inner_taken)
             for inner, is_inner_taken in _turns(section, value, scope, path)
         )
+
+
+class _TracedExpansion(_Expansion):
+    """A walk over a marked template: the marks get the scope's path."""
+
+    def _parse(self, name: str) -> tuple[_Node, ...]:
+        return _parse_marked(name, self.templates)
+
+    def _literal(self, text: str, scope: _Scope) -> str:
+        return text.replace("\ue001", f"{scope.path}\ue001")
 
 
 def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
@@ -209,13 +280,29 @@ def _require_plain(value: object, path: str) -> None:
 @cache
 def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
     """The tree of a template file."""
-    file = f"{name.rpartition('/')[2]}.mustache"
     try:
-        tokens = iter(list(tokenize(template_text(name, templates))))
+        return _tree(name, template_text(name, templates))
     except OSError as error:
-        raise TemplateError(f"cannot read {file}: {error.strerror}") from error
+        raise TemplateError(f"cannot read {name.rpartition('/')[2]}.mustache: {error.strerror}") from error
+
+
+def _parse_marked(name: str, templates: Path) -> tuple[_Node, ...]:
+    """The tree of a template file in which a mark begins every line that gives one, but for blank ones."""
+    lines = template_text(name, templates).splitlines(keepends=True)
+    marked = [
+        line
+        if not line.strip() or _STANDALONE.fullmatch(line.rstrip("\n"))
+        else f"\ue000{name}.mustache:{number}:\ue001{line}"
+        for number, line in enumerate(lines, start=1)
+    ]
+    return _tree(name, "".join(marked))
+
+
+def _tree(name: str, text: str) -> tuple[_Node, ...]:
+    try:
+        tokens = iter(list(tokenize(text)))
     except ChevronError as error:
-        raise TemplateError(f"{file}: {' '.join(str(error).split())}") from error
+        raise TemplateError(f"{name.rpartition('/')[2]}.mustache: {' '.join(str(error).split())}") from error
     return _nodes(tokens)
 
 

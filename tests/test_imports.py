@@ -40,6 +40,7 @@ ALLOWED: dict[str, set[str]] = {
     "netlist": set(),
     "render": set(),
     "own_code": {"render"},
+    "why": _SYSTEM,
     "project": {"diagnostics", "render"},
     "store": {"diagnostics"},
     "library_path": set(),

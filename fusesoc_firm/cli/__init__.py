@@ -15,6 +15,7 @@ from fusesoc_firm.cli.project import add_project
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
+from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.library_path import library_root
 
@@ -53,6 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     add_system(commands)
     add_scheduler(commands)
     add_project(commands)
+    add_why(commands)
     add_cache(commands)
     add_tool(commands)
     return parser

@@ -36,12 +36,12 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
 
 def inputs(request: Request) -> list[Path]:
     """The files that say what is wanted and that hold the definitions; none for those of a type store."""
-    return list(_order(request).files)
+    return list(order_of_request(request).files)
 
 
 def generate(request: Request) -> GeneratedCore:
     """What the request asks for, in the order in which a tool reads it. Raises `InputError`."""
-    order = _order(request)
+    order = order_of_request(request)
     files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages])
     interfaces: dict[str, GeneratedFile] = {}
     for wanted in order.messages:
@@ -88,7 +88,7 @@ def _file(source: ConverterSource) -> GeneratedFile:
     return GeneratedFile(render(source.template, source.configuration), VHDL)
 
 
-def _order(request: Request) -> Order:
+def order_of_request(request: Request) -> Order:
     """What the request asks for, be it a message or what a configuration file lists."""
     config, ros, width = (request.parameters.get(name) for name in ("config", "ros", "width"))
     if config is not None:

@@ -64,6 +64,7 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["scheduler", "choose"],
         ["graph"],
         ["affected"],
+        ["why"],
         ["cache"],
         ["cache", "show"],
         ["cache", "clean"],
