@@ -57,6 +57,19 @@ def project_cores() -> list[ProjectCore]:
     return [_core(name, Path(found[name].core_file)) for name in sorted(found)]
 
 
+def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
+    """A core, and all others that one of its targets depends on, sorted by name.
+
+    Raises `InputError` if there is no such core, or if something that it depends on is missing.
+    """
+    manager, top = _found(core)
+    needed: dict[str, Path] = {}
+    for target in top.get_data({}).targets:
+        needed |= {str(item.name): Path(item.core_file) for item in _solved(manager, top, target)}
+    needed.pop(str(top.name), None)
+    return _core(str(top.name), Path(top.core_file)), [_core(name, needed[name]) for name in sorted(needed)]
+
+
 def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
     """The cores that are touched themselves or depend on such a core, each with the reason, in the order of `cores`.
 
@@ -103,22 +116,9 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
 
     Raises `InputError` if there is no such core or target, or if something that it depends on is missing.
     """
-    from fusesoc.config import Config
-    from fusesoc.coremanager import DependencyError
-    from fusesoc.fusesoc import Fusesoc
-    from fusesoc.vlnv import Vlnv
-
-    manager = Fusesoc(Config()).cm
-    top = None
-    try:
-        top = manager.get_core(Vlnv(core))
-        flags = {**top.get_flags(target), "target": target}
-        solved = manager.get_depends(top.name, {**flags, "is_toplevel": True})
-    except DependencyError as error:
-        known = top is not None
-        fail(str(error) if known else f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
-    except RuntimeError as error:
-        fail(str(error))
+    manager, top = _found(core)
+    flags = _flags(top, target)
+    solved = _solved(manager, top, target)
     names = {name: str(item.name) for item in solved for name in _names(item.core_file)}
     edges: list[tuple[str, str]] = []
     generated: dict[str, str] = {}
@@ -145,6 +145,37 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
             "edges": [{"from": start, "to": end} for start, end in edges],
         },
     )
+
+
+def _found(core: str) -> tuple[Any, Any]:
+    """FuseSoC's manager of cores, and the core of this name."""
+    from fusesoc.config import Config
+    from fusesoc.coremanager import DependencyError
+    from fusesoc.fusesoc import Fusesoc
+    from fusesoc.vlnv import Vlnv
+
+    manager = Fusesoc(Config()).cm
+    try:
+        return manager, manager.get_core(Vlnv(core))
+    except DependencyError:
+        fail(f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
+
+
+def _flags(top: Any, target: str) -> dict[str, Any]:
+    try:
+        return {**top.get_flags(target), "target": target}
+    except RuntimeError as error:
+        fail(str(error))
+
+
+def _solved(manager: Any, top: Any, target: str) -> list[Any]:
+    """All cores of a target, those that others depend on first, the core itself last."""
+    from fusesoc.coremanager import DependencyError
+
+    try:
+        return list(manager.get_depends(top.name, {**_flags(top, target), "is_toplevel": True}))
+    except DependencyError as error:
+        fail(f"{top.name} depends on what FuseSoC does not know here: {error}")
 
 
 def svg(dot: str) -> str:

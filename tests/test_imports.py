@@ -41,6 +41,7 @@ ALLOWED: dict[str, set[str]] = {
     "render": set(),
     "own_code": {"render"},
     "why": _SYSTEM,
+    "lock": _SYSTEM | {"own_code", "project"},
     "project": {"diagnostics", "render"},
     "store": {"diagnostics"},
     "library_path": set(),

@@ -1,4 +1,4 @@
-"""`firm graph` and `firm affected`: how the cores of a project hang together."""
+"""`firm graph`, `firm affected` and `firm lock`: how the cores of a project hang together, and what they use."""
 
 from __future__ import annotations
 
@@ -36,6 +36,17 @@ def add_project(commands: Any) -> None:
         _list_affected,
     )
     affected.add_argument("--since", default="HEAD", metavar="REV", help="the revision before it (default: HEAD)")
+    lock = command(
+        commands,
+        "lock",
+        "write which message definitions, cores and tools a core uses, into a file beside it",
+        "firm lock robot:sys:quat2euler",
+        _lock,
+    )
+    lock.add_argument("core", metavar="CORE", help="its name as FuseSoC has it")
+    lock.add_argument(
+        "--locked", action="store_true", help="write nothing; refuse what differs from the file, and say what does"
+    )
 
 
 def _draw_cores(arguments: argparse.Namespace) -> None:
@@ -63,6 +74,23 @@ def _list_affected(arguments: argparse.Namespace) -> None:
     width = max(map(len, found), default=0)
     for name, reason in found.items():
         print(f"{name:{width}}  {reason}")
+
+
+def _lock(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.lock import check_lock, lock_of, lock_path, lock_text, read_lock
+    from fusesoc_firm.project import dependencies
+
+    core, depends = dependencies(arguments.core)
+    path = lock_path(core)
+    locked = read_lock(path) if arguments.locked else None
+    requests = [request for instance in core.instances if (request := _request(instance))]
+    used = lock_of(core, depends, requests)
+    if locked is None:
+        write(path, lock_text(used))
+        print(_shown(path))
+    else:
+        check_lock(locked, used)
+        print(f"{_shown(path)}: nothing differs")
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:

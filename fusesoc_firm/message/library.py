@@ -127,6 +127,12 @@ class MessageLibrary:
         """The file of a known message, or the distribution that has it, for people to read."""
         return str(self._sources[name].paths[0]) if name in self._sources else self._store.title
 
+    def content(self, name: MessageName) -> bytes:
+        """What defines a known message, as it stands: a file's bytes, or the text that a distribution has."""
+        if name in self._sources:
+            return self._sources[name].paths[0].read_bytes()
+        return self._store.text(name).encode()
+
     def files(self, names: Iterable[MessageName]) -> list[Path]:
         """The files that these messages are read from, in the order of names; messages of a distribution have none."""
         paths = [self._sources[name].paths[0] for name in sorted(set(names)) if name in self._sources]

@@ -67,13 +67,15 @@ class LoadedSystem:
         messages = dict.fromkeys((frame.ros, frame.message) for frame in self.system.frames)
         return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
 
-    def _message_files(self) -> list[Path]:
-        found: list[Path] = []
+    def definitions(self) -> list[tuple[MessageLibrary, Definitions]]:
+        """The library of each message, of software too, with all definitions within it."""
         types = self.system.software.types
         sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
-        for frame in dict.fromkeys((*self.system.frames, *sides)):
-            library = self.libraries[frame.ros]
-            found += library.files(library.closure(frame.message))
+        frames = dict.fromkeys((*self.system.frames, *sides))
+        return [(self.libraries[frame.ros], self.libraries[frame.ros].closure(frame.message)) for frame in frames]
+
+    def _message_files(self) -> list[Path]:
+        found = [path for library, definitions in self.definitions() for path in library.files(definitions)]
         return list(dict.fromkeys(found))
 
 

@@ -65,6 +65,7 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["graph"],
         ["affected"],
         ["why"],
+        ["lock"],
         ["cache"],
         ["cache", "show"],
         ["cache", "clean"],

@@ -1,12 +1,15 @@
-"""How the cores of a project hang together: `firm graph` and `firm affected`."""
+"""How the cores of a project hang together, and what they use: `firm graph`, `firm affected`, `firm lock`."""
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import subprocess
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.library_path import library_root
@@ -184,3 +187,99 @@ def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatc
 def test_what_is_unknown_is_a_fault(project: Path, capsys: Captured, arguments: list[str], message: str) -> None:
     assert main(["graph", *arguments]) == 1
     assert message in capsys.readouterr().err
+
+
+def locked(capsys: Captured) -> list[str]:
+    """What differs from the lock file of the top core."""
+    status = main(["lock", "me:p:top", "--locked"])
+    captured = capsys.readouterr()
+    assert status == (1 if captured.err else 0)
+    assert captured.err or captured.out == "top/top.lock: nothing differs\n"
+    return [line.removeprefix("error: ") for line in captured.err.splitlines()]
+
+
+def test_a_lock_names_messages_cores_and_tools(project: Path, capsys: Captured) -> None:
+    assert main(["lock", "me:p:top"]) == 0
+    assert capsys.readouterr().out == "top/top.lock\n"
+    lock = yaml.safe_load((project / "top/top.lock").read_text())
+    size = lock["messages"]["my_msgs/Size (ROS 2)"]
+    assert size["source"] == "msg/my_msgs/msg/Size.msg"
+    assert size["sha256"] == hashlib.sha256(b"uint8 a\n").hexdigest()
+    assert size["signature"].startswith("RIHS01_")
+    assert lock["messages"]["geometry_msgs/Point (ROS 2)"]["source"] == "rosbags ros2_jazzy"
+    assert {"me:p:branch:1.0", "robot:axis:axis:0.1.0"} <= lock["cores"].keys()
+    # The one is for a target that the core has not, the other is the core itself.
+    assert not {"me:p:leaf:1.0", "me:p:top:1.0"} & lock["cores"].keys()
+    assert lock["tools"]["fusesoc"] == {"version": version("fusesoc")}
+    assert locked(capsys) == []
+
+
+def test_a_copy_of_the_project_is_locked_alike(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    main(["lock", "me:p:top"])
+    capsys.readouterr()
+    monkeypatch.chdir(project.rename(project.with_name("moved")))
+    assert locked(capsys) == []
+
+
+def test_what_differs_from_the_lock_is_said(project: Path, capsys: Captured) -> None:
+    main(["lock", "me:p:top"])
+    capsys.readouterr()
+    # What is the core's own.
+    (project / "top/top.core").write_text(f"{TOP}# edited\n")
+    assert locked(capsys) == []
+    (project / "branch.core").write_text(f"{BRANCH}# edited\n")
+    (found,) = locked(capsys)
+    assert found.startswith("core me:p:branch:1.0: sha256 is ")
+    (project / "branch.core").write_text(BRANCH)
+    size = project / "top/msg/my_msgs/msg/Size.msg"
+    size.write_text("uint8 a # its size\n")
+    (found,) = locked(capsys)
+    assert found.startswith("message my_msgs/Size (ROS 2): sha256 is ")
+    size.write_text("uint8 b\n")
+    assert [line.partition(" is ")[0] for line in locked(capsys)] == [
+        "message my_msgs/Size (ROS 2): sha256",
+        "message my_msgs/Size (ROS 2): signature",
+    ]
+    size.write_text("uint8 a\n")
+    (project / "top/top.core").write_text(TOP.replace("me:p:tree", "me:p:other").replace("/Point", "/Vector3"))
+    assert locked(capsys) == [
+        "message geometry_msgs/Point (ROS 2) is locked, but not used",
+        "message geometry_msgs/Vector3 (ROS 2) is used, but not locked",
+        "core me:p:branch:1.0 is locked, but not used",
+        "core me:p:other:1.0 is used, but not locked",
+    ]
+
+
+def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    def install(text: str) -> None:
+        program = project / "bin" / "ghdl"
+        program.parent.mkdir(exist_ok=True)
+        program.write_text(f"#!/bin/sh\necho {text}\n")
+        program.chmod(0o755)
+
+    monkeypatch.setattr("fusesoc_firm.lock._PROGRAMS", {"ghdl": "--version"})
+    monkeypatch.setenv("PATH", str(project / "bin"))
+    install("GHDL 2.0.0")
+    main(["lock", "me:p:top"])
+    capsys.readouterr()
+    install("GHDL 3.0.0")
+    assert locked(capsys) == ["tool ghdl: version is GHDL 3.0.0, but GHDL 2.0.0 is locked"]
+    (project / "bin" / "ghdl").unlink()
+    assert locked(capsys) == ["tool ghdl is locked, but not installed"]
+    # What is installed, too, is no difference.
+    main(["lock", "me:p:top"])
+    capsys.readouterr()
+    install("GHDL 2.0.0")
+    assert locked(capsys) == []
+    monkeypatch.setattr("fusesoc_firm.lock.digests", lambda: {"naming.py": "edited"})
+    (found,) = locked(capsys)
+    assert found.startswith("tool fusesoc-firm: sha256 is ")
+
+
+@pytest.mark.parametrize("text", ["", "[]", "messages: {}\n", "messages: {}\ncores: {a: 1}\ntools: {}\n", "{"])
+def test_what_is_no_lock_file_is_a_fault(project: Path, capsys: Captured, text: str) -> None:
+    assert "cannot read" in locked(capsys)[0]
+    (project / "top/top.lock").write_text(text)
+    assert "is no lock file" in locked(capsys)[0]

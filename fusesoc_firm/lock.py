@@ -1,0 +1,155 @@
+"""The lock file of a system: which message definitions, cores and tools it uses, so that another build uses the same.
+
+What a core itself consists of is its author's to change and is not locked; all that it takes from elsewhere is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from shutil import which
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.converter.generator import library_sources, order_of_request
+from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.generation import Request
+from fusesoc_firm.message.library import MessageLibrary, libraries
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.own_code import digests
+from fusesoc_firm.project import ProjectCore
+from fusesoc_firm.system.generator import load_requested
+
+Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
+"""By kind (`messages`, `cores`, `tools`) and name: facts by name."""
+
+_PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
+# The programs that targets start, and how each tells its version.
+_PROGRAMS = {
+    "g++": "--version",
+    "ghdl": "--version",
+    "iverilog": "-V",
+    "nextpnr-ecp5": "--version",
+    "nextpnr-himbaechel": "--version",
+    "nextpnr-ice40": "--version",
+    "verilator": "--version",
+    "yosys": "-V",
+}
+_HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
+_WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
+
+
+def lock_path(core: ProjectCore) -> Path:
+    """Where the lock file of a core is: beside its description."""
+    return core.files[0].with_suffix(".lock")
+
+
+def lock_of(core: ProjectCore, depends: Iterable[ProjectCore], requests: Iterable[Request]) -> Lock:
+    """What a core uses now: the cores that it `depends` on, and the messages of its requests for generated cores."""
+    folder = core.files[0].parent
+    messages = {
+        f"{name} ({library.ros.title})": _message(name, library, folder)
+        for request in requests
+        for library, definitions in _definitions(request)
+        for name in definitions
+    }
+    return {
+        "messages": dict(sorted(messages.items())),
+        "cores": {item.vlnv: {"sha256": _digest_of_files(item.files)} for item in depends},
+        "tools": _tools(),
+    }
+
+
+def lock_text(lock: Lock) -> str:
+    """The lock file."""
+    data = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
+    return _HEAD + yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+
+
+def read_lock(path: Path) -> Lock:
+    """A lock file. Raises `InputError` if it cannot be read or is none."""
+    try:
+        data: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+        return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
+    except OSError as error:
+        fail(f"cannot read {path}: {error.strerror}", hint="firm lock writes it")
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
+        fail(f"{path} is no lock file", hint="firm lock writes it anew")
+
+
+def check_lock(locked: Lock, used: Lock) -> None:
+    """Raise `InputError` with everything in which what is used differs from what is locked.
+
+    A program that is installed and not locked is no difference: what was locked did without it.
+    """
+    faults = Diagnostics()
+    for difference in _differences(locked, used):
+        faults.error(difference)
+    faults.raise_if_any()
+
+
+def _differences(locked: Lock, used: Lock) -> Iterator[str]:
+    for kind, word in _WORDS.items():
+        for name in sorted(locked[kind].keys() | used[kind].keys()):
+            was, now = locked[kind].get(name), used[kind].get(name)
+            if now is None:
+                yield f"{word} {name} is locked, but not {'installed' if kind == 'tools' else 'used'}"
+            elif was is not None:
+                for fact in sorted(was.keys() | now.keys()):
+                    if was.get(fact) != now.get(fact):
+                        yield f"{word} {name}: {fact} is {now.get(fact)}, but {was.get(fact)} is locked"
+            elif kind != "tools":
+                yield f"{word} {name} is used, but not locked"
+
+
+def _definitions(request: Request) -> list[tuple[MessageLibrary, Definitions]]:
+    """The library of each message that a request leads to, with all definitions within it."""
+    if request.command == "far":
+        return load_requested(request).definitions()
+    known = libraries(*library_sources(request))
+    return [(known[wanted.ros], wanted.definitions) for wanted in order_of_request(request).messages]
+
+
+def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[str, str]:
+    origin = library.origin(name)
+    # Told from the core's folder, it is the same in every copy of the project.
+    if Path(origin).is_absolute() and Path(origin).resolve().is_relative_to(folder):
+        origin = os.path.relpath(Path(origin).resolve(), folder)
+    return {
+        "source": origin,
+        "sha256": hashlib.sha256(library.content(name)).hexdigest(),
+        "signature": signature(name, library.closure(name)),
+    }
+
+
+def _digest_of_files(files: tuple[Path, ...]) -> str:
+    """The digest of a core's files, by their names from its description on."""
+    return _digest_of({os.path.relpath(path, files[0].parent): _digest(path) for path in files})
+
+
+def _digest_of(found: Mapping[str, str | None]) -> str:
+    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+
+
+def _digest(path: Path) -> str | None:
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+
+
+def _tools() -> dict[str, dict[str, str]]:
+    tools = {name: {"version": version(name)} for name in _PACKAGES}
+    # Between two versions of it, too, it may be another one.
+    tools["fusesoc-firm"]["sha256"] = _digest_of(digests())
+    tools |= {name: {"version": _version(name, option)} for name, option in _PROGRAMS.items() if which(name)}
+    return dict(sorted(tools.items()))
+
+
+def _version(program: str, option: str) -> str:
+    done = subprocess.run([program, option], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    return done.stdout.strip().partition("\n")[0]
