@@ -19,7 +19,6 @@ import yaml
 from fusesoc_firm.diagnostics import Diagnostics, fail, nearest
 from fusesoc_firm.frame.codec import decode, encode
 from fusesoc_firm.frame.defaults import completed
-from fusesoc_firm.host.bags import read_bag
 from fusesoc_firm.host.yaml_message import read_message
 from fusesoc_firm.system.derived import Topic
 from fusesoc_firm.yaml_text import YamlText, is_null, kind, read_yaml
@@ -43,6 +42,9 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     if path.suffix in _YAML_SUFFIXES:
         stimuli = _from_yaml(path, subscribers)
     else:
+        # A call that the store answers does without what the import of rosbags' readers costs.
+        from fusesoc_firm.host.bags import read_bag
+
         stimuli = [Stimulus(*recorded) for recorded in read_bag(path, subscribers)]
     if not stimuli:
         names = ", ".join(subscriber.block for subscriber in subscribers)
