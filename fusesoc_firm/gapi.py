@@ -10,13 +10,13 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.diagnostics import InputError, SourceRef, fail
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
 from fusesoc_firm.netlist.programs import explanation, missing_programs
 from fusesoc_firm.own_code import digests, used_code
@@ -25,8 +25,23 @@ from fusesoc_firm.render import write_if_changed
 from fusesoc_firm.requesting_core import find_requesting_core
 from fusesoc_firm.store import Entry, Files, Key, Made, default_store, request_digest
 
+# The generator of cores that carry messages.
+MESSAGES = "firm_messages"
 # The largest that `math_real.uniform` takes, which draws the stalls.
 _LARGEST_SEED = 2147483562
+
+
+@dataclass(frozen=True)
+class Call:
+    """What FuseSoC says: the new core's name, the requesting core's folder, and the parameters that it gives."""
+
+    vlnv: str
+    files_root: Path
+    given: Mapping[str, Any]
+
+
+MessageCores = Mapping[str, SourceRef | None]
+"""Names of cores that carry messages, each with its place."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +70,18 @@ def _generate_converters(request: Request) -> GeneratedCore:
     from fusesoc_firm.converter import generator
 
     return generator.generate(request)
+
+
+def _message_inputs(request: Request) -> list[Path]:
+    from fusesoc_firm import message_core
+
+    return message_core.inputs(request)
+
+
+def _copy_messages(request: Request) -> GeneratedCore:
+    from fusesoc_firm import message_core
+
+    return message_core.generate(request)
 
 
 def _system_inputs(request: Request) -> list[Path]:
@@ -89,6 +116,10 @@ def _is_simulation(request: Request) -> bool:
 
 _PATHS = Parameter("paths", "list", "folders with message definitions, relative to the core")
 
+_MESSAGES = Parameter(
+    "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
+)
+
 _DISTRO = Parameter("distro", "str", "the ROS distribution whose standard messages are meant")
 
 GENERATORS: Mapping[str, Generator] = {
@@ -112,6 +143,7 @@ GENERATORS: Mapping[str, Generator] = {
                 replaces=("message", "ros", "direction", "width", "include", "exclude"),
             ),
             _PATHS,
+            _MESSAGES,
             _DISTRO,
         ),
         _converter_inputs,
@@ -133,12 +165,21 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
             _PATHS,
+            _MESSAGES,
             _DISTRO,
         ),
         _system_inputs,
         _generate_system,
         _simulator_programs,
         _compiler,
+    ),
+    MESSAGES: Generator(
+        (
+            Parameter("paths", "list", "folders with message definitions, relative to the core", is_required=True),
+            _MESSAGES,
+        ),
+        _message_inputs,
+        _copy_messages,
     ),
 }
 
@@ -152,6 +193,8 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
         request = read_request(command, Path(argv[0]), generators[command].parameters)
         entry = obtain(request, generators[command])
         _write(entry.files)
+        if command == MESSAGES:
+            _mark_run(request)
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
@@ -166,25 +209,49 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     return 0
 
 
-def read_request(command: str, path: Path, parameters: tuple[Parameter, ...]) -> Request:
-    """The request in FuseSoC's file, with checked parameters. Raises `InputError`."""
+def _mark_run(request: Request) -> None:
+    from fusesoc_firm.message_core import mark_run
+
+    mark_run(Path(), find_requesting_core(request.files_root, request.name).name)
+
+
+def read_request(command: str, path: Path, parameters: tuple[Parameter, ...], *, is_this_run: bool = True) -> Request:
+    """The request in FuseSoC's file, with checked parameters; if it `is_this_run`, of the FuseSoC that started us.
+
+    Raises `InputError`.
+    """
     try:
         call: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
         vlnv, files_root = str(call["vlnv"]), Path(call["files_root"])
         given = call.get("parameters") or {}
     except (OSError, yaml.YAMLError, KeyError, TypeError) as error:
         fail(f"{path} is no file of FuseSoC's generator call: {error}")
-    return make_request(command, vlnv, files_root, given, parameters)
+
+    def beside(names: MessageCores) -> tuple[Path, ...]:
+        from fusesoc_firm.message_core import folders_of_run
+
+        return folders_of_run(names, path.absolute().parent.parent, is_this_run=is_this_run)
+
+    return make_request(command, Call(vlnv, files_root, given), parameters, beside)
 
 
 def make_request(
-    command: str, vlnv: str, files_root: Path, given: Mapping[str, Any], parameters: tuple[Parameter, ...]
+    command: str,
+    call: Call,
+    parameters: tuple[Parameter, ...],
+    message_folders: Callable[[MessageCores], tuple[Path, ...]],
 ) -> Request:
-    """A request for the core `vlnv` with checked parameters. Raises `InputError`."""
-    origin = find_requesting_core(files_root, vlnv.split(":")[2])
-    checked = check_parameters(given, parameters, origin)
+    """The request of a call, with checked parameters; `message_folders` finds those of the cores that it names.
+
+    Raises `InputError`.
+    """
+    origin = find_requesting_core(call.files_root, call.vlnv.split(":")[2])
+    checked = check_parameters(call.given, parameters, origin)
     places = {name: origin.items(name) for name, value in checked.items() if isinstance(value, list)}
-    return Request(command, vlnv, files_root, checked, places)
+    request = Request(command, call.vlnv, call.files_root, checked, places)
+    return (
+        replace(request, message_folders=message_folders(names)) if (names := request.listed("messages")) else request
+    )
 
 
 def obtain(request: Request, generator: Generator) -> Entry:
@@ -223,7 +290,12 @@ def _write(files: Files) -> None:
 
 def _name(path: Path, request: Request) -> str:
     """An input's name in the key: the same for copies of a project in different folders."""
-    return str(path.relative_to(request.files_root)) if path.is_relative_to(request.files_root) else str(path)
+    for root in (request.files_root, *request.message_folders):
+        if path.is_relative_to(root):
+            number = request.message_folders.index(root) if root != request.files_root else None
+            name = str(path.relative_to(root))
+            return name if number is None else f"messages/{number}/{name}"
+    return str(path)
 
 
 def _content(path: Path) -> bytes | None:

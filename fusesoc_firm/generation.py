@@ -22,6 +22,7 @@ class Request:
     """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's.
 
     `places` tells where the items of a list parameter stand, as far as that is known; they are no part of the request.
+    `message_folders` are those of the cores that it names as carriers of messages.
     """
 
     command: str
@@ -29,6 +30,7 @@ class Request:
     files_root: Path
     parameters: Mapping[str, Plain]
     places: Mapping[str, Sequence[SourceRef]] = field(default_factory=dict, compare=False)
+    message_folders: tuple[Path, ...] = ()
 
     @property
     def name(self) -> str:

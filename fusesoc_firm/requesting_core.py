@@ -17,10 +17,14 @@ from fusesoc_firm.yaml_text import YamlText, read_yaml
 
 @dataclass(frozen=True)
 class RequestingCore:
-    """The entry under `generate` that asks for a core; `key` and `value` are None where it was not found."""
+    """The entry under `generate` that asks for a core; `key` and `value` are None where it was not found.
+
+    `name` is the requesting core's, as `vendor:library:name`, "" where it was not found.
+    """
 
     text: YamlText | None = None
     entry: tuple[yaml.Node, yaml.Node] | None = None
+    name: str = ""
 
     def instance(self) -> SourceRef | None:
         """The place of the instance's name."""
@@ -59,7 +63,8 @@ def find_requesting_core(folder: Path, new_core: str) -> RequestingCore:
         except InputError:
             continue
         if entry := _entry(text.root, new_core):
-            return RequestingCore(text, entry)
+            name = _item(text.root, "name")
+            return RequestingCore(text, entry, ":".join(str(name[1].value).split(":")[:3]) if name else "")
     return RequestingCore()
 
 

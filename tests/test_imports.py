@@ -40,6 +40,7 @@ ALLOWED: dict[str, set[str]] = {
     "netlist": set(),
     "render": set(),
     "own_code": {"render"},
+    "message_core": _MESSAGE | {"generation"},
     "why": _SYSTEM,
     "lock": _SYSTEM | {"own_code", "project"},
     "project": {"diagnostics", "render"},

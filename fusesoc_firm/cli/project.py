@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import command, write
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.diagnostics import InputError, fail
 
 if TYPE_CHECKING:
+    from fusesoc_firm.gapi import MessageCores
     from fusesoc_firm.generation import Request
     from fusesoc_firm.project import Instance, ProjectCore
 
@@ -77,13 +78,15 @@ def _list_affected(arguments: argparse.Namespace) -> None:
 
 
 def _lock(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.gapi import MESSAGES
     from fusesoc_firm.lock import check_lock, lock_of, lock_path, lock_text, read_lock
     from fusesoc_firm.project import dependencies
 
     core, depends = dependencies(arguments.core)
     path = lock_path(core)
     locked = read_lock(path) if arguments.locked else None
-    requests = [request for instance in core.instances if (request := _request(instance))]
+    wanted = [instance for instance in core.instances if instance.generator != MESSAGES]
+    requests = [request for instance in wanted if (request := _request(instance))]
     used = lock_of(core, depends, requests)
     if locked is None:
         write(path, lock_text(used))
@@ -127,12 +130,30 @@ def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
 
 def _request(instance: Instance) -> Request | None:
     """The request that FuseSoC would make; None for a generator that is not ours."""
-    from fusesoc_firm.gapi import GENERATORS, make_request
+    from fusesoc_firm.gapi import GENERATORS, Call, make_request
 
     if instance.generator not in GENERATORS:
         return None
     known = GENERATORS[instance.generator].parameters
-    return make_request(instance.generator, instance.vlnv, instance.files_root, instance.parameters, known)
+    call = Call(instance.vlnv, instance.files_root, instance.parameters)
+    return make_request(instance.generator, call, known, _message_folders)
+
+
+def _message_folders(names: MessageCores) -> tuple[Path, ...]:
+    """The folders of cores that carry messages, where these lie: there is no run that copies them."""
+    from fusesoc_firm.gapi import MESSAGES
+    from fusesoc_firm.message_core import folders
+    from fusesoc_firm.project import project_cores
+
+    found: list[Path] = []
+    cores = {name: core for core in project_cores() for name in core.names}
+    for name, source in names.items():
+        core = cores.get(":".join(name.split(":")[:3]))
+        requests = [_request(item) for item in core.instances if item.generator == MESSAGES] if core else []
+        if not requests:
+            fail(f"'{name}' is no core with messages that FuseSoC knows here", source)
+        found += [folder for request in requests if request for folder in folders(request)]
+    return tuple(found)
 
 
 def _inputs(request: Request) -> list[Path]:

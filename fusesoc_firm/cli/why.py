@@ -34,7 +34,7 @@ def _tell_why(arguments: argparse.Namespace) -> None:
     path, number = _split(arguments.place)
     call, name = call_file(path)
     command_ = _generator(call)
-    request = read_request(command_, call, GENERATORS[command_].parameters)
+    request = read_request(command_, call, GENERATORS[command_].parameters, is_this_run=False)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -31,7 +31,8 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
-    return [request.files_root / path for path in paths], os.environ, None if distro is None else str(distro)
+    folders = [*(request.files_root / path for path in paths), *request.message_folders]
+    return folders, os.environ, None if distro is None else str(distro)
 
 
 def inputs(request: Request) -> list[Path]:

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.gapi import GENERATORS, make_request
+from fusesoc_firm.gapi import GENERATORS, Call, make_request
 from fusesoc_firm.generation import as_files
 from fusesoc_firm.render import TEMPLATES, Rendering, recorded, render, traced_lines
 
@@ -19,13 +19,17 @@ APPLICATIONS = ("quat2euler", "image_pipeline", "mobile_robot")
 Captured = pytest.CaptureFixture[str]
 
 
+def no_messages(_: object) -> tuple[Path, ...]:
+    return ()
+
+
 def build(folder: Path, application: str = "quat2euler", **parameters: object) -> Path:
     """A build as FuseSoC leaves it: the generated core and its copy, which is returned."""
     given = {"spec": f"{application}.yaml"} | parameters
     generator = "far" if "spec" in parameters or not parameters else "firm"
     given = given if generator == "far" else parameters
     root, vlnv = SPECS / application, f"robot:sys:{application}-system:0.1.0"
-    request = make_request(generator, vlnv, root, given, GENERATORS[generator].parameters)
+    request = make_request(generator, Call(vlnv, root, given), GENERATORS[generator].parameters, no_messages)
     made = folder / "generator_cache" / f"robot_sys_{application}-system_0.1.0-1234"
     for name, content in as_files(GENERATORS[generator].generate(request), request).items():
         (made / name).parent.mkdir(parents=True, exist_ok=True)
@@ -56,13 +60,8 @@ def why(capsys: Captured, path: Path, text: str) -> dict[str, list[str]]:
 @pytest.mark.parametrize("application", APPLICATIONS)
 def test_every_line_is_that_of_the_template_named(application: str) -> None:
     """The rest of a template's line, without its tags, stands on the line that is made of it."""
-    request = make_request(
-        "far",
-        f"a:b:{application}-x:1",
-        SPECS / application,
-        {"spec": f"{application}.yaml"},
-        GENERATORS["far"].parameters,
-    )
+    call = Call(f"a:b:{application}-x:1", SPECS / application, {"spec": f"{application}.yaml"})
+    request = make_request("far", call, GENERATORS["far"].parameters, no_messages)
     with recorded() as renderings:
         GENERATORS["far"].generate(request)
     for text, rendering in renderings.items():
