@@ -221,7 +221,9 @@ class Store:
     def _keep(self, key: Key, made: Made) -> None:
         names = sorted(made.used)
         full = key.with_code(names)
-        assert full is not None, "what was used is among our own files"
+        # One of our own files is no more, or is new.
+        if full is None:
+            return
         try:
             _write(self._path(full, _ENTRY), _entry_bytes(key.about, made.files))
             _write(self._path(key.request, _USES), json.dumps(names).encode())

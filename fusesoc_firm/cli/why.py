@@ -65,7 +65,12 @@ def _generator(call: Path) -> str:
     """The generator that a call is for: FuseSoC does not write it down."""
     import yaml
 
-    return "far" if "spec" in (yaml.safe_load(call.read_text(encoding="utf-8")).get("parameters") or {}) else "firm"
+    from fusesoc_firm.gapi import MESSAGES
+
+    given = yaml.safe_load(call.read_text(encoding="utf-8")).get("parameters") or {}
+    if "spec" in given:
+        return "far"
+    return "firm" if {"message", "config"} & given.keys() else MESSAGES
 
 
 def _names(request: Request) -> Names:

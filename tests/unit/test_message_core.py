@@ -105,6 +105,13 @@ def test_messages_of_a_core_and_of_those_behind_it_are_found(project: Project) -
     assert "elbow_milliradians : out std_logic_vector(31 downto 0)" in " ".join(project.converter().split())
 
 
+def test_a_copied_definition_is_of_no_template(project: Project, capsys: pytest.CaptureFixture[str]) -> None:
+    project.origins()
+    (path,) = (project.root.parent / "build").rglob("generator_cache/me_msgs_base*/base_msgs/msg/Angle.msg")
+    assert main(["why", str(path)]) == 1
+    assert "is of no template: it is data, or a copy of a source" in capsys.readouterr().err
+
+
 def test_a_core_that_is_not_depended_on_has_no_messages_here(project: Project) -> None:
     assert project.set_up().returncode == 0
     # Those of the run before are still there.

@@ -124,6 +124,12 @@ def test_what_was_edited_while_it_was_read_is_not_kept(tmp_path: Path, after: Ke
     assert stored(tmp_path) == {}
 
 
+def test_what_was_made_with_a_file_that_is_no_more_is_not_kept(tmp_path: Path) -> None:
+    made = Made(FILES, [*USED, "gone.py"])
+    assert Store(tmp_path, LARGE).obtain(lambda: Key(REQUEST, CODE), lambda: made) == Entry(FILES, False)
+    assert stored(tmp_path) == {}
+
+
 def test_a_store_that_cannot_be_written_is_done_without(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     # A file in the way, since the rights of a folder do not stop root.
     (tmp_path / "file").write_text("")
