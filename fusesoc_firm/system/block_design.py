@@ -27,7 +27,9 @@ PACKAGE_TEMPLATE = "hls/package.tcl"
 _LENGTH_BITS = 26
 _ADDRESS_BITS = 32
 _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
-# Clocks and resets of cells at the system's clock, beside the processor's.
+# What Vivado would find out by itself, of interfaces that are connected whole and of pins whose polarity is known.
+_FOUND_OUT = {"c_s_axis_s2mm_tdata_width", "C_AUX_RESET_HIGH"}
+# Clock pins of cells, beside the processor's.
 _CLOCK_PINS = (
     *(f"dma/{name}_aclk" for name in ("s_axi_lite", "m_axi_sg", "m_axi_mm2s", "m_axi_s2mm")),
     *("control/aclk", "memory/aclk", "reset/slowest_sync_clk", "system_reset/slowest_sync_clk", "system/clk"),
@@ -57,6 +59,7 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
                 "cell": cell,
                 "ip": ip,
                 "meaning": meaning,
+                "given": [{"name": name, "cell": cell} for name, _ in properties if name in _FOUND_OUT],
                 "has_properties": bool(properties),
                 "properties": _properties(properties),
             }
@@ -93,8 +96,6 @@ def _cells(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, s
             ("c_m_axi_mm2s_data_width", data_width),
             ("c_m_axis_mm2s_tdata_width", system.width),
             ("c_m_axi_s2mm_data_width", data_width),
-            # Otherwise Vivado would take it from an interface, and this one is connected by its pins.
-            ("c_s_axis_s2mm_tdata_width.VALUE_SRC", "USER"),
             ("c_s_axis_s2mm_tdata_width", system.width),
         ],
     )
