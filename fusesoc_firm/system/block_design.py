@@ -15,8 +15,9 @@ from fusesoc_firm.system.board import Board, board_entity
 from fusesoc_firm.system.configuration import pin_groups
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import function_name, kernel_entity
-from fusesoc_firm.system.names import Names, reset_label, seen_reset
+from fusesoc_firm.system.names import Names
 from fusesoc_firm.system.processor import PROCESSORS, Processor
+from fusesoc_firm.system.timing_constraints import period
 
 Configuration = dict[str, Any]
 
@@ -169,28 +170,6 @@ def _pins(system: DerivedSystem) -> list[Configuration]:
     ]
 
 
-def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Configuration:
-    """The configuration of timing constraints: what is between clocks (docs/clocks.md)."""
-    clocks = [("clk", clock), *((item.port, item.frequency) for item in system.clocks)]
-    if board.processor:
-        name = PROCESSORS[str(board.processor)].timing_clock
-        named = [(name.format(number), port, frequency) for number, (port, frequency) in enumerate(clocks)]
-    else:
-        named = [(port, port, frequency) for port, frequency in clocks]
-    resets = [reset for item in system.clocks for reset in (item.reset, seen_reset(item))]
-    return {
-        "description": str(board.description),
-        "clocks": [{"name": name, "port": port, "period": _period(frequency)} for name, port, frequency in named],
-        "pairs": [
-            {"source": source, "sink": sink, "period": _period(max(first, second))}
-            for source, _, first in named
-            for sink, _, second in named
-            if source != sink
-        ],
-        "resets": [{"label": reset_label(reset)} for reset in resets],
-    }
-
-
 def package_configuration(
     type_: AcceleratorType, sources: Sequence[str], system: DerivedSystem, board: Board, clock: Fraction
 ) -> Configuration:
@@ -200,14 +179,9 @@ def package_configuration(
     return {
         "function": function_name(type_),
         "part": str(board.part),
-        "period": _period(fastest),
+        "period": period(fastest),
         "sources": [{"file": source} for source in sources],
     }
-
-
-def _period(frequency: Fraction) -> str:
-    """In ns."""
-    return f"{float(10**9 / frequency):.3f}"
 
 
 def _properties(properties: Iterable[tuple[str, object]]) -> list[Configuration]:

@@ -26,7 +26,6 @@ from fusesoc_firm.system.block_design import (
     BLOCK_DESIGN_TEMPLATE,
     PACKAGE_TEMPLATE,
     block_design_configuration,
-    clocks_configuration,
     kernels,
     package_configuration,
 )
@@ -47,6 +46,7 @@ from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, function_name, wrapper_configuration
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
 from fusesoc_firm.system.timing import frequency
+from fusesoc_firm.system.timing_constraints import clocks_configuration
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {

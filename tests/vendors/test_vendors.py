@@ -327,8 +327,8 @@ def kernel(tmp_path_factory: pytest.TempPathFactory) -> Project:
         ),
         (
             KERNEL_DESIGN,
-            "_hls/solution/impl/ip]]",
-            "/solution/impl/ip]]",
+            "_hls/solution/impl/ip]\n",
+            "/solution/impl/ip]\n",
             "the catalog has no",
         ),
         (
