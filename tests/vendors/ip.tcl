@@ -136,7 +136,7 @@ ip proc_sys_reset {
   pin peripheral_aresetn O reset_n 1
 }
 
-# UG1037 and UG994: the utility xlconcat, 2.1.
+# PB041 (Concat, 2.1).
 ip xlconcat {
   property NUM_PORTS 2 {1 .. 32}
   for {set number 0} {$number < 32} {incr number} {
