@@ -149,12 +149,12 @@ def on_board(specification: Specification, board: Board) -> Specification:
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
     """Raise `InputError` for what a system has and a board's file cannot say."""
-    faults = Diagnostics()
+    clocks = 1 + len(system.clocks)
+    if board.processor and clocks > MOST_CLOCKS:
+        fail(f"board '{board.name}' makes {MOST_CLOCKS} clocks, clk included; the system has {clocks}")
     if not board.is_linked:
-        if board.processor and len(system.clocks) >= MOST_CLOCKS:
-            message = f"board '{board.name}' makes {MOST_CLOCKS} clocks, clk included; the system has"
-            fail(f"{message} {len(system.clocks) + 1}")
         return
+    faults = Diagnostics()
     for clock in system.clocks:
         faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="a board has one clock, clk")
     for block in system.accelerators:
