@@ -1,14 +1,19 @@
 # What the IP of Vivado is like that block designs use: pins, interfaces and properties.
 #
-# Each `ip NAME {...}` lists, with its source:
+# Each `ip NAME {...}` lists, with its source, what is used here and what may be mistaken for it. Where a guide does not list
+# the names of parameters and pins, they are those of scripts that Vivado writes itself (`write_bd_tcl`) in public projects.
+#
 #   property NAME DEFAULT LEGAL              LEGAL is a list of values, or a range of numbers as {LOW .. HIGH}
 #   pin NAME I|O KIND WIDTH ?CONDITION?      KIND is data, clock or reset_n; a width may be {LOW .. HIGH}
 #   interface NAME master|slave ?CONDITION?  memory-mapped AXI of any kind
 #   space NAME, segment NAME                 of addresses: what a master sees, what a slave gives
-# Widths and conditions are expressions of properties. Input clocks and resets have to be connected unless KIND ends with
-# '?'; an interface has to be if it is there.
+#   rule CONDITION                           between properties
+#   automation SETTINGS                      of its rule of block automation
+#
+# Widths and conditions are expressions of properties. Input clocks and resets have to be connected unless KIND ends
+# with '?'; an interface has to be if it is there.
 
-# PG082 (Processing System 7, 5.5), with the names of parameters as in the presets of boards; UG585, tables 2-7 and 2-12.
+# PG082 (Processing System 7, 5.5) and UG585; names as in presets of boards. One master is on unless it is switched off.
 ip processing_system7 {
   foreach number {0 1 2 3} {
     property PCW_EN_CLK${number}_PORT [expr {$number == 0}] {0 1}
@@ -33,7 +38,8 @@ ip processing_system7 {
   automation {make_external {"FIXED_IO, DDR"} apply_board_preset {0 1} Master {Disable} Slave {Disable}}
 }
 
-# PG201 (Zynq UltraScale+ MPSoC Processing System, 3.5): clocks, PS-PL interfaces; the preset of the ZCU104 switches on GP0 and GP1.
+# PG201 (Zynq UltraScale+ MPSoC Processing System, 3.5) and UG1085. Two masters are on unless they are switched off. The
+# limit of frequencies is only there to find a wrong unit.
 ip zynq_ultra_ps_e {
   foreach number {0 1 2 3} {
     property PSU__FPGA_PL${number}_ENABLE [expr {$number == 0}] {0 1}
@@ -127,7 +133,7 @@ ip proc_sys_reset {
   pin slowest_sync_clk I clock 1
   # Vivado sets C_EXT_RESET_HIGH by what is connected.
   pin ext_reset_in I reset_n 1
-  # Of either polarity, by its parameter; the pin is of the one that is not connected by accident.
+  # Its polarity is a parameter. What is connected here is low, so the pin is there for one that is low.
   pin aux_reset_in I reset_n? 1 {!$C_AUX_RESET_HIGH}
   pin mb_reset O data 1
   pin bus_struct_reset O data 1

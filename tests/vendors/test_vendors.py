@@ -276,6 +276,8 @@ DESIGN = "robot_zynq7000.bd"
         ("validate_bd_design\n", "", "the design is not validated"),
         (f"generate_target all [get_files {DESIGN}]\n", "", "its files are not generated"),
         (f"make_wrapper -files [get_files {DESIGN}] -import -top", "", "there is no top level robot_zynq7000_wrapper"),
+        ("[get_files zynq7000.xdc]", "[get_files zcu104.xdc]", "the project has no file zcu104.xdc"),
+        ("used_in_synthesis false", "used_in_syntheses false", "unknown property used_in_syntheses of zynq7000.xdc"),
         ("target_language", "language", "unknown property language of current_project"),
     ],
 )

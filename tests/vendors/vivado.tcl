@@ -37,7 +37,8 @@ set is_ordered 0
 set project_properties {
   current_project {part board_part target_language source_mgmt_mode ip_repo_paths}
   sources_1 {include_dirs top}
-  bd {synth_checkpoint_mode}
+  .bd {synth_checkpoint_mode}
+  .xdc {used_in_synthesis}
 }
 set board_parts {tul.com.tw:pynq-z2:part0:1.0 xc7z020clg400-1 xilinx.com:zcu104:part0:1.1 xczu7ev-ffvc1156-2-e}
 
@@ -50,7 +51,12 @@ proc get_filesets {name} {
 }
 proc update_compile_order {args} { lassign [options {} {-fileset} $args]; set ::is_ordered 1 }
 proc read_verilog {args} { foreach name [lindex [options {-sv} {} $args] 1] { existing $name } }
-proc read_xdc {args} { foreach name [lindex [options {-unmanaged} {} $args] 1] { lappend ::constraints [existing $name] } }
+proc read_xdc {args} {
+  foreach name [lindex [options {-unmanaged} {} $args] 1] {
+    lappend ::constraints [existing $name]
+    lappend ::files [file tail $name]
+  }
+}
 
 proc get_files {name} {
   if {$name ni $::files} { wrong "the project has no file $name" }
@@ -62,7 +68,9 @@ proc generate_target {what name} {
 }
 
 proc get_property {name object} {
-  if {$object ne "current_project" || $name ni [dict get $::project_properties $object]} { wrong "unknown property $name" }
+  if {$object ne "current_project" || $name ni [dict get $::project_properties $object]} {
+    wrong "unknown property $name of $object"
+  }
   expr {[dict exists $::project $name] ? [dict get $::project $name] : ""}
 }
 proc set_property {args} {
@@ -78,7 +86,7 @@ proc set_property {args} {
 }
 proc set_one {name value object} {
   if {[dict exists $::cells $object]} { return [configure $object $name $value] }
-  set kind [expr {[string match *.bd $object] ? "bd" : $object}]
+  set kind [expr {$object in $::files ? [file extension $object] : $object}]
   if {![dict exists $::project_properties $kind] || $name ni [dict get $::project_properties $kind]} {
     wrong "unknown property $name of $object"
   }
@@ -325,7 +333,9 @@ proc get_bd_addr_spaces {path} { address space $path }
 proc get_bd_addr_segs {path} { address segment $path }
 proc address {what path} {
   regexp {^(\w+)/(.*)$} $path all cell name
-  if {![dict exists $::catalog [dict get $::cells [get_bd_cells $cell] ip] $what $name]} { wrong "there is no $what $path" }
+  if {![dict exists $::catalog [dict get $::cells [get_bd_cells $cell] ip] $what $name]} {
+    wrong "there is no $what $path"
+  }
   return $path
 }
 proc assign_bd_address {args} {
@@ -333,7 +343,7 @@ proc assign_bd_address {args} {
   if {$segment eq ""} {
     lappend ::assigned rest
   } else {
-    # Of the general-purpose master: UG585, table 4-1, and UG1085, table 10-1.
+    # What goes to the masters that are used here: the maps of addresses in UG585 and UG1085.
     set windows {processing_system7 {0x40000000 .. 0x7FFFFFFF} zynq_ultra_ps_e {0xA0000000 .. 0xAFFFFFFF}}
     set cell [lindex [split [dict get $given -target_address_space] /] 0]
     set window [dict get $windows [dict get $::cells $cell ip]]
@@ -434,7 +444,7 @@ or_leave {
   check_instances
   foreach name $constraints { source $name }
 }
-dict for {cell fact} $cells { puts "cell $cell [expr {[dict exists $fact ip] ? [dict get $fact ip] : [dict get $fact entity]}]" }
+dict for {cell fact} $cells { puts "cell $cell [dict get $fact [lindex [dict keys $fact] 0]]" }
 dict for {sink driver} $nets { puts "net $driver $sink [lindex [fact_of $driver] 2]" }
 dict for {port fact} $ports { puts "port $port [lindex $fact 2]" }
 foreach line $timing { puts $line }
