@@ -1,7 +1,7 @@
 # What the IP of Vivado is like that block designs use: pins, interfaces and properties.
 #
-# Each `ip NAME {...}` lists, with its source, what is used here and what may be mistaken for it. Where a guide does not list
-# the names of parameters and pins, they are those of scripts that Vivado writes itself (`write_bd_tcl`) in public projects.
+# Each `ip NAME {...}` lists, with its source, what is used here and what may be mistaken for it. Where a guide does not
+# list the names of parameters and pins, they are those of scripts of public projects, many of them written by Vivado.
 #
 #   property NAME DEFAULT LEGAL              LEGAL is a list of values, or a range of numbers as {LOW .. HIGH}
 #   pin NAME I|O KIND WIDTH ?CONDITION?      KIND is data, clock or reset_n; a width may be {LOW .. HIGH}
