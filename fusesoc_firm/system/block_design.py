@@ -37,11 +37,6 @@ _CLOCK_PINS = (
 )
 
 
-def kernels(system: DerivedSystem) -> list[AcceleratorType]:
-    """The accelerators that an HLS tool has to make."""
-    return [type_ for type_ in system.accelerator_types if type_.accelerator.type == "HLS"]
-
-
 def block_design_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Configuration:
     """The configuration of the block design; `clock` is the frequency of clk in Hz."""
     processor = PROCESSORS[str(board.processor)]
@@ -53,7 +48,7 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
         "board": board.name,
         "description": str(board.description),
         "has_clocks": bool(system.clocks),
-        "kernels": [{"function": function_name(type_), "kernel": kernel_entity(type_)} for type_ in kernels(system)],
+        "kernels": [{"function": function_name(type_), "kernel": kernel_entity(type_)} for type_ in system.kernels],
         "ip": processor.ip,
         "automation": " ".join(filter(None, (processor.automation, preset))),
         "processor_properties": _properties(_processor_properties(processor, system, clock)),

@@ -87,7 +87,7 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
 
 
 def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool) -> str:
-    has_kernels = any(item.accelerator.type == "HLS" for item in system.accelerator_types)
+    has_kernels = bool(system.kernels)
     return render(
         TARGETS_TEMPLATE,
         {

@@ -26,7 +26,6 @@ from fusesoc_firm.system.block_design import (
     BLOCK_DESIGN_TEMPLATE,
     PACKAGE_TEMPLATE,
     block_design_configuration,
-    kernels,
     package_configuration,
 )
 from fusesoc_firm.system.board import (
@@ -62,12 +61,13 @@ _INCLUDE_SUFFIXES = (".vh", ".svh")
 
 @dataclass(frozen=True)
 class LoadedSystem:
-    """A specification, the folder its paths are relative to, and the system derived from it."""
+    """A specification, the folder its paths are relative to, the board if one is given, and the system derived."""
 
     specification: Specification
     folder: Path
     libraries: dict[RosVersion, MessageLibrary]
     system: DerivedSystem
+    board: Board | None = None
 
     def inputs(self) -> list[Path]:
         """The accelerators' sources and the files of all messages."""
@@ -104,7 +104,7 @@ def load_system(
     if board:
         specification = on_board(specification, board)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
-    return LoadedSystem(specification, path.parent, libraries, system)
+    return LoadedSystem(specification, path.parent, libraries, system, board)
 
 
 def load_requested(request: Request) -> LoadedSystem:
@@ -173,10 +173,9 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for frame, suffix in system.computed_lengths.items():
         configuration = payload_length_configuration(frame, suffix)
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
-    for type_ in system.accelerator_types:
-        if type_.accelerator.type == "HLS":
-            configuration = wrapper_configuration(type_)
-            yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
+    for type_ in system.kernels:
+        configuration = wrapper_configuration(type_)
+        yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
     yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
 
 
@@ -189,8 +188,8 @@ def generate(request: Request) -> GeneratedCore:
     files = {path: file for path, file in made.items() if path != top}
     files |= _sources(system.accelerator_types, loaded.folder)
     files[top] = made[top]
-    if board := _board(request):
-        files |= _board_files(loaded, board)
+    if loaded.board:
+        files |= _board_files(loaded, loaded.board)
     return GeneratedCore(f"System {system.name}", files)
 
 
@@ -215,7 +214,7 @@ def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedF
     """The block design, and what it takes to make IP of C++."""
     system, clock = loaded.system, _clock(loaded)
     files: dict[str, GeneratedFile] = {}
-    for type_ in kernels(system):
+    for type_ in system.kernels:
         paths = {source_name(type_.accelerator, source): loaded.folder / source for source in type_.accelerator.sources}
         files |= {name: GeneratedFile(path.read_bytes(), "user") for name, path in paths.items()}
         script = render(PACKAGE_TEMPLATE, package_configuration(type_, list(paths), system, board, clock))
