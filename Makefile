@@ -47,7 +47,7 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED
 	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator yosys dot:graphviz
+test: TOOLS = iverilog verilator yosys dot:graphviz tclsh:tcl
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 

@@ -15,8 +15,8 @@ from fusesoc_firm.system.derived import AcceleratorType
 from fusesoc_firm.system.hls import (
     KERNEL_TEMPLATE,
     SHIM_TEMPLATE,
-    function_name,
     kernel_configuration,
+    kernel_entity,
     library_name,
     prototype,
 )
@@ -58,7 +58,7 @@ def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, Genera
     library = library_name(accelerator)
     shim = render(SHIM_TEMPLATE, configuration)
     return {
-        f"{function_name(accelerator)}.vhd": GeneratedFile(render(KERNEL_TEMPLATE, configuration), "vhdlSource-93"),
+        f"{kernel_entity(accelerator)}.vhd": GeneratedFile(render(KERNEL_TEMPLATE, configuration), "vhdlSource-93"),
         library: GeneratedFile(_compile(accelerator, folder, shim), "user", copyto=library),
     }
 

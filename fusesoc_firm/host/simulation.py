@@ -48,9 +48,8 @@ def generate(request: Request) -> GeneratedCore:
     answers = responses(_path(request, "model"), stimuli, answered(system))
     found = traffic(system, loaded.folder, stimuli, answers)
     files: dict[str, GeneratedFile] = {}
-    for accelerator in system.accelerator_types:
-        if accelerator.accelerator.type == "HLS":
-            files |= kernel_files(accelerator, loaded.folder)
+    for kernel in system.kernels:
+        files |= kernel_files(kernel, loaded.folder)
     seed, stall_percent = request.parameters["seed"], request.parameters["stall_percent"]
     assert isinstance(seed, int)
     assert isinstance(stall_percent, int)

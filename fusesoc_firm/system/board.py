@@ -1,6 +1,7 @@
-"""A board without a processor: what its FPGA is connected to, and the top level that fits a system on it.
+"""A board: what its FPGA is connected to, and the top level that fits a system on it.
 
-A board is one YAML file. Those of the package lie in `fusesoc_firm/boards`; a core names its own by a path.
+A board is one YAML file. Those of the package lie in `fusesoc_firm/boards`; a core names its own by a path. One without
+a processor has pins, and a link to the host. One with a processor has the system in a block design (`block_design`).
 """
 
 from __future__ import annotations
@@ -14,15 +15,20 @@ from fusesoc_firm.diagnostics import Diagnostics, fail, nearest
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import DerivedSystem, LinkKind
 from fusesoc_firm.system.interconnect import LINK_PINS
-from fusesoc_firm.system.specification import LINKS, Specification
+from fusesoc_firm.system.processor import MOST_CLOCKS, PROCESSORS
+from fusesoc_firm.system.specification import AXI_STREAM, LINKS, Specification
 from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
 FOLDER = Path(__file__).resolve().parents[1] / "boards"
 BOARD_TEMPLATE = "vhdl/board.vhd"
 
-# Edalize's flows, each with the form of its constraints: their template, FuseSoC's file type, the ending.
+# Edalize's flows for boards with pins, each with the form of its constraints: their template, FuseSoC's file type.
 FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
+# Tools that take the system with its streams: Vivado beside a processor, Quartus as it is.
+VIVADO, QUARTUS = "vivado", "quartus"
+# What they have to know of a board.
+_NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
 _CLOCK = "clk"
 _PORTS = (
     _CLOCK,
@@ -47,16 +53,26 @@ class Board(Section):
     """The whole file."""
 
     description: Text = key("maker, board and FPGA", is_required=True)
-    flow: Text = key("the flow of Edalize that builds for it", is_required=True, choices=tuple(FLOWS))
+    flow: Text = key("what of Edalize builds for it", is_required=True, choices=(*FLOWS, *_NEEDED))
     clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
-    interconnect: Text = key("how the host is connected", is_required=True, choices=LINKS)
+    interconnect: Text = key("how the host is connected", is_required=True, choices=(AXI_STREAM, *LINKS))
+    part: Text | None = key("the FPGA as Vivado calls it")
+    board_part: Text | None = key(
+        "the board as Vivado calls it, if Vivado is to set up the processor", name="boardPart"
+    )
+    processor: Text | None = key("the FPGA's processor", choices=tuple(PROCESSORS))
     standard: Text | None = key("electrical standard of the pins, where the flow wants one")
     device: Text | None = key("the device, for flows that ask for one")
     device_family: Text | None = key("its family, for flows that ask for one", name="deviceFamily")
     synth_options: tuple[Text, ...] = key("options of Yosys' synth command", name="synthOptions", form="texts")
     nextpnr_options: tuple[Text, ...] = key("options of nextpnr", name="nextpnrOptions", form="texts")
-    pins: tuple[BoardPin, ...] = key("the pins that are used", form="sections", section=BoardPin, is_required=True)
+    pins: tuple[BoardPin, ...] = key("the pins that are used", form="sections", section=BoardPin)
     name: str = ""
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether a link of bytes leads to the host."""
+        return self.flow in FLOWS
 
 
 def boards() -> tuple[str, ...]:
@@ -78,33 +94,66 @@ def read_board(name: str, folder: Path) -> Board:
     text = read_yaml(path, name if path.parent != FOLDER else path.name, faults)
     if text.root is None or is_null(text.root):
         faults.raise_if_any()
-        fail(f"{name} is empty; a board needs the keys 'description', 'flow', 'clock', 'interconnect' and 'pins'")
+        fail(f"{name} is empty; a board needs the keys 'description', 'flow', 'clock' and 'interconnect'")
     board = read(Board, text.root, text, faults, "a board")
-    if board.is_sound:
+    if board.is_sound and board.is_linked:
         _check_pins(board, faults)
+    elif board.is_sound:
+        _check_streams(board, faults)
     faults.raise_if_any()
     return replace(board, name=identifier(path.stem).lower())
 
 
 def _check_pins(board: Board, faults: Diagnostics) -> None:
+    if board.interconnect not in LINKS:
+        faults.error(
+            f"flow '{board.flow}' has no processor to take streams", board.interconnect.source, nearest("", LINKS)
+        )
+        return
     seen: dict[str, Text] = {}
     for pin in board.pins:
         twin = seen.setdefault(pin.port, pin.port)
         if twin is not pin.port:
             faults.error(f"port '{pin.port}' has a pin already, at {twin.source}", pin.port.source)
+    source = board.pins[-1].source if board.pins else board.source
     needed = {_CLOCK, *(name for name, _, _ in LINK_PINS[LinkKind(board.interconnect)])} - _OPTIONAL
     for port in sorted(needed - seen.keys()):
-        faults.error(f"the board has no pin for '{port}'", board.pins[-1].source, f"'{board.interconnect}' needs it")
+        faults.error(f"the board has no pin for '{port}'", source, f"'{board.interconnect}' needs it")
+
+
+def _check_streams(board: Board, faults: Diagnostics) -> None:
+    given = {
+        "part": board.part,
+        "processor": board.processor,
+        "device": board.device,
+        "deviceFamily": board.device_family,
+    }
+    for name in _NEEDED[board.flow]:
+        if given[name] is None:
+            faults.error(f"a board of flow '{board.flow}' needs the key '{name}'", board.source)
+    if board.interconnect != AXI_STREAM:
+        faults.error(f"flow '{board.flow}' takes streams", board.interconnect.source, f"legal here: {AXI_STREAM}")
+    if board.pins:
+        message = f"flow '{board.flow}' takes no pins"
+        faults.error(message, board.place("pins"), "constraints of your own belong into a fileset of the core")
 
 
 def on_board(specification: Specification, board: Board) -> Specification:
-    """The specification of the system on the board, whose clock and interconnect it has."""
-    project = replace(specification.project, interconnect=board.interconnect, clock=board.clock)
-    return replace(specification, project=project)
+    """The specification of the system on the board, whose interconnect it has.
+
+    The pin of a board without a processor decides what clk is; a PLL makes whatever the specification wants.
+    """
+    clock = board.clock if board.is_linked else specification.project.clock or board.clock
+    return replace(specification, project=replace(specification.project, interconnect=board.interconnect, clock=clock))
 
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
     """Raise `InputError` for what a system has and a board's file cannot say."""
+    clocks = 1 + len(system.clocks)
+    if board.processor and clocks > MOST_CLOCKS:
+        fail(f"board '{board.name}' makes {MOST_CLOCKS} clocks, clk included; the system has {clocks}")
+    if not board.is_linked:
+        return
     faults = Diagnostics()
     for clock in system.clocks:
         faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="a board has one clock, clk")
@@ -116,8 +165,8 @@ def check_fits(system: DerivedSystem, board: Board) -> None:
 
 
 def board_entity(system: DerivedSystem, board: Board) -> str:
-    """The top level of a system on a board."""
-    return f"{system.name}_{board.name}"
+    """The top level of a system on a board; beside a processor, the block design."""
+    return system.entity if board.flow == QUARTUS else f"{system.name}_{board.name}"
 
 
 def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:

@@ -157,6 +157,7 @@ def pin_groups(names: Names, system: DerivedSystem) -> list[Configuration]:
                 "name": formal.ljust(column),
                 "direction": str(pin.direction).ljust(max(map(len, DIRECTIONS))),
                 "type": vhdl_type(pin.bits),
+                "range": "" if pin.bits is None else f" -from {pin.bits - 1} -to 0",
                 "low": "'0'" if pin.bits is None else "(others => '0')",
             }
             for pin, formal in zip(pins, formals, strict=True)

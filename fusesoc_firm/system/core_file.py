@@ -15,7 +15,7 @@ import yaml
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.render import render
-from fusesoc_firm.system.board import FOLDER, board_entity, boards, read_board
+from fusesoc_firm.system.board import FOLDER, QUARTUS, VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived import DerivedSystem
 from fusesoc_firm.system.verilog_bench import translated_unit
 
@@ -87,7 +87,7 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
 
 
 def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool) -> str:
-    has_kernels = any(item.accelerator.type == "HLS" for item in system.accelerator_types)
+    has_kernels = bool(system.kernels)
     return render(
         TARGETS_TEMPLATE,
         {
@@ -103,26 +103,37 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             # Only an HLS tool makes them, so there is no netlist of the whole.
             "has_kernels": has_kernels,
             "families": [] if has_kernels else list(_FAMILIES),
-            "boards": [] if has_kernels else [_board(system, name) for name in boards()],
+            "boards": [target for name in boards() if (target := _board(system, name, has_kernels=has_kernels))],
         },
     )
 
 
-def _board(system: DerivedSystem, name: str) -> dict[str, object]:
-    """A board's target."""
+def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
+    """A board's target; None if it takes no kernels and the system has some."""
     board = read_board(name, FOLDER)
+    if has_kernels and board.flow != VIVADO:
+        return None
     options = {
+        "frontends": "[ghdlsynth]" if board.is_linked else "",
+        "part": str(board.part or ""),
+        "board_part": str(board.board_part or ""),
+        # A block design refers to modules by name only where Vivado manages the sources.
+        "source_mgmt_mode": "All" if board.flow == VIVADO else "",
         "yosys_synth_options": _words(board.synth_options),
         "nextpnr_options": _words(board.nextpnr_options),
         "device": str(board.device or ""),
-        "device_family": str(board.device_family or ""),
+        "family" if board.flow == QUARTUS else "device_family": str(board.device_family or ""),
     }
+    top = board_entity(system, board)
+    product = "Quartus project" if board.flow == QUARTUS else "Bitstream"
     return {
         "name": name,
-        "description": str(board.description),
+        "description": f"{product} for the board {board.description}",
+        # Of Quartus, Edalize has no flow.
+        "is_tool": board.flow == QUARTUS,
         "flow": str(board.flow),
         "options": [{"name": option, "value": value} for option, value in options.items() if value],
-        "toplevel": board_entity(system, board),
+        "toplevel": f"{top}_wrapper" if board.flow == VIVADO else top,
     }
 
 

@@ -276,6 +276,11 @@ class DerivedSystem:
         return tuple(dict.fromkeys(converter.frame for converter in (*self.subscribers, *self.publishers)))
 
     @property
+    def kernels(self) -> tuple[AcceleratorType, ...]:
+        """The types in C++, of which an HLS tool makes hardware."""
+        return tuple(type_ for type_ in self.accelerator_types if type_.accelerator.type == "HLS")
+
+    @property
     def accelerator_types(self) -> tuple[AcceleratorType, ...]:
         """Every type that has an instance, once."""
         return tuple(dict.fromkeys(block.type for block in self.accelerators))

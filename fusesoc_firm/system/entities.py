@@ -12,7 +12,7 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
-from fusesoc_firm.system.hls import function_name
+from fusesoc_firm.system.hls import kernel_entity
 from fusesoc_firm.system.specification import Block
 
 
@@ -64,4 +64,4 @@ def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
 def _entities(accelerator: AcceleratorType) -> Iterator[str]:
     yield accelerator.entity
     if accelerator.accelerator.type == "HLS":
-        yield function_name(accelerator)
+        yield kernel_entity(accelerator)

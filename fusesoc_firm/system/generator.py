@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 
@@ -21,9 +22,16 @@ from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
+from fusesoc_firm.system.block_design import (
+    BLOCK_DESIGN_TEMPLATE,
+    PACKAGE_TEMPLATE,
+    block_design_configuration,
+    package_configuration,
+)
 from fusesoc_firm.system.board import (
     BOARD_TEMPLATE,
     FLOWS,
+    VIVADO,
     Board,
     board_configuration,
     board_entity,
@@ -34,8 +42,10 @@ from fusesoc_firm.system.board import (
 )
 from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
-from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, wrapper_configuration
+from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, function_name, wrapper_configuration
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
+from fusesoc_firm.system.timing import frequency
+from fusesoc_firm.system.timing_constraints import clocks_configuration
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {
@@ -51,12 +61,13 @@ _INCLUDE_SUFFIXES = (".vh", ".svh")
 
 @dataclass(frozen=True)
 class LoadedSystem:
-    """A specification, the folder its paths are relative to, and the system derived from it."""
+    """A specification, the folder its paths are relative to, the board if one is given, and the system derived."""
 
     specification: Specification
     folder: Path
     libraries: dict[RosVersion, MessageLibrary]
     system: DerivedSystem
+    board: Board | None = None
 
     def inputs(self) -> list[Path]:
         """The accelerators' sources and the files of all messages."""
@@ -95,7 +106,7 @@ def load_system(
     if board:
         specification = on_board(specification, board)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
-    return LoadedSystem(specification, path.parent, libraries, system)
+    return LoadedSystem(specification, path.parent, libraries, system, board)
 
 
 def load_requested(request: Request) -> LoadedSystem:
@@ -164,10 +175,9 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for frame, suffix in system.computed_lengths.items():
         configuration = payload_length_configuration(frame, suffix)
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
-    for type_ in system.accelerator_types:
-        if type_.accelerator.type == "HLS":
-            configuration = wrapper_configuration(type_)
-            yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
+    for type_ in system.kernels:
+        configuration = wrapper_configuration(type_)
+        yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
     yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
 
 
@@ -180,20 +190,59 @@ def generate(request: Request) -> GeneratedCore:
     files = {path: file for path, file in made.items() if path != top}
     files |= _sources(system.accelerator_types, loaded.folder)
     files[top] = made[top]
-    if board := _board(request):
-        files |= _board_files(loaded, board)
+    if loaded.board:
+        files |= _board_files(loaded, loaded.board)
     return GeneratedCore(f"System {system.name}", files)
 
 
 def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
-    """The board's top level, and the constraints of its ports."""
+    """What fits a system on a board: a top level and constraints."""
     check_fits(loaded.system, board)
+    if board.is_linked:
+        return _linked_files(loaded, board)
+    return _processor_files(loaded, board) if board.flow == VIVADO else _clock_files(loaded, board, "sdc", "SDC")
+
+
+def _linked_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
     configuration = board_configuration(loaded.system, board)
     form, file_type = FLOWS[board.flow]
     return {
         f"{board_entity(loaded.system, board)}.vhd": GeneratedFile(render(BOARD_TEMPLATE, configuration), VHDL),
         f"{board.name}.{form}": GeneratedFile(render(f"board/{form}", configuration), file_type),
     }
+
+
+def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
+    """The block design, and what it takes to make IP of C++."""
+    system, clock = loaded.system, _clock(loaded)
+    files: dict[str, GeneratedFile] = {}
+    for type_ in system.kernels:
+        paths = {source_name(type_.accelerator, source): loaded.folder / source for source in type_.accelerator.sources}
+        files |= {name: GeneratedFile(path.read_bytes(), "user") for name, path in paths.items()}
+        script = render(PACKAGE_TEMPLATE, package_configuration(type_, list(paths), system, board, clock))
+        files[f"{function_name(type_)}.tcl"] = GeneratedFile(script, "user")
+    if system.clocks:
+        files |= _clock_files(loaded, board, "xdc", "xdc")
+    design = render(BLOCK_DESIGN_TEMPLATE, block_design_configuration(system, board, clock))
+    files[f"{board_entity(system, board)}.tcl"] = GeneratedFile(design, "tclSource")
+    return files
+
+
+def _clock_files(loaded: LoadedSystem, board: Board, form: str, file_type: str) -> dict[str, GeneratedFile]:
+    """The constraints of clocks."""
+    text = render(f"board/{form}", clocks_configuration(loaded.system, board, _clock(loaded)))
+    return {f"{board.name}.{form}": GeneratedFile(text, file_type)}
+
+
+def _clock(loaded: LoadedSystem) -> Fraction:
+    """The frequency of clk in Hz. Raises `InputError`."""
+    faults = Diagnostics()
+    text = loaded.specification.project.clock
+    assert text is not None, "a board has a clock"
+    found = frequency("clock", text, faults)
+    faults.raise_if_any()
+    assert found is not None
+    return found
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:

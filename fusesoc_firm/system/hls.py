@@ -64,8 +64,16 @@ class Argument:
 
 
 def function_name(accelerator: AcceleratorType) -> str:
-    """The C++ function, and so the kernel's entity: named after the first source file."""
+    """The C++ function: named after the first source file."""
     return PurePosixPath(accelerator.accelerator.sources[0]).stem
+
+
+def kernel_entity(accelerator: AcceleratorType) -> str:
+    """The entity around the function, which the wrapper instantiates: an IP, or in simulation what calls the C++.
+
+    Not the function's own name: that is a module within the IP.
+    """
+    return f"{function_name(accelerator)}_kernel"
 
 
 def library_name(accelerator: AcceleratorType) -> str:
@@ -136,7 +144,8 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
     column = max(len(name) for name in [*names, "rst_n"])
     return {
         "entity": accelerator.entity,
-        "kernel": function_name(accelerator),
+        "function": function_name(accelerator),
+        "kernel": kernel_entity(accelerator),
         "clk": "clk".ljust(column),
         "rst_n": "rst_n".ljust(column),
         "message_ports": [
@@ -196,7 +205,8 @@ def kernel_configuration(accelerator: AcceleratorType) -> Configuration:
     inputs, outputs = arguments(accelerator)
     column = max(len(name) for name in [*_AP_PORTS, *(f"{argument.port}_ap_vld" for argument in [*inputs, *outputs])])
     return {
-        "kernel": function_name(accelerator),
+        "function": function_name(accelerator),
+        "kernel": kernel_entity(accelerator),
         "source": str(PurePosixPath(accelerator.accelerator.sources[0]).name),
         "library": library_name(accelerator),
         "inputs": [_argument(argument, column) for argument in inputs],

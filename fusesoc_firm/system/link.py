@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.system.derived import Link, LinkKind, Scheduling
-from fusesoc_firm.system.specification import Project
+from fusesoc_firm.system.specification import AXI_STREAM, Project
 from fusesoc_firm.system.timing import clock_frequency
 
 # Beyond it the generic CLOCK_HZ is no integer of VHDL.
@@ -13,7 +13,7 @@ _FASTEST = 10**9
 
 def link_of(project: Project, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
     """The link between the host and a system; None where the system's streams are its ports. Faults are noted."""
-    if project.interconnect not in {kind.value for kind in LinkKind}:
+    if project.interconnect == AXI_STREAM:
         return None
     kind = LinkKind(project.interconnect)
     if scheduling.is_preemptive:

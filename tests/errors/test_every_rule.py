@@ -32,6 +32,7 @@ OTHER_FAULTS = {
     ("message/library.py", "_check_folders"): "an option of the command line",
     ("system/board.py", "read_board"): "the file of a board",
     ("system/board.py", "_check_pins"): "the file of a board",
+    ("system/board.py", "_check_streams"): "the file of a board",
     ("system/board.py", "check_fits"): "a board that a right specification does not fit on",
     ("system/core_file.py", "updated_core"): "the file of a core",
     ("system/core_file.py", "_instances"): "the file of a core",

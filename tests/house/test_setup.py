@@ -97,7 +97,19 @@ def test_make_without_a_target_lists_them() -> None:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     done = subprocess.run(["make"], cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
     listed = [line.split()[0] for line in done.stdout.splitlines()[1:]]
-    assert listed == ["help", "sim", "test", "corpus", "bench", "proofs", "lint", "setup", "clean", "distclean"]
+    assert listed == [
+        "help",
+        "sim",
+        "test",
+        "corpus",
+        "bench",
+        "bitstream",
+        "proofs",
+        "lint",
+        "setup",
+        "clean",
+        "distclean",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def test_a_broken_copy_fails(proof: Proof, mutation: Mutation, label: str, tmp_p
 @pytest.mark.parametrize("proof", PROOFS, ids=lambda proof: proof.name)
 def test_every_property_has_its_mutation(proof: Proof) -> None:
     violated = [label for mutation in proof.mutations for label in mutation.violates]
-    assert sorted(violated) == sorted(proof.properties)
+    assert {*violated} == {*proof.properties}
 
 
 @pytest.mark.parametrize(

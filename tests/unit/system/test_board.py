@@ -71,7 +71,10 @@ def written(tmp_path: Path, text: str) -> Board:
     return read_board("board.yaml", tmp_path)
 
 
-@pytest.mark.parametrize("name", boards())
+BOARDS = {name: read_board(name, Path()) for name in boards()}
+
+
+@pytest.mark.parametrize("name", [name for name, board in BOARDS.items() if board.is_linked])
 def test_every_board_takes_a_system(tmp_path: Path, name: str) -> None:
     board = read_board(name, tmp_path)
     system = on(tmp_path, board, "fixed_priority")
@@ -124,7 +127,15 @@ def test_a_board_of_spi(tmp_path: Path) -> None:
         (BOARD.replace("{port: uart_rxd, site: A2}", "{port: led, site: A2}"), "the board has no pin for 'uart_rxd'"),
         (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' has a pin already"),
         (BOARD + "  - {port: lamp, site: A4}\n", "'port' cannot be 'lamp'"),
-        (BOARD.replace("trellis", "vivado"), "'flow' cannot be 'vivado'"),
+        (BOARD.replace("trellis", "ise"), "'flow' cannot be 'ise'"),
+        (BOARD.split("pins:", maxsplit=1)[0], "the board has no pin for 'clk'"),
+        (BOARD.replace("uart\n", "axi_stream\n"), "flow 'trellis' has no processor to take streams"),
+        (BOARD.replace("trellis", "vivado"), "flow 'vivado' takes streams"),
+        (BOARD.replace("trellis", "vivado"), "flow 'vivado' takes no pins"),
+        (BOARD.replace("trellis", "vivado"), "a board of flow 'vivado' needs the key 'part'"),
+        (BOARD.replace("trellis", "vivado"), "a board of flow 'vivado' needs the key 'processor'"),
+        (BOARD.replace("trellis", "quartus"), "a board of flow 'quartus' needs the key 'deviceFamily'"),
+        (BOARD + "processor: microblaze\n", "'processor' cannot be 'microblaze'"),
         (BOARD.replace("clock: 25 MHz\n", ""), "a board needs the key 'clock'"),
         (BOARD.replace("flow:", "flows:"), "did you mean 'flow'"),
         ("", "board.yaml is empty; a board needs the keys"),

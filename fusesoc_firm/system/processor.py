@@ -1,0 +1,88 @@
+"""The processors of FPGAs as blocks of Vivado's: what their IP, pins and properties are called.
+
+Sources: Zynq-7000, PG082 (Processing System 7) and UG585; Zynq UltraScale+, PG201 and UG1085.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# Clocks that a processor makes for the logic.
+MOST_CLOCKS = 4
+
+
+@dataclass(frozen=True)
+class Processor:
+    """A processor of an FPGA. Names with `{}` are those of clock 0, 1, ...
+
+    `clock` is a clock's pin, `timing_clock` what timing constraints call it, `frequency` and `clock_switch` its
+    properties. `control` is the master for registers, with the address `base` for those of the DMA engine; `memory`, of
+    `memory_width` bits, is the slave that leads to the processor's memory; both with their clocks' pins.
+    """
+
+    ip: str
+    automation: str
+    clock: str
+    timing_clock: str
+    frequency: str
+    clock_switch: str
+    reset: str
+    control: str
+    control_clock: str
+    memory: str
+    memory_clock: str
+    memory_width: int
+    interrupts: str
+    properties: tuple[tuple[str, int], ...]
+    base: str
+
+
+PROCESSORS = {
+    "zynq7000": Processor(
+        ip="processing_system7",
+        automation='make_external "FIXED_IO, DDR" Master "Disable" Slave "Disable"',
+        clock="FCLK_CLK{}",
+        timing_clock="clk_fpga_{}",
+        frequency="PCW_FPGA{}_PERIPHERAL_FREQMHZ",
+        clock_switch="PCW_EN_CLK{}_PORT",
+        reset="FCLK_RESET0_N",
+        control="M_AXI_GP0",
+        control_clock="M_AXI_GP0_ACLK",
+        memory="S_AXI_HP0",
+        memory_clock="S_AXI_HP0_ACLK",
+        memory_width=64,
+        interrupts="IRQ_F2P",
+        properties=(
+            ("PCW_USE_M_AXI_GP0", 1),
+            ("PCW_USE_M_AXI_GP1", 0),
+            ("PCW_USE_S_AXI_HP0", 1),
+            ("PCW_USE_FABRIC_INTERRUPT", 1),
+            ("PCW_IRQ_F2P_INTR", 1),
+        ),
+        base="0x40400000",
+    ),
+    "zynqmp": Processor(
+        ip="zynq_ultra_ps_e",
+        automation="",
+        clock="pl_clk{}",
+        timing_clock="clk_pl_{}",
+        frequency="PSU__CRL_APB__PL{}_REF_CTRL__FREQMHZ",
+        clock_switch="PSU__FPGA_PL{}_ENABLE",
+        reset="pl_resetn0",
+        control="M_AXI_HPM0_FPD",
+        control_clock="maxihpm0_fpd_aclk",
+        memory="S_AXI_HP0_FPD",
+        memory_clock="saxihp0_fpd_aclk",
+        memory_width=128,
+        interrupts="pl_ps_irq0",
+        # Presets of boards switch on masters that nothing is connected to.
+        properties=(
+            ("PSU__USE__M_AXI_GP0", 1),
+            ("PSU__USE__M_AXI_GP1", 0),
+            ("PSU__USE__M_AXI_GP2", 0),
+            ("PSU__USE__S_AXI_GP2", 1),
+            ("PSU__USE__IRQ0", 1),
+        ),
+        base="0xA0000000",
+    ),
+}
