@@ -6,6 +6,7 @@ does not fit is reported where it was written; as much as can be checked is chec
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
@@ -40,6 +41,7 @@ from fusesoc_firm.system.software import MOST_CONVERTERS, Parting, Parts, messag
 from fusesoc_firm.system.sources import declares_width
 from fusesoc_firm.system.specification import (
     CONVERTER,
+    CONVERTER_KEYS,
     MODES,
     PUBLISHER,
     SOURCE_SUFFIXES,
@@ -56,6 +58,8 @@ from fusesoc_firm.yaml_text import Text
 
 Libraries = Mapping[RosVersion, MessageLibrary]
 _KINDS_OF_BLOCKS = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
+# What both ROS 1 and ROS 2 take.
+_TOPIC = re.compile(r"(/[A-Za-z](_?[A-Za-z0-9])*_?)+")
 
 
 def derive(
@@ -243,7 +247,7 @@ class _Analysis:
             self.outputs[block.name] = found.outputs
 
     def _resolve_converter(self, block: Block) -> None:
-        missing = [key for key in ("middleware", "mode", "message") if getattr(block, key) is None]
+        missing = [key for key in CONVERTER_KEYS if getattr(block, key) is None]
         if missing:
             # What is wrong with a block that could not be read is noted already.
             if block.is_sound:
@@ -251,6 +255,9 @@ class _Analysis:
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)
             return
         assert block.middleware is not None and block.message is not None
+        if block.topic is not None and not _TOPIC.fullmatch(block.topic):
+            hint = "such as /arm/left: names of letters, digits and _, a / before each"
+            self.faults.error(f"'{block.topic}' is no topic", block.topic.source, hint)
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
@@ -326,5 +333,7 @@ def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> t
         frame = with_names_in_use(whole, names[name])
         # Blocks of the same fields share the entity of the first.
         suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(name).lower()}")
-        found.append(Converter(str(name), frame, number, suffix, software=parts.crossings.get(name)))
+        given_name = str(parts.blocks[name].topic or "")
+        software = parts.crossings.get(name)
+        found.append(Converter(str(name), frame, number, suffix, software=software, given_name=given_name))
     return tuple(found)

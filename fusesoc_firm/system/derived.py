@@ -6,7 +6,7 @@ It is what `analysis` makes of a specification and what all templates, and `firm
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
 
@@ -18,10 +18,16 @@ from fusesoc_firm.system.specification import Accelerator
 
 @dataclass(frozen=True)
 class Topic:
-    """A message between the system and others, under a block's name."""
+    """A message between the system and others, under a block's name; `given_name` is empty for a topic called so."""
 
     block: str
     frame: Frame
+    given_name: str = field(default="", kw_only=True)
+
+    @property
+    def name(self) -> str:
+        """The topic as ROS knows it."""
+        return self.given_name or f"/{identifier(self.block)}"
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
         "nameMW": str(converter.frame.message),
         "ROS": int(converter.frame.ros),
         "block": converter.block,
-        **({"software": converter.software.block} if converter.software else {}),
+        **({"software": converter.software.block} if converter.software else {"topic": converter.name}),
         "id": converter.id,
         "payloadBytes": _payload_bytes(converter.frame),
     }

@@ -110,7 +110,7 @@ class Parting:
         """The host's part; publishers have the fields that they get."""
         sources = {connection.source.block for connection in connections}
         subscribers = [
-            Topic(name, self.outputs[name][0].frame) for name in self._converters(SUBSCRIBER) if name in sources
+            self._topic(name, self.outputs[name][0].frame) for name in self._converters(SUBSCRIBER) if name in sources
         ]
         publishers = []
         for name in self._converters(PUBLISHER):
@@ -121,8 +121,12 @@ class Parting:
                 if end.block == name
             ]
             if given:
-                publishers.append(Topic(name, _joined(given)))
+                publishers.append(self._topic(name, _joined(given)))
         return Software(tuple(self.software), tuple(subscribers), tuple(publishers), connections)
+
+    def _topic(self, name: str, frame: Frame) -> Topic:
+        """The topic of one of the specification's converters."""
+        return Topic(name, frame, given_name=str(self.blocks[name].topic or ""))
 
     # --- where a message is ----------------------------------------------------------------------------------------
 

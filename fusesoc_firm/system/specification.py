@@ -28,6 +28,8 @@ ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
 # A block that is no accelerator, and one that is.
 CONVERTER, ACCELERATOR = "converter", "accelerator"
+# What makes a block a converter.
+CONVERTER_KEYS = ("middleware", "mode", "message")
 # Cores of robot:sched, each with the policy it is called after.
 SCHEDULERS = (
     "fixed_priority",
@@ -159,6 +161,9 @@ class Block(Section):
     middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES), only_of=CONVERTER)
     mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
     message: Text | None = key("a converter's message", only_of=CONVERTER)
+    topic: Text | None = key(
+        "the topic of a converter's messages, such as /arm/left; / and its name unless given", only_of=CONVERTER
+    )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     buffer: int | None = key(

@@ -17,7 +17,7 @@ from ruamel.yaml.comments import CommentedMap
 from fusesoc_firm.prompts import Asker, Question
 from fusesoc_firm.system.specification import (
     ACCELERATOR,
-    CONVERTER,
+    CONVERTER_KEYS,
     PUBLISHER,
     Accelerator,
     Block,
@@ -114,7 +114,7 @@ class _Wizard:
             entry.meaning,
             self._words(draft.section, name, entry),
             is_choice=bool(entry.choices) or is_type,
-            is_required=draft.needs(entry),
+            is_required=draft.needs(name, entry),
             default=_default(draft.section, field_name),
             check=lambda answer: self._fault(draft, name, entry, answer),
         )
@@ -181,9 +181,9 @@ class _Draft:
             return bool(self.made.get("mode") == PUBLISHER)
         return ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
-    def needs(self, entry: Key) -> bool:
-        """Whether a key must be there: a converter has all of one word that the grammar leaves open to a block."""
-        return entry.is_needed(self.made) or (entry.only_of == CONVERTER and entry.form == "text")
+    def needs(self, name: str, entry: Key) -> bool:
+        """Whether a key must be there: what makes a converter, the grammar leaves open to a block."""
+        return entry.is_needed(self.made) or (self.section is Block and name in CONVERTER_KEYS)
 
 
 def _default(section: type[Section], field_name: str) -> str:

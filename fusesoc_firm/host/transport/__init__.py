@@ -1,0 +1,1 @@
+"""How frames get between the host's software and the hardware, be it simulated or not (docs/transport.md)."""
