@@ -36,7 +36,7 @@ class Transport(Protocol):
     """One thread may send while another one receives; closing ends both."""
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; returns when the hardware, or a buffer of bounded size, has it. Raises `TransportError`."""
+        """Send a whole frame; returns when the hardware, or a bounded buffer, has it. Raises `TransportError`."""
 
     def receive(self, timeout: float | None = None) -> Burst | None:
         """The next burst; None if none came in `timeout` seconds (None: wait for ever), or when it is closed.
