@@ -1,11 +1,11 @@
-"""Starts the programs of a build for Edalize: `EDALIZE_LAUNCHER="firm tool"`.
+"""Starts the programs of a build for Edalize, as `firm tool` does.
 
 Edalize's makefiles put the launcher in front of each program. It finds a program on the path or as YoWASP's package
 from PyPI, says which package brings one that is missing, and notes in the build's manifest which one has run. A program
 that fails leaves no output: make, started again, would take it for a good one, such as the layout that nextpnr writes
 before it finds that the clock is too slow.
 
-`GNUmakefile` of the core robot:firm:generators names this module as the launcher of every build that names no other.
+`generators/launcher.mk` is the GNUmakefile of a build, and names this module as the launcher where there is no other.
 """
 
 from __future__ import annotations
