@@ -11,6 +11,7 @@ before it finds that the clock is too slow.
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -30,7 +31,7 @@ def launch(program: str, arguments: Sequence[str]) -> int:
     path = find(program)
     if path is None:
         fail(f"the program '{program}' is not installed", hint=ways(program))
-    status = subprocess.run([path, *arguments], check=False).returncode
+    status = _run([str(path), *arguments])
     note(program, Path())
     if status:
         for option, value in pairwise(arguments):
@@ -38,6 +39,16 @@ def launch(program: str, arguments: Sequence[str]) -> int:
                 Path(value).unlink(missing_ok=True)
     # Killed by a signal, as a shell says it.
     return status if status >= 0 else 128 - status
+
+
+def _run(command: Sequence[str]) -> int:
+    """The exit status of a command; who ends this process, as make does, ends it."""
+    with subprocess.Popen(command) as program:
+        before = signal.signal(signal.SIGTERM, lambda *_: program.terminate())
+        try:
+            return program.wait()
+        finally:
+            signal.signal(signal.SIGTERM, before)
 
 
 def starts_everything() -> bool:

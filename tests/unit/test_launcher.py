@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -10,6 +14,7 @@ import pytest
 from fusesoc_firm import launcher, tools
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
+from tests.sim.ghdl import REPOSITORY
 
 
 def program(folder: Path, name: str, script: str) -> None:
@@ -95,3 +100,17 @@ def test_another_launcher_may_find_programs_elsewhere(
     if setting is not None:
         monkeypatch.setenv("EDALIZE_LAUNCHER", setting)
     assert launcher.starts_everything() is is_ours
+
+
+def test_who_ends_the_launcher_ends_the_program(alone: Path, tmp_path: Path) -> None:
+    program(alone, "icepack", "echo $$ > started.part; /bin/mv started.part started; exec /bin/sleep 60")
+    command = [f"{sys.base_prefix}/bin/python3", "-m", "fusesoc_firm.launcher", "icepack"]
+    environment = {"PATH": str(alone), "PYTHONPATH": ":".join([str(REPOSITORY), *sys.path])}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment) as started:
+        while not (tmp_path / "started").exists():
+            assert started.poll() is None
+            time.sleep(0.01)
+        started.terminate()
+        assert started.wait(timeout=30) == 128 + signal.SIGTERM
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "started").read_text()), 0)
