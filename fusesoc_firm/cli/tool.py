@@ -14,8 +14,8 @@ def add_tool(commands: Any) -> None:
     tool = command(
         commands,
         "tool",
-        "start a program for Edalize, from wherever it is installed, and say which package brings one that is missing",
-        'EDALIZE_LAUNCHER="firm tool" fusesoc run --target=ulx3s robot:sys:quat2euler',
+        "start a program for Edalize and note it in manifest.json, or say which package brings it",
+        "firm tool nextpnr-ecp5 --version",
         _run_tool,
     )
     tool.add_argument("program", metavar="PROGRAM", help="such as nextpnr-ecp5")

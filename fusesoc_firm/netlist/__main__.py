@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from fusesoc_firm.manifest import note
 from fusesoc_firm.netlist.repair import NetlistError
 from fusesoc_firm.netlist.translation import Translation, translate
 
@@ -17,6 +18,7 @@ def main(path: Path) -> int:
     except NetlistError as error:
         print(f"ghdlsynth: {translation.top}: no Verilog netlist\n{error}", file=sys.stderr)
         return 1
+    note("ghdl", Path())
     if warnings:
         print(warnings, file=sys.stderr)
     return 0

@@ -16,8 +16,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.netlist.programs import explanation, missing_programs
+from fusesoc_firm.launcher import starts_everything
 from fusesoc_firm.netlist.repair import NetlistError, repair
+from fusesoc_firm.tools import explanation, missing
 
 _UNBOUND = re.compile(r'instance "(.*?)" of component "(.*?)" is not bound')
 _MODULE = r"^[ \t]*module\s+({name})\b"
@@ -37,8 +38,9 @@ _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned
 class Translation:
     """What to translate: VHDL files by library in any order, the unit on top, `[library.]unit`, and its generics.
 
-    `verilog` are the sources that may hold the modules of components without an entity; they are linked later. `tool`
-    takes the netlist, if it is known. All paths are relative to the current folder.
+    `verilog` are the sources that may hold the modules of components without an entity; they are linked later.
+    `programs` are those that take the netlist, as far as they are known: nobody waits for it if they are not there. All
+    paths are relative to the current folder.
     """
 
     top: str
@@ -48,7 +50,7 @@ class Translation:
     verilog: Sequence[str] = ()
     std: str = "93"
     options: Sequence[str] = ()
-    tool: str = ""
+    programs: Sequence[str] = ()
 
     def to_json(self) -> str:
         """A text that `from_json` reads."""
@@ -81,8 +83,8 @@ def translate(translation: Translation, folder: Path) -> str:
 
     Raises `NetlistError`; then there is no netlist.
     """
-    if missing := missing_programs(translation.tool):
-        raise NetlistError(explanation(missing))
+    if absent := missing(["ghdl", *(translation.programs if starts_everything() else ())]):
+        raise NetlistError(explanation(absent))
     output = Path(translation.output)
     output.unlink(missing_ok=True)
     shutil.rmtree(folder, ignore_errors=True)

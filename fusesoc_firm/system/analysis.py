@@ -52,7 +52,7 @@ from fusesoc_firm.system.specification import (
     OutputType,
     Specification,
 )
-from fusesoc_firm.system.timing import scheduling_of
+from fusesoc_firm.system.timing import clock_frequency, scheduling_of
 from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text
 
@@ -78,7 +78,8 @@ def derive(
     analysis.check_names()
     analysis.resolve_accelerators()
     analysis.resolve_blocks()
-    clocks = clocks_of(specification, faults)
+    clock = clock_frequency(specification.project, faults)
+    clocks = clocks_of(specification, clock, faults)
     names = message_names(analysis.blocks, analysis.inputs, analysis.outputs)
     parts = analysis.parts(analysis.wiring().connect(), names)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
@@ -90,8 +91,8 @@ def derive(
     publishers = tuple(
         replace(item, buffer=buffers.get(item.block, 0)) for item in _converters(parts, PUBLISHER, connections)
     )
-    scheduling = scheduling_of(project, parts.blocks, publishers, faults)
-    link = link_of(project, scheduling, faults)
+    scheduling = scheduling_of(project, clock, parts.blocks, publishers, faults)
+    link = link_of(project, clock, scheduling, faults)
     faults.raise_if_any()
     system = DerivedSystem(
         name=identifier(project.name).lower(),
@@ -102,6 +103,7 @@ def derive(
         publishers=publishers,
         accelerators=analysis.instances(is_software=False),
         connections=connections,
+        clock=clock,
         clocks=clocks,
         software=parts.software,
         names=names,

@@ -6,13 +6,15 @@ a processor has pins, and a link to the host. One with a processor has the syste
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.diagnostics import Diagnostics, fail, nearest
+from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.system.configuration import top_level_pins
 from fusesoc_firm.system.derived import DerivedSystem, LinkKind
 from fusesoc_firm.system.interconnect import LINK_PINS
 from fusesoc_firm.system.processor import MOST_CLOCKS, PROCESSORS
@@ -43,7 +45,7 @@ _OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq"}
 class BoardPin(Section):
     """A pin of the FPGA that the top level uses."""
 
-    port: Text = key("what is connected there", is_required=True, choices=_PORTS)
+    port: Text = key("what is connected there: a port of the board's, or a pin of an accelerator", is_required=True)
     site: Text = key("the pin, as the FPGA's maker calls it", is_required=True)
     standard: Text | None = key("its electrical standard, if it is not the board's")
 
@@ -73,6 +75,21 @@ class Board(Section):
     def is_linked(self) -> bool:
         """Whether a link of bytes leads to the host."""
         return self.flow in FLOWS
+
+
+@dataclass(frozen=True)
+class _Port:
+    """A pin of an accelerator at the top level: bits of a vector or None, and what to call it in a message."""
+
+    name: str
+    direction: str
+    width: int | None
+    what: str
+    source: SourceRef | None
+
+    def bits(self) -> list[str]:
+        """Every bit, each of which has a place of its own."""
+        return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
 
 
 def boards() -> tuple[str, ...]:
@@ -112,7 +129,7 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
         return
     seen: dict[str, Text] = {}
     for pin in board.pins:
-        twin = seen.setdefault(pin.port, pin.port)
+        twin = seen.setdefault(pin.port.lower(), pin.port)
         if twin is not pin.port:
             faults.error(f"port '{pin.port}' has a pin already, at {twin.source}", pin.port.source)
     source = board.pins[-1].source if board.pins else board.source
@@ -157,11 +174,24 @@ def check_fits(system: DerivedSystem, board: Board) -> None:
     faults = Diagnostics()
     for clock in system.clocks:
         faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="a board has one clock, clk")
-    for block in system.accelerators:
-        for pin in block.type.accelerator.pins:
-            message = f"pin '{pin.name}' of '{block.block}' has no place on board '{board.name}'"
-            faults.error(message, pin.name.source, "write a top level of your own around the system's")
+    _check_places(_accelerator_pins(system), board, faults)
     faults.raise_if_any()
+
+
+def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> None:
+    """Note every pin of an accelerator that the board has no place for, and every place that is for none."""
+    places = {pin.port.lower() for pin in board.pins}
+    for pin in pins:
+        if pin.name in _PORTS:
+            faults.error(f"{pin.what} is called '{pin.name}', as a port of every board may be", pin.source)
+        elif missing := next((bit for bit in pin.bits() if bit not in places), None):
+            hint = f"give a board file of your own a '{{port: {missing}, site: ...}}'"
+            faults.error(f"{pin.what} has no place on board '{board.name}'", pin.source, hint)
+    known = (*_PORTS, *(bit for pin in pins for bit in pin.bits()))
+    for place in board.pins:
+        if place.port.lower() not in known:
+            message = f"nothing of the system is called '{place.port}'"
+            faults.error(message, place.port.source, nearest(place.port, known))
 
 
 def board_entity(system: DerivedSystem, board: Board) -> str:
@@ -173,24 +203,27 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
     """The configuration of the top level, and of the constraints of its ports."""
     assert system.link is not None
     clock_hz = system.link.clock_hz
-    ports = {str(pin.port) for pin in board.pins}
+    ports = {pin.port.lower() for pin in board.pins}
+    pins = _accelerator_pins(system)
     link = [(name, direction) for name, direction, _ in LINK_PINS[system.link.kind] if name in ports]
     own = [(name, "out" if name.startswith("led") else "in ") for name in ("led", "led_n", "reset", "reset_n")]
     declared = [(_CLOCK, "in "), *link, *((name, direction) for name, direction in own if name in ports)]
+    typed = [(name, direction, "std_logic") for name, direction in declared]
+    typed += [(pin.name, pin.direction.ljust(3), vhdl_type(pin.width)) for pin in pins]
     return {
         "entity": board_entity(system, board),
         "system": system.entity,
         "description": str(board.description),
         "clock_hz": clock_hz,
         "error_high": len(system.error_blocks) - 1,
-        "ports": _columns(declared),
-        "link_pins": [{"name": name} for name, _ in link],
+        "ports": _columns(typed),
+        "handed_on": [{"name": name} for name in (*(name for name, _ in link), *(pin.name for pin in pins))],
         **{name: name in ports for name, _ in own},
         "is_uart": system.link.kind is LinkKind.UART,
         "clock_mhz": f"{clock_hz / 10**6:g}",
         "pins": [
             {
-                "port": str(pin.port),
+                "port": str(pin.port).lower(),
                 "site": str(pin.site),
                 "standard": _standard(pin, board),
             }
@@ -201,13 +234,34 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
 
 def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
     standard = pin.standard or board.standard
-    return {"port": str(pin.port), "name": str(standard)} if standard else None
+    return {"port": str(pin.port).lower(), "name": str(standard)} if standard else None
 
 
-def _columns(ports: Iterable[tuple[str, str]]) -> list[dict[str, str]]:
-    lines = list(ports)
-    column = max(len(name) for name, _ in lines)
+def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
+    """The pins of accelerators, as the top level has them."""
+    names = top_level_pins(system)
     return [
-        {"name": name.ljust(column), "direction": direction, "semicolon": ";" if number < len(lines) - 1 else ""}
-        for number, (name, direction) in enumerate(lines)
+        _Port(
+            # As GHDL writes it: it has forgotten the case.
+            names[block.block, pin.name].lower(),
+            str(pin.direction),
+            pin.bits,
+            f"pin '{pin.name}' of '{block.block}'",
+            pin.name.source,
+        )
+        for block in system.accelerators
+        for pin in block.type.accelerator.pins
+    ]
+
+
+def _columns(ports: Sequence[tuple[str, str, str]]) -> list[dict[str, str]]:
+    column = max(len(name) for name, *_ in ports)
+    return [
+        {
+            "name": name.ljust(column),
+            "direction": direction,
+            "type": type_,
+            "semicolon": ";" if number < len(ports) - 1 else "",
+        }
+        for number, (name, direction, type_) in enumerate(ports)
     ]

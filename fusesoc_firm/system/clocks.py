@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from fractions import Fraction
 
 from fusesoc_firm.diagnostics import Diagnostics, nearest
 from fusesoc_firm.naming import identifier
@@ -11,8 +12,11 @@ from fusesoc_firm.system.specification import ClockDomain, Specification
 from fusesoc_firm.system.timing import frequency
 
 
-def clocks_of(specification: Specification, faults: Diagnostics) -> tuple[Clock, ...]:
-    """The clocks beside that of the system, in the order of the specification; what is wrong is noted."""
+def clocks_of(specification: Specification, own: Fraction | None, faults: Diagnostics) -> tuple[Clock, ...]:
+    """The clocks beside that of the system, in the order of the specification; what is wrong is noted.
+
+    `own` is the frequency of clk in Hz, if it is known.
+    """
     project = specification.project
     _check_names(specification, faults)
     _check_uses(specification, faults)
@@ -24,8 +28,6 @@ def clocks_of(specification: Specification, faults: Diagnostics) -> tuple[Clock,
             hint = "add 'clock' to the project, such as 'clock: 100 MHz'"
             faults.error(message, project.clocks[0].source, hint)
         return ()
-    # A fault in it is noted where times are read.
-    own = frequency("clock", project.clock, Diagnostics())
     found = []
     for clock in project.clocks:
         hertz = frequency("frequency", clock.frequency, faults) if clock.frequency else None

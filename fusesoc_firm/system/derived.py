@@ -226,6 +226,8 @@ class Clock:
 class DerivedSystem:
     """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` those beside clk.
 
+    `clock` is the frequency of clk in Hz, if it is given.
+
     Without a `link` its streams are ports. Converters, accelerators and connections are those of the hardware. `names`
     are what messages at accelerators are called outside of these: `<block>_in`, `<block>_out1` and so on.
     """
@@ -241,6 +243,7 @@ class DerivedSystem:
     software: Software
     names: Mapping[End, str]
     link: Link | None = None
+    clock: Fraction | None = None
     clocks: tuple[Clock, ...] = ()
 
     def clock_of(self, block: str) -> Clock | None:

@@ -44,7 +44,6 @@ from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configurat
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, function_name, wrapper_configuration
 from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
-from fusesoc_firm.system.timing import frequency
 from fusesoc_firm.system.timing_constraints import clocks_configuration
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
@@ -235,14 +234,9 @@ def _clock_files(loaded: LoadedSystem, board: Board, form: str, file_type: str) 
 
 
 def _clock(loaded: LoadedSystem) -> Fraction:
-    """The frequency of clk in Hz. Raises `InputError`."""
-    faults = Diagnostics()
-    text = loaded.specification.project.clock
-    assert text is not None, "a board has a clock"
-    found = frequency("clock", text, faults)
-    faults.raise_if_any()
-    assert found is not None
-    return found
+    """The frequency of clk in Hz."""
+    assert loaded.system.clock is not None, "a board has a clock"
+    return loaded.system.clock
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:

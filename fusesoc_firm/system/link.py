@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.system.derived import Link, LinkKind, Scheduling
 from fusesoc_firm.system.specification import AXI_STREAM, Project
-from fusesoc_firm.system.timing import clock_frequency
 
 # Beyond it the generic CLOCK_HZ is no integer of VHDL.
 _FASTEST = 10**9
 
 
-def link_of(project: Project, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
-    """The link between the host and a system; None where the system's streams are its ports. Faults are noted."""
+def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
+    """The link between the host and a system; None where the system's streams are its ports. Faults are noted.
+
+    `clock` is the frequency of clk in Hz, if it is given.
+    """
     if project.interconnect == AXI_STREAM:
         return None
     kind = LinkKind(project.interconnect)
@@ -22,12 +26,12 @@ def link_of(project: Project, scheduling: Scheduling, faults: Diagnostics) -> Li
             project.interconnect.source,
             "a row of bytes does not show where a burst ends: take a scheduler that is not preemptive, or 'axi_stream'",
         )
-    return Link(kind, _clock_hz(project, faults))
+    return Link(kind, _clock_hz(project, clock, faults))
 
 
-def _clock_hz(project: Project, faults: Diagnostics) -> int:
-    """The clock's frequency as an integer; 0 where it is not known."""
-    if project.clock is None:
+def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:
+    """The clock's frequency as an integer; 0 where it is not given."""
+    if project.clock is None or clock is None:
         if project.interconnect == LinkKind.UART.value:
             faults.error(
                 f"interconnect '{project.interconnect}' needs the clock's frequency",
@@ -35,14 +39,10 @@ def _clock_hz(project: Project, faults: Diagnostics) -> int:
                 "add 'clock' to the project, such as 'clock: 100 MHz'",
             )
         return 0
-    # What is wrong with it is noted by who reads the publishers' times.
-    frequency = clock_frequency(project, Diagnostics())
-    if frequency is None:
-        return 0
-    if frequency.denominator != 1 or frequency > _FASTEST:
+    if clock.denominator != 1 or clock > _FASTEST:
         faults.error(
             f"interconnect '{project.interconnect}' cannot work at 'clock' {project.clock}",
             project.clock.source,
             "legal: a whole number of Hz, at most 1 GHz",
         )
-    return int(frequency)
+    return int(clock)

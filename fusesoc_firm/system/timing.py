@@ -48,10 +48,17 @@ Rounding = Callable[[Fraction], int]
 
 
 def scheduling_of(
-    project: Project, blocks: Mapping[str, Block], publishers: Sequence[Converter], faults: Diagnostics
+    project: Project,
+    clock: Fraction | None,
+    blocks: Mapping[str, Block],
+    publishers: Sequence[Converter],
+    faults: Diagnostics,
 ) -> Scheduling:
-    """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted."""
-    reader = _Reader(project.clock is not None, clock_frequency(project, faults), faults)
+    """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted.
+
+    `clock` is the frequency of clk in Hz, if it is given.
+    """
+    reader = _Reader(clock, faults)
     times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
     policy, reasons = str(project.scheduler), tuple[str, ...]()
     _check_shortest_run(project, faults)
@@ -168,9 +175,8 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads times. The clock is in Hz; it may have been given and not be known, by a fault that is noted."""
+    """Reads times. The clock is in Hz, if it is given."""
 
-    is_clock_given: bool
     clock: Fraction | None
     faults: Diagnostics
 
@@ -195,9 +201,8 @@ class _Reader:
             return None
         number, unit = Fraction(found[1]), found[2]
         if unit and self.clock is None:
-            if not self.is_clock_given:
-                message = f"'{key}' is '{time}', but the clock's frequency is not given"
-                self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
+            message = f"'{key}' is '{time}', but the clock's frequency is not given"
+            self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
             return None
         cycles = number if not unit else self._of_unit(number, unit)
         if not 1 <= cycles <= _LONGEST_TIME:

@@ -11,7 +11,20 @@ from __future__ import annotations
 import argparse
 import sys
 
-from tests.bench import area, cycles, figures, fuzz, images, manager, simulators, systems, timing, use
+from tests.bench import (
+    applications,
+    area,
+    cycles,
+    figures,
+    fuzz,
+    images,
+    links,
+    manager,
+    simulators,
+    systems,
+    timing,
+    use,
+)
 from tests.bench.areas import write_areas
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import Table
@@ -58,6 +71,10 @@ def _measure(part: str, seed: int, broken: int) -> list[Table]:
         return timing.measure(Nextpnr(yosys), _tell)
     if part == "use":
         return use.measure(seed, _tell)
+    if part == "links":
+        return links.measure(yosys, _tell)
+    if part == "applications":
+        return applications.measure(yosys, _tell)
     if part == "images":
         return images.measure(yosys, seed, _tell)
     if part == "simulators":

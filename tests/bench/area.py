@@ -261,12 +261,12 @@ def _part(entity: str, width: int) -> Callable[[Path], Subject]:
     return of_core(entity, generics)
 
 
-def of_core(entity: str, generics: Mapping[str, Generic]) -> Callable[[Path], Subject]:
-    """Makes a subject of an entity of `CORES`."""
+def of_core(entity: str, generics: Mapping[str, Generic], cores: Sequence[str] = CORES) -> Callable[[Path], Subject]:
+    """Makes a subject of an entity of some cores."""
 
     def make(folder: Path) -> Subject:
         library = Library("firm", folder)
-        library.analyse(core_files(*CORES))
+        library.analyse(core_files(*cores))
         return Subject(library, entity, generics)
 
     return make

@@ -9,7 +9,21 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, images, manager, nextpnr, simulators, systems, timing, use, yosys
+from tests.bench import (
+    applications,
+    area,
+    cycles,
+    fuzz,
+    images,
+    links,
+    manager,
+    nextpnr,
+    simulators,
+    systems,
+    timing,
+    use,
+    yosys,
+)
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
@@ -23,6 +37,8 @@ _HEADINGS = {
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
     "images": "Images",
+    "links": "Links and crossings",
+    "applications": "Applications",
     "systems": "Systems",
     "simulators": "Simulators",
 }
@@ -39,15 +55,19 @@ _METHODS = {
     "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
     "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
+    "links": "Measured as in 'Area'.",
+    "applications": f"""The whole of each system of specs/ ([applications.md](applications.md)), its streams as ports,
+        measured as in 'Area', for ECP5 with `{yosys.ECP5.synthesis}` and for iCE40 UltraPlus with
+        `{yosys.ICE40.synthesis}`. The targets `synth_*` do the same with the Yosys that is installed.""",
     "systems": "Time that a user waits for a large system.",
     "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
         same frames and stalls in every simulator, and the same bytes back.""",
 }
 _INTRODUCTION = """
     Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
-    `cycles`, `fuzz`, `images`, `systems`, `simulators`). 'not converted' is a message that no converter is made of yet,
-    or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`.
-    'met' and 'MISSED' tell how a row stands to its bar.
+    `cycles`, `fuzz`, `images`, `links`, `applications`, `systems`, `simulators`). 'not converted' is a message that no
+    converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of
+    `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -58,7 +78,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    modules = (area, manager, timing, use, cycles, fuzz, images, systems, simulators)
+    modules = (area, manager, timing, use, cycles, fuzz, images, links, applications, systems, simulators)
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
 
@@ -91,7 +111,7 @@ def _versions(part: str) -> str:
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]
-    elif part in ("area", "manager", "timing"):
+    elif part in ("area", "manager", "timing", "links", "applications"):
         tools.append(f"{yowasp.PACKAGE} {yowasp.version()}")
         tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
     else:

@@ -16,7 +16,7 @@ from tests.bench.yosys import Yosys
 from tests.sim.ghdl import Generic
 
 # The sum of table 3.3, LUT/FF.
-_MANAGER = {
+DISSERTATION = {
     2: "26/12",
     4: "44/13",
     8: "81/14",
@@ -86,7 +86,7 @@ def _managers() -> Iterator[Row]:
                     "PUBLISHERS": channels,
                     "PREEMPTIVE": is_preemptive,
                 }
-                known = _MANAGER[channels] if is_theirs and not is_preemptive else ""
+                known = DISSERTATION[channels] if is_theirs and not is_preemptive else ""
                 bar = _MANAGER_BAR if known and channels == 256 else None
                 yield Row(label(design, channels), "", width, of_core("firm_manager", generics), known, bar)
 

@@ -23,7 +23,7 @@ from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, ports_of
 from tests.bench.model import FrameError, Message, publisher_model, subscriber_model
 from tests.bench.payloads import BrokenPayloadError, Payloads
 from tests.bench.tables import FAILED, Table
-from tests.bench.yosys import Cells, SynthesisError, Yosys, count_cells
+from tests.bench.yosys import ECP5, ICE40, Cells, SynthesisError, Yosys, count_cells
 from tests.sim.ghdl import Library
 
 SEED = 20240611
@@ -96,13 +96,21 @@ def test_what_counts_as_what() -> None:
         "IBUF": 9,
         "BUFG": 1,
         "RAMB18E2": 1,
+        "DSP48E2": 6,
+        "$scopeinfo": 4,
     }
-    assert count_cells(cells) == Cells(lut=3, ff=7, carry=5, memory=4, block=1)
+    assert count_cells(cells) == Cells(lut=3, ff=7, carry=5, memory=4, block=1, dsp=6)
+    ecp5 = {"LUT4": 1, "CCU2C": 2, "TRELLIS_FF": 7, "TRELLIS_DPR16X4": 1, "DP16KD": 3, "MULT18X18D": 1, "PFUMX": 9}
+    assert count_cells(ecp5, ECP5) == Cells(lut=5, ff=7, memory=4, block=3, dsp=1)
+    ice40 = {"SB_LUT4": 1, "SB_CARRY": 2, "SB_DFFESR": 3, "SB_DFF": 1, "SB_RAM40_4K": 2, "SB_MAC16": 1}
+    assert count_cells(ice40, ICE40) == Cells(lut=1, ff=4, carry=2, block=2, dsp=1)
     for latch in ("LDCE", "LDPE", "$dlatch", "$_DLATCH_P_"):
         with pytest.raises(SynthesisError, match="latches"):
             count_cells({"LUT1": 1, latch: 1})
     with pytest.raises(SynthesisError, match="FOO is not known"):
         count_cells({"FOO": 1})
+    with pytest.raises(SynthesisError, match="LUT6 is not known"):
+        count_cells({"LUT6": 1}, ECP5)
 
 
 def test_ports_of_an_entity() -> None:

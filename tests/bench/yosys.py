@@ -1,4 +1,4 @@
-"""What a netlist becomes on an UltraScale+ device: Yosys maps it and the cells are counted.
+"""What a netlist becomes on an UltraScale+ device, or one of another family: Yosys maps it and the cells are counted.
 
     yosys = Yosys()
     yosys.prepare()
@@ -16,13 +16,11 @@ import re
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from tests import yowasp
-
-SYNTHESIS = "synth_xilinx -family xcup -flatten -abc9"
 
 # How many LUTs a cell of distributed RAM or a shift register takes (UG974).
 _LUTS_AS_MEMORY = {
@@ -43,16 +41,13 @@ _LUTS_AS_MEMORY = {
     "RAM64M8": 8,
     "RAM512X1S": 8,
 }
-_LUT = re.compile(r"LUT[1-6]")
 _FF = re.compile(r"FD[RSCP]E(_1)?")
 # Where a slice has an inverter of its own (UG574); everywhere else one takes a LUT.
 _INVERTIBLE = {"R", "S", "CLR", "PRE", "C"}
 _RESET_INVERTER = "INV to resets"
-_CARRY = re.compile(r"CARRY[48]")
-_BLOCK = re.compile(r"RAMB(18|36)E2|URAM288|DSP48E2")
 _LATCH = re.compile(r"LD[CP]E(_1)?|\$_?dlatch.*", re.IGNORECASE)
-# Pins and clock buffers of a top level, constants, the multiplexers beside the LUTs, and Yosys' notes on hierarchy.
-_FREE = re.compile(r"[IO]?BUFT?|IOBUF|BUFG|GND|VCC|MUXF[789]|\$scopeinfo|INV to resets")
+# Yosys' notes on hierarchy.
+_NOTE = "$scopeinfo"
 
 
 class SynthesisError(Exception):
@@ -61,38 +56,95 @@ class SynthesisError(Exception):
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of a mapped design. `memory` are LUTs used as RAM or shift register; `block` block RAMs and DSPs."""
+    """Cells of a mapped design. `memory` are LUTs used as RAM or shift register; `block` block RAMs."""
 
     lut: int = 0
     ff: int = 0
     carry: int = 0
     memory: int = 0
     block: int = 0
+    dsp: int = 0
 
     def __str__(self) -> str:
         return f"{self.lut}/{self.ff}"
 
 
-def count_cells(number_of: Mapping[str, int]) -> Cells:
+# What a cell is: a field of `Cells`, or "" for what costs nothing, and how many of it.
+Kind = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class Family:
+    """A family of FPGAs: Yosys' command for it, and its cells, each by the first expression that is its name."""
+
+    name: str
+    synthesis: str
+    cells: Mapping[str, Kind]
+
+    def kind(self, cell: str) -> Kind:
+        """What a cell is. Raises `SynthesisError` if it is not known."""
+        found = next((kind for name, kind in self.cells.items() if re.fullmatch(name, cell)), None)
+        if found is None:
+            raise SynthesisError(f"the cell {cell} is not known")
+        return found
+
+
+XILINX = Family(
+    "xcup",
+    "synth_xilinx -family xcup -flatten -abc9",
+    {
+        "LUT[1-6]": ("lut", 1),
+        _FF.pattern: ("ff", 1),
+        "CARRY[48]": ("carry", 1),
+        **{name: ("memory", luts) for name, luts in _LUTS_AS_MEMORY.items()},
+        "RAMB(18|36)E2|URAM288": ("block", 1),
+        "DSP48E2": ("dsp", 1),
+        # Pins and clock buffers of a top level, constants, the multiplexers beside the LUTs.
+        f"[IO]?BUFT?|IOBUF|BUFG|GND|VCC|MUXF[789]|{_RESET_INVERTER}": ("", 0),
+    },
+)
+# A carry cell takes the two LUTs that it lies in, a distributed RAM four.
+ECP5 = Family(
+    "ecp5",
+    "synth_ecp5 -abc9",
+    {
+        "LUT4": ("lut", 1),
+        "CCU2C": ("lut", 2),
+        "TRELLIS_FF": ("ff", 1),
+        "TRELLIS_DPR16X4": ("memory", 4),
+        "DP16KD|PDPW16KD": ("block", 1),
+        "MULT18X18D": ("dsp", 1),
+        "PFUMX|L6MUX21|GND|VCC": ("", 0),
+    },
+)
+# A carry cell lies beside a LUT.
+ICE40 = Family(
+    "ice40",
+    "synth_ice40 -abc9 -device u -dsp",
+    {
+        "SB_LUT4": ("lut", 1),
+        "SB_DFF.*": ("ff", 1),
+        "SB_CARRY": ("carry", 1),
+        "SB_RAM40_4K.*|SB_SPRAM256KA": ("block", 1),
+        "SB_MAC16": ("dsp", 1),
+        "GND|VCC|SB_GB": ("", 0),
+    },
+)
+FAMILIES = (XILINX, ECP5, ICE40)
+SYNTHESIS = XILINX.synthesis
+
+
+def count_cells(number_of: Mapping[str, int], family: Family = XILINX) -> Cells:
     """Cells by what they take of a device. Raises `SynthesisError` for a latch, or a cell that is not known."""
     latches = [cell for cell in number_of if _LATCH.fullmatch(cell)]
     if latches:
         raise SynthesisError(f"latches: {', '.join(latches)}")
-    lut = ff = carry = memory = block = 0
+    found = Counter[str]()
     for cell, number in number_of.items():
-        if _LUT.fullmatch(cell):
-            lut += number
-        elif _FF.fullmatch(cell):
-            ff += number
-        elif _CARRY.fullmatch(cell):
-            carry += number
-        elif cell in _LUTS_AS_MEMORY:
-            memory += number * _LUTS_AS_MEMORY[cell]
-        elif _BLOCK.fullmatch(cell):
-            block += number
-        elif not _FREE.fullmatch(cell):
-            raise SynthesisError(f"the cell {cell} is not known")
-    return Cells(lut, ff, carry, memory, block)
+        if cell != _NOTE:
+            kind, weight = family.kind(cell)
+            found[kind] += number * weight
+    return Cells(**{field.name: found[field.name] for field in fields(Cells)})
 
 
 def _numbers(module: Mapping[str, Any]) -> Counter[str]:
@@ -119,14 +171,15 @@ def _kind(cell: Mapping[str, Any], sinks: Mapping[int, set[str]]) -> str:
 class Yosys(yowasp.Yosys):
     """Yosys that maps and counts; it must be prepared."""
 
-    def cells(self, verilog: str, top: str) -> Cells:
-        """Map a netlist for `xcup` and count its cells; raises `SynthesisError`."""
+    def cells(self, verilog: str, top: str, family: Family = XILINX) -> Cells:
+        """Map a netlist for a family and count its cells; raises `SynthesisError`."""
         with tempfile.TemporaryDirectory() as name:
             directory = Path(name)
             (directory / "netlist.v").write_text(verilog, encoding="utf-8")
-            script = f"read_verilog netlist.v; {SYNTHESIS} -top {top}; check -assert; write_json mapped.json"
+            script = f"read_verilog netlist.v; {family.synthesis} -top {top}; check -assert; write_json mapped.json"
             done = self.run(["-q", "-p", script], directory)
             mapped = directory / "mapped.json"
             if done.returncode != 0 or not mapped.is_file():
                 raise SynthesisError(f"Yosys ended with {done.returncode} and no netlist:\n{done.stderr[-2000:]}")
-            return count_cells(_numbers(json.loads(mapped.read_text(encoding="utf-8"))["modules"][top]))
+            modules = json.loads(mapped.read_text(encoding="utf-8"))["modules"]
+            return count_cells(_numbers(modules[top]), family)

@@ -131,3 +131,28 @@ def test_the_folder_it_is_called_in_does_not_count(tmp_path: Path, bare: Path, m
     monkeypatch.chdir(here)
     done = call(bare, put_generators(other.parents[1] / "lib" / "generators"), "input.yml")
     assert f"These were tried:\n  {bare}\n  {other}\nInstall" in done.stderr
+
+
+MAKEFILE = "python := $(shell python3 {})\nall:\n\t@echo found: $(python)\n"
+
+
+@pytest.mark.parametrize("shell", ["/bin/sh", "/bin/bash"])
+def test_a_makefile_finds_the_python_of_the_fusesoc_that_started_make(
+    tmp_path: Path, bare: Path, owner: Path, shell: str
+) -> None:
+    """Bash takes the place of a single command, Debian's sh may stay above it."""
+    (tmp_path / "fusesoc").write_text(PARENT)
+    generator = put_generators(tmp_path / "generators")
+    command = f"{generator.with_name('firm_python.py')} || true"
+    (tmp_path / "Makefile").write_text(f"SHELL := {shell}\n{MAKEFILE.format(command)}")
+    done = call(owner, tmp_path / "fusesoc", "make", "-C", tmp_path, PATH=f"{bare.parent}:/usr/bin:/bin")
+    assert f"found: {owner}" in done.stdout.splitlines()
+
+
+def test_a_makefile_does_without(tmp_path: Path, bare: Path) -> None:
+    generator = put_generators(tmp_path / "generators")
+    (tmp_path / "Makefile").write_text(MAKEFILE.format(generator.with_name("firm_python.py")))
+    done = call("make", "-C", tmp_path, PATH=f"{bare.parent}:/usr/bin:/bin")
+    assert "found:" in done.stdout.splitlines()
+    chosen = call("make", "-C", tmp_path, PATH=f"{bare.parent}:/usr/bin:/bin", FUSESOC_FIRM_PYTHON=sys.executable)
+    assert f"found: {sys.executable}" in chosen.stdout.splitlines()

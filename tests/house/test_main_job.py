@@ -12,6 +12,8 @@ from types import MappingProxyType
 
 import pytest
 
+from fusesoc_firm import manifest
+
 ROOT = Path(__file__).resolve().parents[2]
 FUSESOC = Path(sys.executable).parent / "fusesoc"
 CORES = ("quat2euler", "quat2euler_hls")
@@ -101,7 +103,9 @@ def test_it_passes_and_a_second_time_comes_out_of_the_store(core: str, build_roo
 
 @pytest.mark.parametrize("core", shared)
 def test_it_passes_without_an_activated_environment(core: str, build_root: Path) -> None:
+    (work_folder(build_root, core) / manifest.FILE).unlink(missing_ok=True)
     assert has_passed(run(core, build_root, is_activated=False))
+    assert {"ghdl", "fusesoc", "edalize", "fusesoc-firm"} <= manifest.read(work_folder(build_root, core)).keys()
 
 
 @pytest.mark.parametrize("core", shared)

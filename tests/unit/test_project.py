@@ -15,6 +15,7 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.library_path import library_root
 from fusesoc_firm.own_code import PACKAGE
 from fusesoc_firm.project import project_cores
+from fusesoc_firm.tools import Program
 
 LEAF = """\
 CAPI=2:
@@ -259,7 +260,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
         program.write_text(f"#!/bin/sh\necho {text}\n")
         program.chmod(0o755)
 
-    monkeypatch.setattr("fusesoc_firm.lock._PROGRAMS", {"ghdl": "--version"})
+    monkeypatch.setattr("fusesoc_firm.tools.PROGRAMS", {"ghdl": Program("ghdl")})
     monkeypatch.setenv("PATH", str(project / "bin"))
     install("GHDL 2.0.0")
     main(["lock", "me:p:top"])
@@ -273,7 +274,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     capsys.readouterr()
     install("GHDL 2.0.0")
     assert locked(capsys) == []
-    monkeypatch.setattr("fusesoc_firm.lock.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.own_code.digests", lambda: {"naming.py": "edited"})
     (found,) = locked(capsys)
     assert found.startswith("tool fusesoc-firm: sha256 is ")
 

@@ -32,7 +32,7 @@ blocks:
   - {{name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point, period: 1 ms}}
 """
 WITH_PINS = """\
-project: {name: robot, clock: 100 MHz, clocks: [{name: fast, frequency: 200 MHz}]}
+project: {name: robot, clock: 100 MHz}
 accelerators:
   - name: copy
     type: VHDL
@@ -43,7 +43,7 @@ accelerators:
     pins: [{name: lamp, direction: out}]
 blocks:
   - {name: in, middleware: ROS, mode: subscriber, message: geometry_msgs/Point, outgoing: [{name: block}]}
-  - {name: block, type: copy, clock: fast, outgoing: [{name: out}]}
+  - {name: block, type: copy, outgoing: [{name: out}]}
   - {name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point}
 """
 BOARD = """
@@ -126,7 +126,7 @@ def test_a_board_of_spi(tmp_path: Path) -> None:
     [
         (BOARD.replace("{port: uart_rxd, site: A2}", "{port: led, site: A2}"), "the board has no pin for 'uart_rxd'"),
         (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' has a pin already"),
-        (BOARD + "  - {port: lamp, site: A4}\n", "'port' cannot be 'lamp'"),
+        (BOARD + "  - {port: Clk, site: A4}\n", "port 'Clk' has a pin already"),
         (BOARD.replace("trellis", "ise"), "'flow' cannot be 'ise'"),
         (BOARD.split("pins:", maxsplit=1)[0], "the board has no pin for 'clk'"),
         (BOARD.replace("uart\n", "axi_stream\n"), "flow 'trellis' has no processor to take streams"),
@@ -156,17 +156,69 @@ def test_a_preemptive_scheduler_does_not_fit_on_a_link(tmp_path: Path) -> None:
         on(tmp_path, written(tmp_path, BOARD), "lst")
 
 
-def test_pins_and_further_clocks_have_no_place_on_a_board(tmp_path: Path) -> None:
+def with_pins(tmp_path: Path, board: Board, pins: str, block: str = "Block") -> DerivedSystem:
     (tmp_path / "copy.vhd").write_text("entity copy is end;", encoding="ascii")
-    (tmp_path / "spec.yaml").write_text(WITH_PINS, encoding="utf-8")
-    board = written(tmp_path, BOARD)
+    text = WITH_PINS.replace("{name: lamp, direction: out}", pins).replace("name: block", f"name: {block}")
+    (tmp_path / "spec.yaml").write_text(text, encoding="utf-8")
+    faults = Diagnostics()
+    specification = read_specification(tmp_path / "spec.yaml", "spec.yaml", faults)
+    return derive(on_board(specification, board), tmp_path, LIBRARIES, faults)
+
+
+def test_a_board_has_one_clock(tmp_path: Path) -> None:
+    board = written(tmp_path, BOARD + "  - {port: block_lamp, site: A4}\n")
+    text = WITH_PINS.replace("clock: 100 MHz", "clock: 100 MHz, clocks: [{name: fast, frequency: 200 MHz}]")
+    (tmp_path / "copy.vhd").write_text("entity copy is end;", encoding="ascii")
+    (tmp_path / "spec.yaml").write_text(text.replace("type: copy,", "type: copy, clock: fast,"), encoding="utf-8")
     faults = Diagnostics()
     specification = read_specification(tmp_path / "spec.yaml", "spec.yaml", faults)
     system = derive(on_board(specification, board), tmp_path, LIBRARIES, faults)
     with pytest.raises(InputError) as raised:
         check_fits(system, board)
-    assert "board 'board' has no clock 'fast'" in str(raised.value)
-    assert "spec.yaml:9:19: error: pin 'lamp' of 'block' has no place on board 'board'" in str(raised.value)
+    assert str(raised.value) == "error: board 'board' has no clock 'fast'\n      = a board has one clock, clk"
+
+
+PINS = "{name: Lamp, direction: out}, {name: level, direction: in, bits: 2}"
+
+
+@pytest.mark.parametrize("flow", FLOWS)
+def test_pins_of_accelerators_lead_to_sites(tmp_path: Path, flow: str) -> None:
+    """In the case that a netlist has, whatever the specification and the board say."""
+    places = {"BLOCK_lamp": "B1", "block_level[0]": "B2", "block_level[1]": "B3"}
+    text = BOARD.replace("trellis", flow) + "".join(
+        f"  - {{port: '{name}', site: {places[name]}}}\n" for name in places
+    )
+    board = written(tmp_path, text)
+    system = with_pins(tmp_path, board, PINS)
+    check_fits(system, board)
+    configuration = board_configuration(system, board)
+    top = [" ".join(line.split()) for line in render(BOARD_TEMPLATE, configuration).splitlines()]
+    assert "block_lamp : out std_logic;" in top
+    assert "block_level : in std_logic_vector(1 downto 0)" in top
+    assert {"block_lamp => block_lamp,", "block_level => block_level,"} <= set(top)
+    lines = render(f"board/{FLOWS[flow][0]}", configuration).splitlines()
+    for name, site in places.items():
+        (line,) = (line for line in lines if site in line)
+        assert name.lower() in line.replace('"', "")
+
+
+def test_pins_without_a_place_and_places_without_a_pin(tmp_path: Path) -> None:
+    board = written(tmp_path, BOARD + "  - {port: 'block_level[0]', site: B2}\n  - {port: block_lmp, site: B3}\n")
+    with pytest.raises(InputError) as raised:
+        check_fits(with_pins(tmp_path, board, PINS), board)
+    said = str(raised.value)
+    assert "spec.yaml:9:19: error: pin 'Lamp' of 'Block' has no place on board 'board'" in said
+    assert "give a board file of your own a '{port: block_lamp, site: ...}'" in said
+    assert "error: pin 'level' of 'Block' has no place on board 'board'" in said
+    assert "'{port: block_level[1], site: ...}'" in said
+    assert "error: nothing of the system is called 'block_lmp'" in said
+    assert "did you mean 'block_lamp'?" in said
+
+
+def test_a_pin_is_not_called_as_a_port_of_the_board(tmp_path: Path) -> None:
+    board = written(tmp_path, BOARD)
+    with pytest.raises(InputError, match="pin 'n' of 'led' is called 'led_n', as a port of every board may be"):
+        check_fits(with_pins(tmp_path, board, "{name: n, direction: out}", "led"), board)
 
 
 def test_a_clock_that_is_none(tmp_path: Path) -> None:

