@@ -9,13 +9,14 @@ This file runs in any Python 3.9 or later.
 from __future__ import annotations
 
 import os
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
-from importlib.util import find_spec
-from pathlib import Path
-from typing import NoReturn
+
+# What only a second start needs is imported for it: most calls are answered out of the store, at once.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import NoReturn
 
 _NEEDED = ("fusesoc_firm", "chevron", "rosbags", "yaml")
 # Without the current folder, which `-c` can import from and a script cannot.
@@ -33,16 +34,32 @@ _RESTARTED = "_FUSESOC_FIRM_RESTARTED"
 
 def run(command: str) -> NoReturn:
     """Answer FuseSoC's call of the generator `command`, in this Python or in another that takes this one's place."""
-    is_restarted = os.environ.pop(_RESTARTED, "")
-    if not is_restarted:
-        _restart_if_needed(command)
-    from fusesoc_firm.gapi import main
-
+    is_restarted = bool(os.environ.pop(_RESTARTED, ""))
+    try:
+        if (is_restarted or not os.environ.get(_CHOSEN)) and _is_recalled(command):
+            sys.exit(0)
+        if not is_restarted:
+            _restart_if_needed(command)
+        from fusesoc_firm.gapi import main
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
     sys.exit(main(command, sys.argv[1:]))
+
+
+def _is_recalled(command: str) -> bool:
+    """Tell whether the call was answered as it was answered before."""
+    try:
+        from fusesoc_firm.recall import answer
+    except ImportError:
+        return False
+    return answer(command, sys.argv[1:])
 
 
 def _restart_if_needed(command: str) -> None:
     """Return if this Python will do; else start again in one that does, or end with a message."""
+    from importlib.util import find_spec
+
     chosen = os.environ.get(_CHOSEN)
     if not chosen and all(map(find_spec, _NEEDED)):
         return
@@ -59,6 +76,9 @@ def _restart_if_needed(command: str) -> None:
 
 def _candidates() -> Iterator[str]:
     """Pythons that may have the package, the likeliest first."""
+    import shutil
+    from pathlib import Path
+
     interpreter, script = _parent_command()
     # Where no Python but, say, a shell is the parent, it is not to be asked what only Python understands.
     if Path(interpreter).name.startswith(("python", "pypy")) and (found := shutil.which(interpreter)):
@@ -70,6 +90,8 @@ def _candidates() -> Iterator[str]:
 
 def _parent_command() -> tuple[str, str]:
     """Interpreter and script of FuseSoC, the process that started this one; "" where the system does not tell."""
+    from pathlib import Path
+
     try:
         words = Path(f"/proc/{os.getppid()}/cmdline").read_bytes().decode(errors="replace").split("\0")
         folder = Path(f"/proc/{os.getppid()}/cwd").readlink()
@@ -89,6 +111,8 @@ def _environments_above(path: Path) -> Iterator[str]:
 
 
 def _is_suitable(python: str) -> bool:
+    import subprocess
+
     try:
         return subprocess.run([python, "-c", _PROBE], stderr=subprocess.DEVNULL, check=False).returncode == 0
     except OSError:

@@ -13,9 +13,14 @@ _PROGRAMS: dict[str, tuple[str, ...]] = {
 }
 
 
-def missing_programs(tool: str) -> list[str]:
-    """The programs that Edalize's tool needs beside GHDL, and it too, which are not installed."""
-    return [name for name in ("ghdl", *_PROGRAMS.get(tool, ())) if shutil.which(name) is None]
+def needed_programs(tool: str) -> list[str]:
+    """The programs that Edalize's tool needs beside GHDL, and it too."""
+    return ["ghdl", *_PROGRAMS.get(tool, ())]
+
+
+def missing_programs(programs: Iterable[str]) -> list[str]:
+    """Those that are not installed."""
+    return [name for name in programs if shutil.which(name) is None]
 
 
 def explanation(programs: Iterable[str]) -> str:

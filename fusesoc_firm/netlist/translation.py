@@ -16,7 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.netlist.programs import explanation, missing_programs
+from fusesoc_firm.netlist.programs import explanation, missing_programs, needed_programs
 from fusesoc_firm.netlist.repair import NetlistError, repair
 
 _UNBOUND = re.compile(r'instance "(.*?)" of component "(.*?)" is not bound')
@@ -81,7 +81,7 @@ def translate(translation: Translation, folder: Path) -> str:
 
     Raises `NetlistError`; then there is no netlist.
     """
-    if missing := missing_programs(translation.tool):
+    if missing := missing_programs(needed_programs(translation.tool)):
         raise NetlistError(explanation(missing))
     output = Path(translation.output)
     output.unlink(missing_ok=True)
