@@ -63,7 +63,9 @@ def _hook(event: str, arguments: tuple[object, ...]) -> None:
         if event != "open" or _is_read(*arguments[1:]):
             _note(arguments[0], is_file=True)
     elif event in _OF_FOLDERS:
-        _note(arguments[0], is_file=False)
+        # An import lists the folders of Python's path, and never scans one.
+        if event != "os.listdir" or arguments[0] not in _current[-1].python_path:
+            _note(arguments[0], is_file=False)
     elif event in _OF_TEMPORARY:
         _current[-1].temporary.append(_absolute(str(arguments[0])))
 
@@ -79,7 +81,9 @@ def _note(path: object, *, is_file: bool) -> None:
     if not isinstance(path, str | bytes) or (text := os.fsdecode(path)) == ":memory:":
         return
     absolute, reads = _absolute(text), _current[-1]
-    if not _is_below(absolute, (*_apart(), *reads.temporary)) and not _is_of_package(absolute, reads):
+    # An archive may be on Python's path, too.
+    is_apart = is_file and absolute in reads.python_path
+    if not is_apart and not _is_below(absolute, (*_apart(), *reads.temporary)) and not _is_of_package(absolute, reads):
         (reads.files if is_file else reads.folders)[absolute] = None
 
 

@@ -125,9 +125,7 @@ def test_definitions_that_nobody_asked_for_do_not_count(calls: Calls) -> None:
     assert answer("firm", arguments)
 
 
-@pytest.mark.parametrize(
-    "name", ["quat2euler.yaml", "stimuli.yaml", "model.py", "rtl/quat2euler.vhd", "new.csv"]
-)
+@pytest.mark.parametrize("name", ["quat2euler.yaml", "stimuli.yaml", "model.py", "rtl/quat2euler.vhd", "new.csv"])
 def test_an_input_is_looked_at_again(calls: Calls, name: str) -> None:
     arguments = calls.simulation(files=["new.csv"])
     assert main("far", arguments) == 0
