@@ -26,7 +26,7 @@ from fusesoc_firm.netlist.programs import explanation, missing_programs, needed_
 from fusesoc_firm.own_code import PACKAGE, digests, used_code
 from fusesoc_firm.parameters import Parameter, check_parameters
 from fusesoc_firm.reads import Reads, noted
-from fusesoc_firm.recall import SEARCHED, Fact, call_digest, facts
+from fusesoc_firm.recall import LOCKED, SEARCHED, Fact, call_digest, facts
 from fusesoc_firm.requesting_core import find_requesting_core
 from fusesoc_firm.store import Call as StoredCall
 from fusesoc_firm.store import Entry, Files, Key, Made, default_store, request_digest
@@ -128,6 +128,8 @@ _MESSAGES = Parameter(
 
 _DISTRO = Parameter("distro", "str", "the ROS distribution whose standard messages are meant")
 
+_LOCKED = Parameter("locked", "str", "a lock file, relative to the core: what differs from it is refused")
+
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
         (
@@ -151,6 +153,7 @@ GENERATORS: Mapping[str, Generator] = {
             _PATHS,
             _MESSAGES,
             _DISTRO,
+            _LOCKED,
         ),
         _converter_inputs,
         _generate_converters,
@@ -174,6 +177,7 @@ GENERATORS: Mapping[str, Generator] = {
             _PATHS,
             _MESSAGES,
             _DISTRO,
+            _LOCKED,
         ),
         _system_inputs,
         _generate_system,
@@ -200,8 +204,9 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
         path = Path(argv[0])
         request = read_request(command, path, generators[command].parameters)
         missing = missing_programs(generators[command].programs(request))
-        # What is missing is said on every run.
-        entry = obtain(request, generators[command], None if missing else path)
+        is_locked = _check_locked(request)
+        # What is locked is compared on every run, and what is missing is said.
+        entry = obtain(request, generators[command], None if missing or is_locked else path)
         _write(entry.files)
         if marks := _marks(request):
             mark_run("", marks)
@@ -217,6 +222,22 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     origin = "from store" if entry.is_from_store else "generated"
     print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
     return 0
+
+
+def _check_locked(request: Request) -> bool:
+    """Tell whether a request is held to a lock file. Raises `InputError` with what differs from one."""
+    places: list[Path] = []
+    if name := request.parameters.get("locked"):
+        places.append(request.files_root / str(name))
+    if name := os.environ.get(LOCKED):
+        if not Path(name).is_absolute():
+            fail(f"{LOCKED} is '{name}'", hint=f"a generator has a folder of its own; write {LOCKED}=$PWD/{name}")
+        places.append(Path(name))
+    for place in places:
+        from fusesoc_firm.lock import check_request
+
+        check_request(place, request, has_messages=request.command != MESSAGES)
+    return bool(places)
 
 
 def _marks(request: Request) -> str:
@@ -296,7 +317,8 @@ def _key(request: Request, generator: Generator, reads: Reads) -> Key:
     asked = {
         "command": request.command,
         "vlnv": request.vlnv,
-        "parameters": dict(request.parameters),
+        # What is locked is so beside what is made.
+        "parameters": {name: value for name, value in request.parameters.items() if name != "locked"},
         "tools": dict(generator.tools(request)),
     }
     paths = generator.inputs(request)

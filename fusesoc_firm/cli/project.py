@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from fusesoc_firm.diagnostics import InputError, fail
 if TYPE_CHECKING:
     from fusesoc_firm.gapi import MessageCores
     from fusesoc_firm.generation import Request
+    from fusesoc_firm.lock import Lock
     from fusesoc_firm.project import Instance, ProjectCore
 
 
@@ -77,23 +79,51 @@ def _list_affected(arguments: argparse.Namespace) -> None:
         print(f"{name:{width}}  {reason}")
 
 
-def _lock(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.gapi import MESSAGES
-    from fusesoc_firm.lock import check_lock, lock_of, lock_path, lock_text, read_lock
+def check_locked(core: str) -> Path:
+    """Raise `InputError` with everything in which a core, by its name, differs from its lock file, which is returned.
+
+    Where that file is missing, there is nothing to hold the core to, which is a fault, too.
+    """
+    from fusesoc_firm.lock import check_lock, lock_path, read_lock
     from fusesoc_firm.project import dependencies
 
+    found, depends = dependencies(core)
+    path = lock_path(found)
+    locked = read_lock(path)
+    check_lock(locked, _used(found, depends))
+    return path
+
+
+def _lock(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.lock import lock_path, lock_text
+    from fusesoc_firm.project import dependencies
+
+    if arguments.locked:
+        print(f"{_shown(check_locked(arguments.core))}: nothing differs")
+        return
     core, depends = dependencies(arguments.core)
-    path = lock_path(core)
-    locked = read_lock(path) if arguments.locked else None
-    wanted = [instance for instance in core.instances if instance.generator != MESSAGES]
-    requests = [request for instance in wanted if (request := _request(instance))]
-    used = lock_of(core, depends, requests)
-    if locked is None:
-        write(path, lock_text(used))
-        print(_shown(path))
-    else:
-        check_lock(locked, used)
-        print(f"{_shown(path)}: nothing differs")
+    write(lock_path(core), lock_text(_used(core, depends)))
+    print(_shown(lock_path(core)))
+
+
+def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
+    """What a core uses now."""
+    from fusesoc_firm.lock import lock_of
+
+    calls = {core.vlnv: [*_calls(core)]}
+    for item in depends:
+        # Of another one only part may be used here. Where that cannot be made, FuseSoC's run says so.
+        with suppress(InputError):
+            calls[item.vlnv] = [*_calls(item)]
+    return lock_of(core, depends, calls)
+
+
+def _calls(core: ProjectCore) -> Iterator[tuple[Request, list[Path]]]:
+    from fusesoc_firm.gapi import MESSAGES
+
+    for instance in core.instances:
+        if instance.generator != MESSAGES and (request := _request(instance)):
+            yield request, _inputs(request)
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
