@@ -160,11 +160,24 @@ def test_graph(project: Path, capsys: Captured) -> None:
     assert main(["graph", "me:p:top", "--format", "dot"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert '  "me:p:top:1.0" -> "me:p:top-size:1.0"' in lines
-    assert '  "me:p:top-size:1.0" -> "msg/my_msgs/msg/Size.msg"' in lines
+    assert '  "me:p:top-size:1.0" -> "top/msg/my_msgs/msg/Size.msg"' in lines
     assert '  "me:p:top:1.0" -> "me:p:branch:1.0"' in lines
     assert '  "me:p:leaf:1.0" [shape=box]' not in lines
     assert main(["graph", "me:p:branch", "--target", "sim", "--format", "dot"]) == 0
     assert '  "me:p:branch:1.0" -> "me:p:leaf:1.0"' in capsys.readouterr().out.splitlines()
+
+
+def test_files_of_one_name_are_two_and_any_name_can_be_drawn(project: Path, capsys: Captured) -> None:
+    for name in ("one", 'the "other"'):
+        message = project / name / "msg/my_msgs/msg/Size.msg"
+        message.parent.mkdir(parents=True)
+        message.write_text("uint8 a\n")
+        core = TOP.replace("me:p:top", f"me:p:{name[:3]}").replace("me:p:tree", "me:p:one")
+        (project / name / "x.core").write_text(core.replace('"me:p:one", ', "") if name == "one" else core)
+    assert main(["graph", "me:p:the", "--format", "dot"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert '  "me:p:one-size:1.0" -> "one/msg/my_msgs/msg/Size.msg"' in lines
+    assert '  "me:p:the-size:1.0" -> "the \\"other\\"/msg/my_msgs/msg/Size.msg"' in lines
 
 
 @pytest.mark.skipif(not shutil.which("dot"), reason="Graphviz is not installed")
@@ -183,6 +196,7 @@ def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatc
     ("arguments", "message"),
     [
         (["me:p:bush"], "'me:p:bush' is no core that FuseSoC knows here"),
+        (["me:p:a bush"], "'me:p:a bush' is no core that FuseSoC knows here"),
         (["me:p:top", "--target", "fly"], "'me:p:top:1.0' has no target 'fly'"),
     ],
 )
