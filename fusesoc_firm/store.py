@@ -45,6 +45,9 @@ _DEFAULT_LIMIT = "1G"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 # When the store is too large, so much is left that it is not so again at once.
 _KEPT_OF_LIMIT = 0.8
+# Who makes an entry may be stopped, or be on a machine that is no more. It is longer than generation takes.
+_LONGEST_WAIT_SECONDS = 120
+_POLL_SECONDS = 0.02
 # What a process that was killed left behind; no file takes so long to be written.
 _ABANDONED_SECONDS = 3600
 
@@ -196,11 +199,14 @@ class Store:
 
     @contextmanager
     def _lock(self, key: Key) -> Iterator[bool]:
-        """Hold the request's lock, which the system frees if the process dies; False where there can be none."""
+        """Hold the request's lock, which the system frees if the process dies; False if the store cannot be written.
+
+        Who has waited too long for it goes on without.
+        """
         path = self._path(key.request, LOCK)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            file = _locked(path)
+            file, is_held = _locked(path)
         except OSError as error:
             self._warn(error)
             yield False
@@ -209,8 +215,9 @@ class Store:
             yield True
         finally:
             # While it is held: whoever waits for it then sees that the file is another one.
-            with suppress(OSError):
-                path.unlink()
+            if is_held:
+                with suppress(OSError):
+                    path.unlink()
             file.close()
 
     def _keep(self, key: Callable[[], Key], wanted: Key, made: Made, call: Call | None) -> None:
@@ -303,14 +310,30 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
     return digest_of(parts)
 
 
-def _locked(path: Path) -> IO[bytes]:
-    """The file at `path`, opened and locked, which whoever had the lock before may have removed meanwhile."""
+def _locked(path: Path) -> tuple[IO[bytes], bool]:
+    """The file at `path`, opened, and whether it is locked; whoever had the lock before may have removed it meanwhile.
+
+    A file system without locks, or one that another machine keeps, costs a second build at worst.
+    """
+    end = time.monotonic() + _LONGEST_WAIT_SECONDS
     while True:
         file = path.open("wb")
-        # A file system without locks costs a second build at worst.
-        with suppress(OSError):
-            fcntl.flock(file, fcntl.LOCK_EX)
+        while not (is_held := _take(file)) and time.monotonic() < end:
+            time.sleep(_POLL_SECONDS)
+        if not is_held:
+            return file, False
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file
+                return file, True
         file.close()
+
+
+def _take(file: IO[bytes]) -> bool:
+    """Lock a file unless another process has it; a lock that cannot be had at all counts as taken."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True

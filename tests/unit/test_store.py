@@ -266,6 +266,49 @@ def test_a_process_that_ends_in_the_middle_leaves_no_entry_and_no_lock(
     assert find(tmp_path) == FILES
 
 
+def test_one_that_is_stopped_is_not_waited_for_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    process = start(HANG_IN_BUILD, tmp_path, REQUEST)
+    wait_for(process, "in the middle")
+    process.send_signal(signal.SIGSTOP)
+    monkeypatch.setattr(store_module, "_LONGEST_WAIT_SECONDS", 0.2)
+    begin = time.monotonic()
+    # What the other process asked for.
+    made = Store(tmp_path, LARGE).obtain(lambda: Key(REQUEST, {}), lambda: Made(FILES, []))
+    assert time.monotonic() - begin >= 0.2
+    assert made == Entry(FILES, False)
+    assert find(tmp_path, code={}) == FILES
+    # Its lock is its own to remove.
+    assert len([*tmp_path.rglob("*.lock")]) == 1
+    process.kill()
+    process.communicate()
+
+
+class Gone:
+    """A file that was opened, and removed on another machine before it was read."""
+
+    def __enter__(self) -> Gone:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def read(self) -> bytes:
+        raise OSError(errno.ESTALE, "Stale file handle")
+
+
+def test_what_is_gone_while_it_is_read_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    obtain(tmp_path)
+    real = open
+
+    def open_stale(path: Path | str, mode: str) -> object:
+        return Gone() if str(path).endswith((".entry", ".uses")) else real(path, mode)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("builtins.open", open_stale)
+        assert obtain(tmp_path) == Entry(FILES, False)
+    assert find(tmp_path) == FILES
+
+
 FILL = """
 import itertools, sys
 from pathlib import Path
