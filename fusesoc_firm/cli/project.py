@@ -129,13 +129,17 @@ def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
     """What tells by which of the changed files a core itself is touched."""
 
     def touched(core: ProjectCore) -> str | None:
-        files = set(core.files)
-        for instance in core.instances:
-            files |= _files_behind(instance, changed)
-        first = next((path for path in changed if path in files), None)
-        return None if first is None else _shown(first)
+        found = _first(changed, core.files)
+        # What is behind a generated core takes longer to tell.
+        for instance in core.instances if changed and not found else ():
+            found = found or _first(changed, _files_behind(instance, changed))
+        return _shown(found) if found else None
 
     return touched
+
+
+def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
+    return next((path for path in changed if path in files), None)
 
 
 def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
