@@ -91,7 +91,7 @@ class Entry:
 class Call:
     """A call as `recall` knows it: its digest, the facts that its key follows from, and what else the note holds.
 
-    `facts` are asked for when the key is made, their states are those of that moment.
+    `facts` are told for those of our own files that were used, in their state at that moment.
     """
 
     digest: str
@@ -126,7 +126,7 @@ class Store:
         wanted = key()
         if (files := self._find(wanted)) is not None:
             if call and self._is_writable():
-                self._note(key, wanted, self.uses(wanted) or (), call)
+                self._note(key, wanted, call)
             return Entry(files, True)
         with self._lock(wanted) as is_writable:
             # While this process waited for the lock another one may have made the entry.
@@ -223,28 +223,32 @@ class Store:
     def _keep(self, key: Callable[[], Key], wanted: Key, made: Made, call: Call | None) -> None:
         used = sorted(made.used)
         full = wanted.with_code(used)
-        # Before the key is made again: what is edited after that differs from its state here.
         facts = call.facts(used) if call else ()
-        # One of our own files is no more, or is new, or something was edited.
+        # The key after the facts: what is edited in between is found now, and what is edited later differs from them.
+        # None if one of our own files is no more, or is new.
         if full is None or key() != wanted:
             return
         try:
             store_files.write_entry(self._path(full, ENTRY), wanted.about, made.files)
             store_files.write_json(self._path(wanted.request, USES), used)
             if call:
-                store_files.write_json(self._path(call.digest, CALL), {**call.note, "key": full, "facts": facts})
+                self._write_note(call, full, facts)
             self._shrink_if_needed()
         except OSError as error:
             self._warn(error)
 
-    def _note(self, key: Callable[[], Key], wanted: Key, used: Iterable[str], call: Call) -> None:
-        """Note what led to an entry that was found by its key."""
+    def _note(self, key: Callable[[], Key], wanted: Key, call: Call) -> None:
+        """Note a call whose entry was found by the key, unless something is edited meanwhile."""
+        used = self.uses(wanted) or []
         full = wanted.with_code(used)
         facts = call.facts(used)
         if full is not None and key() == wanted:
             # It only saves time.
             with suppress(OSError):
-                store_files.write_json(self._path(call.digest, CALL), {**call.note, "key": full, "facts": facts})
+                self._write_note(call, full, facts)
+
+    def _write_note(self, call: Call, full: str, facts: Sequence[Fact]) -> None:
+        store_files.write_json(self._path(call.digest, CALL), {**call.note, "key": full, "facts": facts})
 
     def _is_writable(self) -> bool:
         return os.access(self._folder(), os.W_OK)

@@ -118,6 +118,15 @@ def test_a_definition_is_looked_at_again(calls: Calls, name: str) -> None:
     assert not answer("firm", arguments)
 
 
+def test_a_folder_that_the_environment_names_may_come_later(calls: Calls) -> None:
+    calls.monkeypatch.setenv("AMENT_PREFIX_PATH", str(calls.project / "later"))
+    arguments = calls.call("vector", message="geometry_msgs/Vector3", ros=2)
+    main("firm", arguments)
+    assert answer("firm", arguments)
+    calls.write("later/share/geometry_msgs/msg/Vector3.msg", "float64 x\n")
+    assert not answer("firm", arguments)
+
+
 def test_definitions_that_nobody_asked_for_do_not_count(calls: Calls) -> None:
     arguments = calls.converter()
     main("firm", arguments)
@@ -238,9 +247,13 @@ def test_an_answer_does_not_need_what_led_to_the_key(calls: Calls) -> None:
     assert answer("firm", arguments)
 
 
-def test_what_is_edited_while_the_facts_are_noted_is_not_noted(calls: Calls) -> None:
+@pytest.mark.parametrize("is_stored", [False, True])
+def test_what_is_edited_while_the_facts_are_noted_is_not_noted(calls: Calls, is_stored: bool) -> None:
     """The state in a note must be that which the key was made of."""
     arguments = calls.converter()
+    if is_stored:
+        main("firm", arguments)
+        _removed(CALL)(calls)
     edits = iter(["uint16 a\n"])
 
     def edit_after(kind: str, names: list[str]) -> list[tuple[str, str, str | None]]:
