@@ -19,32 +19,34 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 _NEEDED = ("fusesoc_firm", "chevron", "rosbags", "yaml")
-# Without the current folder, which `-c` can import from and a script cannot.
-_PROBE = f"""
-import sys
-from importlib.util import find_spec
-sys.path = [folder for folder in sys.path if folder]
-sys.exit(not all(map(find_spec, {_NEEDED})))
-"""
 # Set to a Python to use just that.
 _CHOSEN = "FUSESOC_FIRM_PYTHON"
-# Set for the second start, so that there is no third.
-_RESTARTED = "_FUSESOC_FIRM_RESTARTED"
+# Set for a further start: the Pythons that were tried, and those that are left, both in lines.
+_TRIED, _LEFT = "_FUSESOC_FIRM_TRIED", "_FUSESOC_FIRM_LEFT"
 
 
 def run(command: str) -> NoReturn:
     """Answer FuseSoC's call of the generator `command`, in this Python or in another that takes this one's place."""
-    is_restarted = bool(os.environ.pop(_RESTARTED, ""))
+    tried, left = (os.environ.pop(name, "").splitlines() for name in (_TRIED, _LEFT))
+    chosen = os.environ.get(_CHOSEN)
     try:
-        if (is_restarted or not os.environ.get(_CHOSEN)) and _is_recalled(command):
+        if chosen and not tried and chosen != sys.executable:
+            _start_next(command, [], [chosen])
+        if _is_recalled(command):
             sys.exit(0)
-        if not is_restarted:
-            _restart_if_needed(command)
-        from fusesoc_firm.gapi import main
+        from importlib.util import find_spec
+
+        if all(map(find_spec, _NEEDED)):
+            from fusesoc_firm.gapi import main
+
+            sys.exit(main(command, sys.argv[1:]))
+        if not tried:
+            tried = [sys.executable]
+            left = [] if chosen else [python for python in dict.fromkeys(_candidates()) if python != sys.executable]
+        _start_next(command, tried, left)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         sys.exit(130)
-    sys.exit(main(command, sys.argv[1:]))
 
 
 def _is_recalled(command: str) -> bool:
@@ -56,20 +58,22 @@ def _is_recalled(command: str) -> bool:
     return answer(command, sys.argv[1:])
 
 
-def _restart_if_needed(command: str) -> None:
-    """Return if this Python will do; else start again in one that does, or end with a message."""
-    from importlib.util import find_spec
+def _start_next(command: str, tried: list[str], left: list[str]) -> NoReturn:
+    """Start again in the next Python that may have the package, or end with a message.
 
-    chosen = os.environ.get(_CHOSEN)
-    if not chosen and all(map(find_spec, _NEEDED)):
-        return
-    pythons = [chosen] if chosen else list(dict.fromkeys([sys.executable, *_candidates()]))
-    for python in pythons[0 if chosen else 1 :]:
-        if _is_suitable(python):
-            os.execve(python, [python, *sys.argv], {**os.environ, _RESTARTED: "1"})
-    tried = "\n".join(f"  {python}" for python in pythons)
+    It is not asked beforehand whether it has: that would take a start by itself.
+    """
+    while left:
+        tried.append(left.pop(0))
+        environment = {**os.environ, _TRIED: "\n".join(tried), _LEFT: "\n".join(left)}
+        try:
+            os.execve(tried[-1], [tried[-1], *sys.argv], environment)
+        except OSError:
+            # It is no program, or is no more.
+            continue
+    lines = "\n".join(f"  {python}" for python in tried)
     sys.exit(
-        f"{command}: error: no Python with the packages {', '.join(_NEEDED)} was found. These were tried:\n{tried}\n"
+        f"{command}: error: no Python with the packages {', '.join(_NEEDED)} was found. These were tried:\n{lines}\n"
         f"Install fusesoc-firm beside FuseSoC, activate the environment that has it, or set {_CHOSEN} to its python3."
     )
 
@@ -108,12 +112,3 @@ def _environments_above(path: Path) -> Iterator[str]:
         for environment in (folder, folder / ".venv"):
             if (environment / "pyvenv.cfg").is_file():
                 yield str(environment / "bin" / "python3")
-
-
-def _is_suitable(python: str) -> bool:
-    import subprocess
-
-    try:
-        return subprocess.run([python, "-c", _PROBE], stderr=subprocess.DEVNULL, check=False).returncode == 0
-    except OSError:
-        return False
