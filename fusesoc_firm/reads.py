@@ -2,7 +2,7 @@
 
 What a generator reads has to be among the inputs that its key covers, or an edit would go unnoticed. What Python
 consists of and what its packages hold is left out, as their versions count, and so is this package, whose files are
-counted apart. So is what is the machine's: `/dev`, `/etc`, `/proc`, `/sys`. Reads of other programs are not seen.
+counted apart. So is what is the machine's: `/dev`, `/etc`, `/proc`, `/sys`. What other programs read is not seen.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ _OF_FOLDERS = ("os.listdir", "os.scandir")
 _OF_TEMPORARY = ("tempfile.mkdtemp", "tempfile.mkstemp")
 _MACHINE = ("/dev", "/etc", "/proc", "/sys")
 _PATHS_OF_PYTHON = ("stdlib", "platstdlib", "purelib", "platlib")
+# What folders of installed packages are called, Debian's and those of each user included.
+_PACKAGE_FOLDERS = ("site-packages", "dist-packages")
 
 
 @dataclass
@@ -91,6 +93,7 @@ def _absolute(path: str) -> str:
     return os.path.abspath(path)
 
 
+@cache
 def _apart() -> tuple[str, ...]:
     """Folders of what is counted apart."""
     paths = sysconfig.get_paths()
@@ -102,10 +105,12 @@ def _is_below(path: str, folders: tuple[str, ...]) -> bool:
 
 
 def _is_of_package(path: str, reads: Reads) -> bool:
-    """Tell whether a file is one of a package that Python finds elsewhere, such as in the user's own folder."""
+    """Tell whether a file is one of a package that Python finds elsewhere."""
     for folder in reads.python_path:
         if path.startswith(f"{folder}{os.sep}"):
+            if os.path.basename(folder) in _PACKAGE_FOLDERS:
+                return True
             first = os.path.join(folder, path[len(folder) + 1 :].partition(os.sep)[0])
-            if os.path.isfile(os.path.join(first, "__init__.py")) or first.endswith(("-info", ".pth")):
+            if os.path.isfile(os.path.join(first, "__init__.py")) or first.endswith("-info"):
                 return True
     return False

@@ -5,6 +5,7 @@ All applications of `specs/`, both products, one of them for every simulator and
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -12,6 +13,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +24,7 @@ import yaml
 from fusesoc_firm.gapi import main
 from fusesoc_firm.own_code import PACKAGE
 from fusesoc_firm.project import Instance, project_cores
+from fusesoc_firm.reads import Reads, noted
 from fusesoc_firm.store_files import CALL
 
 SPECS = PACKAGE.parent / "specs"
@@ -196,6 +199,27 @@ def test_what_it_reads_need_not_be_writable(
     written = {name: content for name, content in made.files().items() if not name.endswith(".core")}
     assert written
     assert [name for name, content in written.items() if content not in contents] == []
+
+
+def test_what_is_installed_is_no_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module by itself, too, in whatever folder of packages; but not one that merely lies on Python's path."""
+    for name in ("dist-packages/alone.py", "elsewhere/whole/__init__.py", "elsewhere/own.py", "text.txt"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    monkeypatch.setattr(sys, "path", [str(tmp_path / "dist-packages"), str(tmp_path / "elsewhere"), *sys.path])
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    reads = Reads()
+    with noted(reads):
+        for module in ("alone", "whole", "own"):
+            importlib.import_module(module)
+        (tmp_path / "text.txt").read_text()
+        (tmp_path / "written.txt").write_text("")
+        with tempfile.TemporaryDirectory() as place:
+            (Path(place) / "a").write_text("")
+            (Path(place) / "a").read_text()
+    read = {Path(file).relative_to(tmp_path) for file in reads.files if not file.endswith(".pyc")}
+    assert read == {Path("elsewhere/own.py"), Path("text.txt")}
 
 
 MODEL = """
