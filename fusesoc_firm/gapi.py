@@ -7,23 +7,29 @@ is written last. What the generator prints is shown to the user as it is.
 
 from __future__ import annotations
 
+import json
+import os
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from fusesoc_firm.diagnostics import InputError, SourceRef, fail
+from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
+from fusesoc_firm.files import write_if_changed
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
-from fusesoc_firm.own_code import digests, used_code
+from fusesoc_firm.message_runs import mark_run
+from fusesoc_firm.own_code import PACKAGE, digests, used_code
 from fusesoc_firm.parameters import Parameter, check_parameters
-from fusesoc_firm.render import write_if_changed
+from fusesoc_firm.reads import Reads, noted
+from fusesoc_firm.recall import LOCKED, SEARCHED, Fact, call_digest, facts
 from fusesoc_firm.requesting_core import find_requesting_core
+from fusesoc_firm.store import Call as StoredCall
 from fusesoc_firm.store import Entry, Files, Key, Made, default_store, request_digest
-from fusesoc_firm.tools import explanation, missing_programs
+from fusesoc_firm.tools import explanation, missing, simulation_programs
 
 # The generator of cores that carry messages.
 MESSAGES = "firm_messages"
@@ -49,14 +55,14 @@ class Generator:
     """A generator: its parameters, the files whose content it depends on, what it makes of them, and what that needs.
 
     `inputs` is cheap, since it is asked on every run; a path in it need not exist. `generate` raises `InputError` for
-    what its user did wrong. `missing_programs` are those without which what was made cannot be run. `tools` are the
-    versions of programs that make part of it.
+    what its user did wrong. `programs` are those without which what was made cannot be run. `tools` are the versions
+    of programs that make part of it.
     """
 
     parameters: tuple[Parameter, ...]
     inputs: Callable[[Request], list[Path]]
     generate: Callable[[Request], GeneratedCore]
-    missing_programs: Callable[[Request], list[str]] = lambda _: []
+    programs: Callable[[Request], Sequence[str]] = lambda _: ()
     tools: Callable[[Request], Mapping[str, str]] = lambda _: {}
 
 
@@ -98,8 +104,8 @@ def _generate_system(request: Request) -> GeneratedCore:
     return simulation.generate(request) if _is_simulation(request) else generator.generate(request)
 
 
-def _simulator_programs(request: Request) -> list[str]:
-    return missing_programs(str(request.parameters["simulator"])) if _is_simulation(request) else []
+def _simulator_programs(request: Request) -> Sequence[str]:
+    return simulation_programs(str(request.parameters["simulator"])) if _is_simulation(request) else []
 
 
 def _compiler(request: Request) -> Mapping[str, str]:
@@ -121,6 +127,8 @@ _MESSAGES = Parameter(
 )
 
 _DISTRO = Parameter("distro", "str", "the ROS distribution whose standard messages are meant")
+
+_LOCKED = Parameter("locked", "str", "a lock file, relative to the core: what differs from it is refused")
 
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
@@ -145,6 +153,7 @@ GENERATORS: Mapping[str, Generator] = {
             _PATHS,
             _MESSAGES,
             _DISTRO,
+            _LOCKED,
         ),
         _converter_inputs,
         _generate_converters,
@@ -164,9 +173,11 @@ GENERATORS: Mapping[str, Generator] = {
             ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
+            Parameter("files", "list", "further files that the model and functions in software read"),
             _PATHS,
             _MESSAGES,
             _DISTRO,
+            _LOCKED,
         ),
         _system_inputs,
         _generate_system,
@@ -190,11 +201,15 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     try:
         if len(argv) != 1:
             fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
-        request = read_request(command, Path(argv[0]), generators[command].parameters)
-        entry = obtain(request, generators[command])
+        path = Path(argv[0])
+        request = read_request(command, path, generators[command].parameters)
+        absent = missing(generators[command].programs(request))
+        is_locked = _check_locked(request)
+        # What is locked is compared on every run, and what is missing is said.
+        entry = obtain(request, generators[command], None if absent or is_locked else path)
         _write(entry.files)
-        if command == MESSAGES:
-            _mark_run(request)
+        if marks := _marks(request):
+            mark_run("", marks)
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
@@ -202,17 +217,32 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
         print("interrupted", file=sys.stderr)
         return 130
     # It can be generated and not be run.
-    if missing := generators[command].missing_programs(request):
-        print(f"{command}: {explanation(missing)}", flush=True)
+    if absent:
+        print(f"{command}: {explanation(absent)}", flush=True)
     origin = "from store" if entry.is_from_store else "generated"
     print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
     return 0
 
 
-def _mark_run(request: Request) -> None:
-    from fusesoc_firm.message_core import mark_run
+def _check_locked(request: Request) -> bool:
+    """Tell whether a request is held to a lock file. Raises `InputError` with what differs from one."""
+    places: list[Path] = []
+    if name := request.parameters.get("locked"):
+        places.append(request.files_root / str(name))
+    if name := os.environ.get(LOCKED):
+        if not Path(name).is_absolute():
+            fail(f"{LOCKED} is '{name}'", hint=f"a generator has a folder of its own; write {LOCKED}=$PWD/{name}")
+        places.append(Path(name))
+    for place in places:
+        from fusesoc_firm.lock import check_request
 
-    mark_run(Path(), find_requesting_core(request.files_root, request.name).name)
+        check_request(place, request, has_messages=request.command != MESSAGES)
+    return bool(places)
+
+
+def _marks(request: Request) -> str:
+    """The core whose messages a request generates; "" for all else."""
+    return find_requesting_core(request.files_root, request.name).name if request.command == MESSAGES else ""
 
 
 def read_request(command: str, path: Path, parameters: tuple[Parameter, ...], *, is_this_run: bool = True) -> Request:
@@ -254,29 +284,78 @@ def make_request(
     )
 
 
-def obtain(request: Request, generator: Generator) -> Entry:
-    """The files of the core that a request asks for, out of the store if it has them. Raises `InputError`."""
-    return default_store().obtain(
-        lambda: _key(request, generator), lambda: Made(as_files(generator.generate(request), request), used_code())
-    )
+def obtain(request: Request, generator: Generator, path: Path | None = None) -> Entry:
+    """The files of the core that a request asks for, out of the store if it has them. Raises `InputError`.
+
+    If `path` is FuseSoC's file of the call, the answer is noted, so that it can be recalled.
+    """
+    of_key = Reads()
+
+    def key() -> Key:
+        with noted(of_key):
+            return _key(request, generator, of_key)
+
+    def build() -> Made:
+        of_build = Reads()
+        with noted(of_build):
+            core = generator.generate(request)
+        _check_declared(of_build, of_key)
+        return Made(as_files(core, request), used_code())
+
+    return default_store().obtain(key, build, _stored_call(request, generator, path, of_key) if path else None)
 
 
 def used_before(request: Request, generator: Generator) -> list[str] | None:
     """Names of our own files that answered a request when it was last made; None if the store does not know it."""
-    return default_store().uses(_key(request, generator))
+    return default_store().uses(_key(request, generator, Reads()))
 
 
-def _key(request: Request, generator: Generator) -> Key:
+def _key(request: Request, generator: Generator, reads: Reads) -> Key:
+    """The key of a request; the inputs are added to `reads`, also where there is none."""
     # First, as later the modules are imported that they belong to.
     code = digests()
     asked = {
         "command": request.command,
         "vlnv": request.vlnv,
-        "parameters": dict(request.parameters),
+        # What is locked is so beside what is made.
+        "parameters": {name: value for name, value in request.parameters.items() if name != "locked"},
         "tools": dict(generator.tools(request)),
     }
-    inputs = {_name(path, request): _content(path) for path in generator.inputs(request)}
+    paths = generator.inputs(request)
+    reads.files |= dict.fromkeys(str(path.absolute()) for path in paths)
+    inputs = {_name(path, request): _content(path) for path in paths}
     return Key(request_digest(asked, inputs, code), code, {"core": request.vlnv, "generator": request.command})
+
+
+def _check_declared(of_build: Reads, of_key: Reads) -> None:
+    """Raise `InputError` if something was read that the key does not cover: an edit of it would never be noticed."""
+    faults = Diagnostics()
+    known = {os.path.realpath(file) for file in of_key.files}
+    for file in of_build.files:
+        if os.path.realpath(file) not in known and Path(file).is_file():
+            faults.error(f"{file} was read, which is no input", hint="list it under the generator's parameter 'files'")
+    faults.raise_if_any()
+
+
+def _stored_call(request: Request, generator: Generator, path: Path, reads: Reads) -> StoredCall:
+    """How a call is noted, of which FuseSoC's file is at `path`; `reads` are those of the key."""
+
+    def facts_of_key(used: Iterable[str]) -> list[Fact]:
+        from fusesoc_firm.message_core import core_name
+
+        entries = [entry for name in SEARCHED for entry in os.environ.get(name, "").split(os.pathsep) if entry]
+        environment = [folder for entry in entries for folder in (entry, str(Path(entry, "share")))]
+        generated = str(path.absolute().parent.parent)
+        return [
+            *facts("file", [*reads.files, *(str(PACKAGE / name) for name in used)]),
+            *facts("folder", [*reads.folders, *environment]),
+            *facts("code", [""]),
+            *facts("program", sorted({*generator.tools(request), *generator.programs(request)})),
+            *facts("messages", [json.dumps([generated, core_name(name)]) for name in request.listed("messages")]),
+        ]
+
+    digest = call_digest(request.command, path.read_bytes())
+    return StoredCall(digest, facts_of_key, {"name": request.name, "marks": _marks(request)})
 
 
 def _write(files: Files) -> None:

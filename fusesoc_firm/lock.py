@@ -1,6 +1,8 @@
 """The lock file of a system: which message definitions, cores and tools it uses, so that another build uses the same.
 
-What a core itself consists of is its author's to change and is not locked; all that it takes from elsewhere is.
+What a core itself consists of is its author's to change and is not locked; all that it takes from elsewhere is. `firm`
+holds a core to its lock as a whole (`check_lock`), a generator its own request (`check_request`): that sees neither the
+cores beside it nor the programs of a target.
 """
 
 from __future__ import annotations
@@ -8,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,8 @@ from fusesoc_firm.tools import facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """By kind (`messages`, `cores`, `tools`) and name: facts by name."""
+Call = tuple[Request, Sequence[Path]]
+"""A request for a generated core, and the files that it is made of."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
 _HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
@@ -37,18 +41,21 @@ def lock_path(core: ProjectCore) -> Path:
     return core.files[0].with_suffix(".lock")
 
 
-def lock_of(core: ProjectCore, depends: Iterable[ProjectCore], requests: Iterable[Request]) -> Lock:
-    """What a core uses now: the cores that it `depends` on, and the messages of its requests for generated cores."""
-    folder = core.files[0].parent
-    messages = {
-        f"{name} ({library.ros.title})": _message(name, library, folder)
-        for request in requests
-        for library, definitions in _definitions(request)
-        for name in definitions
-    }
+def lock_of(core: ProjectCore, depends: Iterable[ProjectCore], calls: Mapping[str, Sequence[Call]]) -> Lock:
+    """What a core uses now: itself, and the cores that it `depends` on, with the `calls` of each by its name.
+
+    A message that two of them take from different places is listed for each.
+    """
+    depends = list(depends)
+    messages: dict[str, dict[str, str]] = {}
+    for item in (core, *depends):
+        for request, _ in calls.get(item.vlnv, ()):
+            for label, facts in _messages(request).items():
+                if messages.setdefault(label, facts) != facts:
+                    messages[_of_request(label, request)] = facts
     return {
         "messages": dict(sorted(messages.items())),
-        "cores": {item.vlnv: {"sha256": _digest_of_files(item.files)} for item in depends},
+        "cores": {item.vlnv: {"sha256": _digest_of_core(item, calls.get(item.vlnv, ()))} for item in depends},
         "tools": _tools(),
     }
 
@@ -81,18 +88,52 @@ def check_lock(locked: Lock, used: Lock) -> None:
     faults.raise_if_any()
 
 
+def check_request(path: Path, request: Request, *, has_messages: bool = True) -> None:
+    """Raise `InputError` with what a request uses that differs from a lock file: messages, if any, and packages."""
+    locked = read_lock(path)
+    faults = Diagnostics()
+    for label, now in _messages(request).items() if has_messages else ():
+        was = locked["messages"].get(_of_request(label, request), locked["messages"].get(label))
+        for difference in _difference("message", label, was, now):
+            faults.error(difference, hint=f"by {path}")
+    for name, now in packages(_PACKAGES).items():
+        if (was := locked["tools"].get(name)) is not None:
+            for difference in _difference("tool", name, was, now):
+                faults.error(difference, hint=f"by {path}")
+    faults.raise_if_any()
+
+
 def _differences(locked: Lock, used: Lock) -> Iterator[str]:
     for kind, word in _WORDS.items():
         for name in sorted(locked[kind].keys() | used[kind].keys()):
             was, now = locked[kind].get(name), used[kind].get(name)
             if now is None:
                 yield f"{word} {name} is locked, but not {'installed' if kind == 'tools' else 'used'}"
-            elif was is not None:
-                for fact in sorted(was.keys() | now.keys()):
-                    if was.get(fact) != now.get(fact):
-                        yield f"{word} {name}: {fact} is {now.get(fact)}, but {was.get(fact)} is locked"
-            elif kind != "tools":
-                yield f"{word} {name} is used, but not locked"
+            elif was is not None or kind != "tools":
+                yield from _difference(word, name, was, now)
+
+
+def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mapping[str, str]) -> Iterator[str]:
+    """In what a thing that is used differs from what is locked."""
+    if was is None:
+        yield f"{word} {name} is used, but not locked"
+        return
+    for fact in sorted(was.keys() | now.keys()):
+        if was.get(fact) != now.get(fact):
+            yield f"{word} {name}: {fact} is {now.get(fact)}, but {was.get(fact)} is locked"
+
+
+def _messages(request: Request) -> dict[str, dict[str, str]]:
+    """The facts of each message that a request leads to."""
+    return {
+        f"{name} ({library.ros.title})": _message(name, library, request.files_root.resolve())
+        for library, definitions in _definitions(request)
+        for name in definitions
+    }
+
+
+def _of_request(label: str, request: Request) -> str:
+    return f"{label} of {request.vlnv}"
 
 
 def _definitions(request: Request) -> list[tuple[MessageLibrary, Definitions]]:
@@ -115,9 +156,11 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
     }
 
 
-def _digest_of_files(files: tuple[Path, ...]) -> str:
-    """The digest of a core's files, by their names from its description on."""
-    return _digest_of({os.path.relpath(path, files[0].parent): _digest(path) for path in files})
+def _digest_of_core(core: ProjectCore, calls: Sequence[Call]) -> str:
+    """The digest of a core's files, and of what is generated for it is made of, by their names from its description."""
+    folder = core.files[0].parent
+    made_of = [path.resolve() for _, inputs in calls for path in inputs]
+    return _digest_of({os.path.relpath(path, folder): _digest(path) for path in (*core.files, *made_of)})
 
 
 def _digest_of(found: Mapping[str, str | None]) -> str:

@@ -2,13 +2,12 @@
 
 A generator sees the folder of the core that asks for it, and no others. But FuseSoC runs the generators of a core after
 those of the cores that it depends on, each in a folder of its own, one beside the other. So a core of messages has its
-definitions generated, that is copied, and who names this core in `messages` finds them beside its own folder. What an
-earlier run left there is told by a mark, which names the run that made it.
+definitions generated, that is copied, and who names this core in `messages` finds them beside its own folder
+(`message_runs`).
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -16,8 +15,7 @@ from fusesoc_firm.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.folders import interface_files
 from fusesoc_firm.message.middleware import known_suffixes
-
-_MARK = "firm_messages.run"
+from fusesoc_firm.message_runs import marked_folders
 
 
 def folders(request: Request) -> list[Path]:
@@ -50,11 +48,6 @@ def request_place(request: Request) -> SourceRef | None:
     return next(iter(request.listed("paths").values()), None)
 
 
-def mark_run(folder: Path, core: str) -> None:
-    """Note in a generated core's folder whose messages these are, and that this run of FuseSoC made it."""
-    (folder / _MARK).write_text(f"{core}\n{_run()}")
-
-
 def folders_of_run(
     names: Mapping[str, SourceRef | None], generated: Path, *, is_this_run: bool = True
 ) -> tuple[Path, ...]:
@@ -64,10 +57,8 @@ def folders_of_run(
     """
     faults = Diagnostics()
     found: list[Path] = []
-    marks = sorted(generated.glob(f"*/{_MARK}"))
     for name, source in names.items():
-        core = ":".join(name.split(":")[:3])
-        current = [mark.parent for mark in marks if _is_of(mark, core, is_this_run)]
+        current = [Path(path) for path in marked_folders(str(generated), core_name(name), is_this_run=is_this_run)]
         if not current:
             hint = "the requesting core depends on it, and it has the generator firm_messages in its target 'default'"
             faults.error(f"there are no messages of core '{name}'", source, hint)
@@ -76,9 +67,9 @@ def folders_of_run(
     return tuple(found)
 
 
-def _is_of(mark: Path, core: str, is_this_run: bool) -> bool:
-    found, _, run = mark.read_text().partition("\n")
-    return found == core and (run == _run() or not is_this_run)
+def core_name(vlnv: str) -> str:
+    """The name of a core without its version."""
+    return ":".join(vlnv.split(":")[:3])
 
 
 def _files(request: Request) -> Iterator[tuple[str, Path]]:
@@ -88,14 +79,3 @@ def _files(request: Request) -> Iterator[tuple[str, Path]]:
             for name, paths in files.items():
                 for path in paths:
                     yield f"{name.package}/{kind.value}/{path.name}", path
-
-
-def _run() -> str:
-    """What tells this run of FuseSoC, which is our parent, from all others on this machine."""
-    parent = os.getppid()
-    try:
-        # When it was started, behind the name in parentheses, which may hold blanks.
-        started = Path(f"/proc/{parent}/stat").read_text().rpartition(")")[2].split()[19]
-    except OSError:
-        started = ""
-    return f"{parent} {started}"

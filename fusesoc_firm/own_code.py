@@ -12,8 +12,6 @@ import os
 import sys
 from pathlib import Path
 
-from fusesoc_firm.render import TEMPLATES, templates_read
-
 PACKAGE = Path(__file__).resolve().parent
 _DATA = (".yaml", ".csv")
 _COUNTED = (".py", ".mustache", *_DATA)
@@ -21,7 +19,7 @@ _COUNTED = (".py", ".mustache", *_DATA)
 
 def digests(package: Path = PACKAGE) -> dict[str, str]:
     """The SHA-256 of every module, data file and template of a package's folder, its library left out, by name."""
-    return {name: hashlib.sha256((package / name).read_bytes()).hexdigest() for name in _names(package)}
+    return {name: hashlib.sha256((package / name).read_bytes()).hexdigest() for name in all_names(package)}
 
 
 def digest() -> str:
@@ -31,22 +29,25 @@ def digest() -> str:
 
 def used_code() -> list[str]:
     """Those of the names in `digests` that this process has used so far, sorted."""
+    from fusesoc_firm.render import TEMPLATES, templates_read
+
     files = [getattr(module, "__file__", None) for module in [*sys.modules.values()]]
     modules = {path for file in files if file and (path := Path(file).resolve()).is_relative_to(PACKAGE)}
     folders = {path.parent for path in modules}
     used = modules | {TEMPLATES / name for name in templates_read()}
-    return sorted(name for name in _names(PACKAGE) if (path := PACKAGE / name) in used or _is_data(path, folders))
+    return sorted(name for name in all_names() if (path := PACKAGE / name) in used or _is_data(path, folders))
 
 
 def _is_data(path: Path, folders: set[Path]) -> bool:
     return path.suffix in _DATA and path.parent in folders
 
 
-def _names(package: Path) -> list[str]:
+def all_names(package: Path = PACKAGE) -> list[str]:
+    """The names in `digests`, sorted."""
     found: list[str] = []
     for folder, folders, files in os.walk(package):
         # In the library lie cores, and links to folders of any size.
         folders[:] = [name for name in folders if name not in ("library", "__pycache__")]
-        paths = (Path(folder, name) for name in files)
-        found += [path.relative_to(package).as_posix() for path in paths if path.suffix in _COUNTED]
+        above = os.path.relpath(folder, package)
+        found += [os.path.normpath(os.path.join(above, name)) for name in files if name.endswith(_COUNTED)]
     return sorted(found)

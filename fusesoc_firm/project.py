@@ -133,7 +133,7 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
             )
             generated[made.vlnv] = made.generator
             edges.append((str(item.name), made.vlnv))
-            for source in inputs_of(made):
+            for source in map(_quoted, inputs_of(made)):
                 sources[source] = None
                 edges.append((made.vlnv, source))
     return render(
@@ -147,6 +147,11 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
     )
 
 
+def _quoted(name: str) -> str:
+    """A file's name as it stands between quotes."""
+    return name.replace("\\", "\\\\").replace('"', '\\"')
+
+
 def _found(core: str) -> tuple[Any, Any]:
     """FuseSoC's manager of cores, and the core of this name."""
     from fusesoc.config import Config
@@ -157,7 +162,7 @@ def _found(core: str) -> tuple[Any, Any]:
     manager = Fusesoc(Config()).cm
     try:
         return manager, manager.get_core(Vlnv(core))
-    except DependencyError:
+    except (DependencyError, SyntaxError):
         fail(f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
 
 

@@ -14,7 +14,6 @@ templates, and the tree is expanded here, by these rules:
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -148,25 +147,6 @@ def template_text(name: str, templates: Path = TEMPLATES) -> str:
 def templates_read() -> frozenset[str]:
     """Which files below `TEMPLATES` this process has read so far."""
     return frozenset(_READ)
-
-
-def write_if_changed(path: Path, content: str | bytes) -> bool:
-    """Write a file unless it holds just that already; tell whether it was written.
-
-    An unchanged file keeps its time, so nothing behind it is built again. A changed one is replaced at once, so that no
-    reader sees half of it. Raises `OSError`.
-    """
-    data = content.encode() if isinstance(content, str) else content
-    if path.is_file() and path.read_bytes() == data:
-        return False
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_bytes(data)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-    return True
 
 
 @dataclass(frozen=True)

@@ -8,49 +8,46 @@ for leads to the names of the files that it used when it was last made, and thes
 entry. An entry is right whichever names led to it: what used just these files, in this state, for this request, will do
 so again.
 
-    <root>/v2/<first two digits>/<digest of the request>.uses    names of our own files, as JSON
-    <root>/v2/<first two digits>/<key>.entry                     a line with the SHA-256 of the rest; a line of JSON:
-                                                                 what was asked for, names, lengths; the contents
-    <root>/v2/<first two digits>/<digest of the request>.lock    held while an entry is made
+A call that was answered leaves a note of all facts that its key follows from, by which `recall` answers it the next
+time without making the key. `store_files` tells how all this lies in the store.
 
 A file is written beside its place and appears there by one rename; it is read whole and checked before it is used. So
 no reader, on this machine or on another that shares the folder, sees half of it or is disturbed by its removal. Locks
-only save work.
+only save work: they need not hold between machines, and are never trusted.
 """
 
 from __future__ import annotations
 
 import fcntl
-import hashlib
-import io
-import json
 import os
 import platform
 import re
-import secrets
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO
 
+from fusesoc_firm import store_files
 from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.files import TEMPORARY
+from fusesoc_firm.recall import IMPORTED, Fact
+from fusesoc_firm.store_files import CALL, ENTRY, KEPT, LAYOUT, LOCK, USES, digest, digest_of
 
 Files = Mapping[str, bytes]
 """Contents by file name; a name may hold `/`."""
 
-# What generated text can depend on beside our own code.
-_IMPORTED = ("chevron", "numpy", "pyyaml", "rosbags")
-_LAYOUT = "v2"
-_FORMER_LAYOUTS = ("v1",)
-_ENTRY, _USES, _LOCK, _NEW = ".entry", ".uses", ".lock", ".new-"
+_FORMER_LAYOUTS = ("v1", "v2")
 _DEFAULT_LIMIT = "1G"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 # When the store is too large, so much is left that it is not so again at once.
 _KEPT_OF_LIMIT = 0.8
+# Who makes an entry may be stopped, or be on a machine that is no more. It is longer than generation takes.
+_LONGEST_WAIT_SECONDS = 120
+_POLL_SECONDS = 0.02
 # What a process that was killed left behind; no file takes so long to be written.
 _ABANDONED_SECONDS = 3600
 
@@ -71,7 +68,7 @@ class Key:
         names = sorted(set(used))
         if not set(names) <= self.code.keys():
             return None
-        return _digest_of([self.request, {name: self.code[name] for name in names}])
+        return digest_of([self.request, {name: self.code[name] for name in names}])
 
 
 @dataclass(frozen=True)
@@ -91,11 +88,15 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class StoredEntry:
-    """What an entry says: what was asked for, and the files in the order they were made."""
+class Call:
+    """A call as `recall` knows it: its digest, the facts that its key follows from, and what else the note holds.
 
-    about: Mapping[str, str]
-    files: Files
+    `facts` are told for those of our own files that were used, in their state at that moment.
+    """
+
+    digest: str
+    facts: Callable[[Iterable[str]], Sequence[Fact]]
+    note: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -114,37 +115,40 @@ class Store:
     root: Path
     limit: int
 
-    def obtain(self, key: Callable[[], Key], build: Callable[[], Made]) -> Entry:
+    def obtain(self, key: Callable[[], Key], build: Callable[[], Made], call: Call | None = None) -> Entry:
         """The files of a key, from the store if it has them undamaged, else from `build`, which are then kept.
 
         The key is asked for again after `build`, and nothing is kept if it has changed: then something was edited while
         it was read. Processes that want the same at once wait for the first of them. Whatever `build` raises passes
-        through. If the store cannot be written, one line on stderr says so and the files are made without it.
+        through. If the store cannot be written, one line on stderr says so and the files are made without it. The
+        answer to a `call` is noted, so that it can be recalled.
         """
         wanted = key()
         if (files := self._find(wanted)) is not None:
+            if call and self._is_writable():
+                self._note(key, wanted, call)
             return Entry(files, True)
         with self._lock(wanted) as is_writable:
             # While this process waited for the lock another one may have made the entry.
             if (files := self._find(wanted)) is not None:
                 return Entry(files, True)
             made = build()
-            if is_writable and key() == wanted:
-                self._keep(wanted, made)
+            if is_writable:
+                self._keep(key, wanted, made, call)
         return Entry(made.files, False)
 
     def entries(self) -> list[StoredFile]:
         """Every entry, the one that was used last first."""
-        return [file for file in self._files() if file.path.suffix == _ENTRY]
+        return [file for file in self._files() if file.path.suffix == ENTRY]
 
     def size(self) -> int:
         """The bytes of all that counts against the limit."""
         return sum(file.size for file in self._files())
 
     def remove_damaged(self) -> list[Path]:
-        """Remove the entries that are not whole, and name them. Raises `OSError`."""
-        # One that is no more was removed by another process.
-        damaged = [file.path for file in self.entries() if read_entry(file.path) is None and file.path.exists()]
+        """Remove what is not whole, and name it. Raises `OSError`."""
+        # What is no more was removed by another process.
+        damaged = [file.path for file in self._files() if store_files.read(file.path) is None and file.path.exists()]
         for path in damaged:
             path.unlink(missing_ok=True)
         return damaged
@@ -167,7 +171,7 @@ class Store:
     def clean(self) -> int:
         """Remove all of it, that of former versions too; the number of bytes removed. Raises `OSError`."""
         removed = 0
-        for layout in (*_FORMER_LAYOUTS, _LAYOUT):
+        for layout in (*_FORMER_LAYOUTS, LAYOUT):
             for folder, _, files in os.walk(self.root / layout, topdown=False):
                 for path in (Path(folder, name) for name in files):
                     # Another process may remove it in between.
@@ -182,30 +186,27 @@ class Store:
 
     def uses(self, key: Key) -> list[str] | None:
         """Which of our own files were used for what was asked for when it was last made; None if that is not known."""
-        try:
-            names = json.loads(self._path(key.request, _USES).read_bytes())
-        except (OSError, ValueError):
-            return None
-        return names if isinstance(names, list) and all(isinstance(name, str) for name in names) else None
+        names = store_files.read_json(self._path(key.request, USES))
+        return names if isinstance(names, list) else None
 
     def _find(self, key: Key) -> Files | None:
         uses = self.uses(key)
         full = None if uses is None else key.with_code(uses)
-        if full is None or (found := read_entry(self._path(full, _ENTRY))) is None:
+        if full is None or (found := store_files.read_entry(self._path(full, ENTRY))) is None:
             return None
-        for path in (self._path(full, _ENTRY), self._path(key.request, _USES)):
-            # What cannot be written can be read all the same.
-            with suppress(OSError):
-                os.utime(path)
-        return found.files
+        store_files.mark_used(self._path(full, ENTRY), self._path(key.request, USES))
+        return found[1]
 
     @contextmanager
     def _lock(self, key: Key) -> Iterator[bool]:
-        """Hold the request's lock, which the system frees if the process dies; False where there can be none."""
-        path = self._path(key.request, _LOCK)
+        """Hold the request's lock, which the system frees if the process dies; False if the store cannot be written.
+
+        Who has waited too long for it goes on without.
+        """
+        path = self._path(key.request, LOCK)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            file = _locked(path)
+            file, is_held = _locked(path)
         except OSError as error:
             self._warn(error)
             yield False
@@ -214,27 +215,48 @@ class Store:
             yield True
         finally:
             # While it is held: whoever waits for it then sees that the file is another one.
-            with suppress(OSError):
-                path.unlink()
+            if is_held:
+                with suppress(OSError):
+                    path.unlink()
             file.close()
 
-    def _keep(self, key: Key, made: Made) -> None:
-        names = sorted(made.used)
-        full = key.with_code(names)
-        # One of our own files is no more, or is new.
-        if full is None:
+    def _keep(self, key: Callable[[], Key], wanted: Key, made: Made, call: Call | None) -> None:
+        used = sorted(made.used)
+        full = wanted.with_code(used)
+        facts = call.facts(used) if call else ()
+        # The key after the facts: what is edited in between is found now, and what is edited later differs from them.
+        # None if one of our own files is no more, or is new.
+        if full is None or key() != wanted:
             return
         try:
-            _write(self._path(full, _ENTRY), _entry_bytes(key.about, made.files))
-            _write(self._path(key.request, _USES), json.dumps(names).encode())
+            store_files.write_entry(self._path(full, ENTRY), wanted.about, made.files)
+            store_files.write_json(self._path(wanted.request, USES), used)
+            if call:
+                self._write_note(call, full, facts)
             self._shrink_if_needed()
         except OSError as error:
             self._warn(error)
 
+    def _note(self, key: Callable[[], Key], wanted: Key, call: Call) -> None:
+        """Note a call whose entry was found by the key, unless something is edited meanwhile."""
+        used = self.uses(wanted) or []
+        full = wanted.with_code(used)
+        facts = call.facts(used)
+        if full is not None and key() == wanted:
+            # It only saves time.
+            with suppress(OSError):
+                self._write_note(call, full, facts)
+
+    def _write_note(self, call: Call, full: str, facts: Sequence[Fact]) -> None:
+        store_files.write_json(self._path(call.digest, CALL), {**call.note, "key": full, "facts": facts})
+
+    def _is_writable(self) -> bool:
+        return os.access(self._folder(), os.W_OK)
+
     def _shrink_if_needed(self) -> None:
         if self.size() > self.limit:
             self.shrink(int(self.limit * _KEPT_OF_LIMIT))
-        for path in self._folder().glob(f"*/{_NEW}*"):
+        for path in self._folder().glob(f"*/{TEMPORARY}*"):
             with suppress(OSError):
                 if path.stat().st_mtime < time.time() - _ABANDONED_SECONDS:
                     path.unlink()
@@ -243,7 +265,7 @@ class Store:
         """What counts against the limit, the one that was used last first."""
         found: list[StoredFile] = []
         for path in self._folder().glob("*/*"):
-            if path.suffix in (_ENTRY, _USES):
+            if path.suffix in KEPT:
                 # Another process may remove it in between.
                 with suppress(OSError):
                     status = path.stat()
@@ -251,10 +273,10 @@ class Store:
         return sorted(found, key=lambda file: (-file.used, file.path))
 
     def _folder(self) -> Path:
-        return self.root / _LAYOUT
+        return self.root / LAYOUT
 
     def _path(self, digest: str, suffix: str) -> Path:
-        return self._folder() / digest[:2] / f"{digest}{suffix}"
+        return Path(store_files.place(self.root, digest, suffix))
 
     def _warn(self, error: OSError) -> None:
         print(f"warning: nothing is kept in the store {self.root}: {error.strerror}", file=sys.stderr)
@@ -265,15 +287,7 @@ def default_store(environment: Mapping[str, str] = os.environ) -> Store:
     limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
         fail(f"FUSESOC_FIRM_CACHE_SIZE is '{limit}', which is no size", hint="bytes, or such as 500M or 2G")
-    return Store(default_root(environment), size)
-
-
-def default_root(environment: Mapping[str, str] = os.environ) -> Path:
-    """FUSESOC_FIRM_CACHE, else `fusesoc_firm` in XDG_CACHE_HOME, else in ~/.cache."""
-    if chosen := environment.get("FUSESOC_FIRM_CACHE"):
-        return Path(chosen).expanduser().absolute()
-    base = environment.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(base).expanduser().absolute() / "fusesoc_firm"
+    return Store(Path(store_files.default_root(environment)), size)
 
 
 def parse_size(text: str) -> int | None:
@@ -290,63 +304,40 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
     """
     parts = {
         "request": request,
-        "inputs": {name: None if data is None else _digest(data) for name, data in inputs.items()},
+        "inputs": {name: None if data is None else digest(data) for name, data in inputs.items()},
         "code": sorted(code),
-        "versions": {name: version(name) for name in _IMPORTED},
+        "versions": {name: version(name) for name in IMPORTED},
         "python": sys.version_info[:2],
         # What a compiler made of an accelerator runs on one kind of machine only.
         "machine": platform.machine(),
     }
-    return _digest_of(parts)
+    return digest_of(parts)
 
 
-def read_entry(path: Path) -> StoredEntry | None:
-    """An entry, or None if it is not there or not whole."""
-    try:
-        digest, _, rest = path.read_bytes().partition(b"\n")
-    except OSError:
-        return None
-    if _digest(rest).encode() != digest:
-        return None
-    stream = io.BytesIO(rest)
-    header = json.loads(stream.readline())
-    return StoredEntry(header["about"], {name: stream.read(length) for name, length in header["files"]})
+def _locked(path: Path) -> tuple[IO[bytes], bool]:
+    """The file at `path`, opened, and whether it is locked; whoever had the lock before may have removed it meanwhile.
 
-
-def _entry_bytes(about: Mapping[str, str], files: Files) -> bytes:
-    header = {"about": dict(about), "files": [[name, len(data)] for name, data in files.items()]}
-    rest = b"".join([json.dumps(header).encode(), b"\n", *files.values()])
-    return _digest(rest).encode() + b"\n" + rest
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file at once: no reader sees part of it, and what is there is replaced. Raises `OSError`."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f"{_NEW}{secrets.token_hex(8)}")
-    try:
-        with temporary.open("xb") as file:
-            file.write(data)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _locked(path: Path) -> IO[bytes]:
-    """The file at `path`, opened and locked, which whoever had the lock before may have removed meanwhile."""
+    A file system without locks, or one that another machine keeps, costs a second build at worst.
+    """
+    end = time.monotonic() + _LONGEST_WAIT_SECONDS
     while True:
         file = path.open("wb")
-        # A file system without locks costs a second build at worst.
-        with suppress(OSError):
-            fcntl.flock(file, fcntl.LOCK_EX)
+        while not (is_held := _take(file)) and time.monotonic() < end:
+            time.sleep(_POLL_SECONDS)
+        if not is_held:
+            return file, False
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file
+                return file, True
         file.close()
 
 
-def _digest_of(data: object) -> str:
-    return _digest(json.dumps(data, sort_keys=True).encode())
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+def _take(file: IO[bytes]) -> bool:
+    """Lock a file unless another process has it; a lock that cannot be had at all counts as taken."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True

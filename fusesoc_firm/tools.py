@@ -96,9 +96,9 @@ def missing(programs: Iterable[str]) -> list[str]:
     return [program for program in programs if find(program) is None]
 
 
-def missing_programs(simulator: str) -> list[str]:
-    """The programs that a simulation needs, GHDL always among them, and that are not installed."""
-    return missing(["ghdl", *programs_of(simulator)])
+def simulation_programs(simulator: str) -> tuple[str, ...]:
+    """The programs that a simulation needs, GHDL always among them."""
+    return ("ghdl", *programs_of(simulator))
 
 
 def ways(program: str) -> str:

@@ -46,21 +46,22 @@ class Names:
     messages: Mapping[str, Mapping[str, SourceRef]]
 
 
-def rendering_of(generate: Callable[[], GeneratedCore], name: str, text: str) -> Rendering:
-    """What the file `name` of a generated core is made of.
+def rendering_of(generate: Callable[[], GeneratedCore], name: str, text: str, inputs: Iterable[Path] = ()) -> Rendering:
+    """What the file `name` of a generated core, which is made of `inputs`, is made of.
 
     Raises `InputError` if no template made it, or not this `text`.
     """
     with recorded() as renderings:
         core = generate()
     if name not in core.files:
-        fail(f"'{name}' is no file of the generated core", hint=f"it has {', '.join(core.files)}")
+        fail(f"'{name}' is none of the generated core's files", hint=f"these are {', '.join(core.files)}")
     content = core.files[name].content
     made = content if isinstance(content, str) else content.decode(errors="replace")
     if made != text:
         fail(f"'{name}' is not what would be generated now", hint="generate it again with fusesoc run --setup")
     if made not in renderings:
-        fail(f"'{name}' is of no template: it is data, or a copy of a source")
+        copied = [str(path) for path in inputs if path.is_file() and path.read_bytes() == text.encode()]
+        fail(f"'{name}' is of no template", hint=f"it is a copy of {copied[0]}" if copied else "it is data")
     return renderings[made]
 
 
@@ -178,7 +179,10 @@ def call_file(path: Path) -> tuple[Path, str]:
     found = ((call, folder) for folder, place in places for call in sorted(place.glob("*_input.yml")))
     call, folder = next(found, (None, path))
     if call is None:
-        fail(f"no call of a generator made {path}", hint="name a file below 'generator_cache' or 'src' of a build")
+        fail(
+            f"no generator made {path}",
+            hint="what one made lies in a build, below 'generator_cache' or in the folder of a core <core>-<instance>",
+        )
     return call, path.relative_to(folder).as_posix()
 
 

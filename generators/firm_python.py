@@ -10,62 +10,85 @@ This file runs in any Python 3.9 or later.
 from __future__ import annotations
 
 import os
-import shlex
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterator
-from importlib.util import find_spec
-from pathlib import Path
-from typing import NoReturn
+
+# What only a second start needs is imported for it: most calls are answered out of the store, at once.
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import NoReturn
 
 _NEEDED = ("fusesoc_firm", "chevron", "rosbags", "yaml")
-# Without the current folder, which `-c` can import from and a script cannot.
-_PROBE = f"""
-import sys
-from importlib.util import find_spec
-sys.path = [folder for folder in sys.path if folder]
-sys.exit(not all(map(find_spec, {_NEEDED})))
-"""
 # Set to a Python to use just that.
 _CHOSEN = "FUSESOC_FIRM_PYTHON"
-# Set for the second start, so that there is no third.
-_RESTARTED = "_FUSESOC_FIRM_RESTARTED"
+# Set for a further start: the Pythons that were tried, and those that are left, both in lines.
+_TRIED, _LEFT = "_FUSESOC_FIRM_TRIED", "_FUSESOC_FIRM_LEFT"
 
 
 def run(command: str) -> NoReturn:
     """Answer FuseSoC's call of the generator `command`, in this Python or in another that takes this one's place."""
-    is_restarted = os.environ.pop(_RESTARTED, "")
-    if not is_restarted:
-        _restart_if_needed(command)
-    from fusesoc_firm.gapi import main
+    tried, left = (os.environ.pop(name, "").splitlines() for name in (_TRIED, _LEFT))
+    chosen = os.environ.get(_CHOSEN)
+    try:
+        if chosen and not tried and chosen != sys.executable:
+            _start_next(command, [], [chosen])
+        if _is_recalled(command):
+            sys.exit(0)
+        from importlib.util import find_spec
 
-    sys.exit(main(command, sys.argv[1:]))
+        if all(map(find_spec, _NEEDED)):
+            from fusesoc_firm.gapi import main
+
+            sys.exit(main(command, sys.argv[1:]))
+        if not tried:
+            tried = [sys.executable]
+            left = [] if chosen else _others(os.getppid())
+        _start_next(command, tried, left)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
 
 
-def _restart_if_needed(command: str) -> None:
-    """Return if this Python will do; else start again in one that does, or end with a message."""
-    pythons = _pythons(os.getppid())
-    python = next(filter(_is_suitable, pythons), None)
-    if python == sys.executable:
-        return
-    if python:
-        os.execve(python, [python, *sys.argv], {**os.environ, _RESTARTED: "1"})
-    tried = "\n".join(f"  {python}" for python in pythons)
+def _is_recalled(command: str) -> bool:
+    """Tell whether the call was answered as it was answered before."""
+    try:
+        from fusesoc_firm.recall import answer
+    except ImportError:
+        return False
+    return answer(command, sys.argv[1:])
+
+
+def _start_next(command: str, tried: list[str], left: list[str]) -> NoReturn:
+    """Start again in the next Python that may have the package, or end with a message.
+
+    It is not asked beforehand whether it has: that would take a start by itself.
+    """
+    while left:
+        tried.append(left.pop(0))
+        environment = {**os.environ, _TRIED: "\n".join(tried), _LEFT: "\n".join(left)}
+        try:
+            os.execve(tried[-1], [tried[-1], *sys.argv], environment)
+        except OSError:
+            # It is no program, or is no more.
+            continue
+    lines = "\n".join(f"  {python}" for python in tried)
     sys.exit(
-        f"{command}: error: no Python with the packages {', '.join(_NEEDED)} was found. These were tried:\n{tried}\n"
+        f"{command}: error: no Python with the packages {', '.join(_NEEDED)} was found. These were tried:\n{lines}\n"
         f"Install fusesoc-firm beside FuseSoC, activate the environment that has it, or set {_CHOSEN} to its python3."
     )
 
 
-def _pythons(parent: int) -> list[str]:
-    """What to try, in order, where FuseSoC is the process `parent`."""
-    chosen = os.environ.get(_CHOSEN)
-    return [chosen] if chosen else list(dict.fromkeys([sys.executable, *_candidates(parent)]))
+def _others(parent: int) -> list[str]:
+    """What to try beside this Python, in order, where FuseSoC is the process `parent`."""
+    return [python for python in dict.fromkeys(_candidates(parent)) if python != sys.executable]
 
 
 def _candidates(parent: int) -> Iterator[str]:
     """Pythons that may have the package, the likeliest first."""
+    import shutil
+    from pathlib import Path
+
     interpreter, script = _command(parent)
     # Where no Python but, say, a shell is the parent, it is not to be asked what only Python understands.
     if Path(interpreter).name.startswith(("python", "pypy")) and (found := shutil.which(interpreter)):
@@ -77,6 +100,8 @@ def _candidates(parent: int) -> Iterator[str]:
 
 def _command(process: int) -> tuple[str, str]:
     """Interpreter and script of a process, which is FuseSoC; "" where the system does not tell."""
+    from pathlib import Path
+
     try:
         words = Path(f"/proc/{process}/cmdline").read_bytes().decode(errors="replace").split("\0")
         folder = Path(f"/proc/{process}/cwd").readlink()
@@ -87,8 +112,41 @@ def _command(process: int) -> tuple[str, str]:
     return absolute[0], next((word for word in absolute[1:] if "/" in word), "")
 
 
+def _environments_above(path: Path) -> Iterator[str]:
+    """The virtual environment that a file is installed in, and those named `.venv` in the folders above it."""
+    for folder in path.parents:
+        for environment in (folder, folder / ".venv"):
+            if (environment / "pyvenv.cfg").is_file():
+                yield str(environment / "bin" / "python3")
+
+
+def _print_suitable() -> None:
+    """Print, for a shell, the Python that a generator would run in; nothing if there is none."""
+    import shlex
+    import subprocess
+
+    # Without the current folder, which `-c` can import from and a script cannot.
+    probe = f"""
+import sys
+from importlib.util import find_spec
+sys.path = [folder for folder in sys.path if folder]
+sys.exit(not all(map(find_spec, {_NEEDED})))
+"""
+    chosen = os.environ.get(_CHOSEN)
+    for python in [chosen] if chosen else [sys.executable, *_others(_above_make())]:
+        try:
+            is_suitable = subprocess.run([python, "-c", probe], stderr=subprocess.DEVNULL, check=False).returncode == 0
+        except OSError:
+            continue
+        if is_suitable:
+            print(shlex.quote(python))
+            return
+
+
 def _above_make() -> int:
     """The process that started the make in whose makefile this one is, maybe by a shell."""
+    from pathlib import Path
+
     process = os.getppid()
     for name in ("sh", "make"):
         try:
@@ -101,24 +159,5 @@ def _above_make() -> int:
     return process
 
 
-def _environments_above(path: Path) -> Iterator[str]:
-    """The virtual environment that a file is installed in, and those named `.venv` in the folders above it."""
-    for folder in path.parents:
-        for environment in (folder, folder / ".venv"):
-            if (environment / "pyvenv.cfg").is_file():
-                yield str(environment / "bin" / "python3")
-
-
-def _is_suitable(python: str) -> bool:
-    if python == sys.executable:
-        return all(map(find_spec, _NEEDED))
-    try:
-        return subprocess.run([python, "-c", _PROBE], stderr=subprocess.DEVNULL, check=False).returncode == 0
-    except OSError:
-        return False
-
-
 if __name__ == "__main__":
-    for found in filter(_is_suitable, _pythons(_above_make())):
-        print(shlex.quote(found))
-        break
+    _print_suitable()

@@ -51,7 +51,8 @@ def _size(text: str) -> int:
 
 
 def _show_cache(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.store import default_store, read_entry
+    from fusesoc_firm.store import default_store
+    from fusesoc_firm.store_files import read_entry
 
     store = default_store()
     entries = store.entries()
@@ -61,7 +62,7 @@ def _show_cache(arguments: argparse.Namespace) -> None:
     for file in entries if arguments.entries else ():
         used = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.used))
         entry = read_entry(file.path)
-        about = f"{entry.about['generator']}  {entry.about['core']}" if entry else "damaged"
+        about = f"{entry[0]['generator']}  {entry[0]['core']}" if entry else "damaged"
         print(f"{used}  {_shown(file.size):>10}  {about}")
 
 

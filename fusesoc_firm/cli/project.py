@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from fusesoc_firm.diagnostics import InputError, fail
 if TYPE_CHECKING:
     from fusesoc_firm.gapi import MessageCores
     from fusesoc_firm.generation import Request
+    from fusesoc_firm.lock import Lock
     from fusesoc_firm.project import Instance, ProjectCore
 
 
@@ -55,9 +57,8 @@ def _draw_cores(arguments: argparse.Namespace) -> None:
 
     def sources(instance: Instance) -> list[str]:
         request = _request(instance)
-        files = [] if request is None else _inputs(request)
-        root = instance.files_root.resolve()
-        return [str(file.relative_to(root) if file.is_relative_to(root) else file) for file in files]
+        # Told from here, files of one name in two cores are two.
+        return [] if request is None else [*map(_shown, _inputs(request))]
 
     dot = core_graph(arguments.core, arguments.target, sources)
     picture = dot if arguments.format == "dot" else svg(dot)
@@ -77,36 +78,68 @@ def _list_affected(arguments: argparse.Namespace) -> None:
         print(f"{name:{width}}  {reason}")
 
 
-def _lock(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.gapi import MESSAGES
-    from fusesoc_firm.lock import check_lock, lock_of, lock_path, lock_text, read_lock
+def check_locked(core: str) -> Path:
+    """Raise `InputError` with everything in which a core, by its name, differs from its lock file, which is returned.
+
+    Where that file is missing, there is nothing to hold the core to, which is a fault, too.
+    """
+    from fusesoc_firm.lock import check_lock, lock_path, read_lock
     from fusesoc_firm.project import dependencies
 
+    found, depends = dependencies(core)
+    path = lock_path(found)
+    locked = read_lock(path)
+    check_lock(locked, _used(found, depends))
+    return path
+
+
+def _lock(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.lock import lock_path, lock_text
+    from fusesoc_firm.project import dependencies
+
+    if arguments.locked:
+        print(f"{_shown(check_locked(arguments.core))}: nothing differs")
+        return
     core, depends = dependencies(arguments.core)
-    path = lock_path(core)
-    locked = read_lock(path) if arguments.locked else None
-    wanted = [instance for instance in core.instances if instance.generator != MESSAGES]
-    requests = [request for instance in wanted if (request := _request(instance))]
-    used = lock_of(core, depends, requests)
-    if locked is None:
-        write(path, lock_text(used))
-        print(_shown(path))
-    else:
-        check_lock(locked, used)
-        print(f"{_shown(path)}: nothing differs")
+    write(lock_path(core), lock_text(_used(core, depends)))
+    print(_shown(lock_path(core)))
+
+
+def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
+    """What a core uses now."""
+    from fusesoc_firm.lock import lock_of
+
+    calls = {core.vlnv: [*_calls(core)]}
+    for item in depends:
+        # Of another one only part may be used here. Where that cannot be made, FuseSoC's run says so.
+        with suppress(InputError):
+            calls[item.vlnv] = [*_calls(item)]
+    return lock_of(core, depends, calls)
+
+
+def _calls(core: ProjectCore) -> Iterator[tuple[Request, list[Path]]]:
+    from fusesoc_firm.gapi import MESSAGES
+
+    for instance in core.instances:
+        if instance.generator != MESSAGES and (request := _request(instance)):
+            yield request, _inputs(request)
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
     """What tells by which of the changed files a core itself is touched."""
 
     def touched(core: ProjectCore) -> str | None:
-        files = set(core.files)
-        for instance in core.instances:
-            files |= _files_behind(instance, changed)
-        first = next((path for path in changed if path in files), None)
-        return None if first is None else _shown(first)
+        found = _first(changed, core.files)
+        # What is behind a generated core takes longer to tell.
+        for instance in core.instances if changed and not found else ():
+            found = found or _first(changed, _files_behind(instance, changed))
+        return _shown(found) if found else None
 
     return touched
+
+
+def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
+    return next((path for path in changed if path in files), None)
 
 
 def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:

@@ -32,14 +32,17 @@ def _tell_why(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.why import call_file, reasons, rendering_of
 
     path, number = _split(arguments.place)
+    if not path.is_file():
+        fail(f"there is no file {path}", hint="after its name stands a line, or nothing: FILE:LINE")
     call, name = call_file(path)
     command_ = _generator(call)
     request = read_request(command_, call, GENERATORS[command_].parameters, is_this_run=False)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        fail(f"cannot read {path}: {error}")
-    rendering = rendering_of(lambda: GENERATORS[command_].generate(request), name, text)
+        fail(f"{path} is no text that can be read: {error}")
+    generator = GENERATORS[command_]
+    rendering = rendering_of(lambda: generator.generate(request), name, text, generator.inputs(request))
     found = reasons(rendering, _names(request))
     if number is None:
         for count, reason in enumerate(found, start=1):
@@ -47,7 +50,7 @@ def _tell_why(arguments: argparse.Namespace) -> None:
             print(f"{count}: {', '.join([_template(reason.line), *shown])}")
         return
     if not 1 <= number <= len(found):
-        fail(f"{path} has {len(found)} lines")
+        fail(f"{path} has no line {number}, its last one is {len(found)}")
     reason = found[number - 1]
     print(reason.line.text)
     print(f"  template       {_template(reason.line)}")

@@ -1,4 +1,7 @@
-"""A Frame's converters as template and configuration: those of fixed size, or those of any."""
+"""A Frame's converters as template and configuration: those of fixed size, or those of any.
+
+The latter are imported where there is one: an edit of them leaves what the store has of the others.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +17,6 @@ from fusesoc_firm.converter.configuration import (
     subscriber_configuration,
     subscriber_entity,
 )
-from fusesoc_firm.converter.variable_publisher import VARIABLE_PUBLISHER_TEMPLATE, variable_publisher_configuration
-from fusesoc_firm.converter.variable_subscriber import VARIABLE_SUBSCRIBER_TEMPLATE, variable_subscriber_configuration
 from fusesoc_firm.frame.model import Frame
 
 
@@ -31,6 +32,11 @@ def subscriber_source(frame: Frame, width: int, suffix: str = "") -> ConverterSo
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, suffix))
+    from fusesoc_firm.converter.variable_subscriber import (
+        VARIABLE_SUBSCRIBER_TEMPLATE,
+        variable_subscriber_configuration,
+    )
+
     configuration = variable_subscriber_configuration(frame, width, subscriber_entity(frame, suffix))
     return ConverterSource(VARIABLE_SUBSCRIBER_TEMPLATE, configuration)
 
@@ -40,5 +46,10 @@ def publisher_source(frame: Frame, width: int, suffix: str = "") -> ConverterSou
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, suffix))
+    from fusesoc_firm.converter.variable_publisher import (
+        VARIABLE_PUBLISHER_TEMPLATE,
+        variable_publisher_configuration,
+    )
+
     configuration = variable_publisher_configuration(frame, width, publisher_entity(frame, suffix))
     return ConverterSource(VARIABLE_PUBLISHER_TEMPLATE, configuration)

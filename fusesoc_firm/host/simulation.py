@@ -34,9 +34,9 @@ _BENCH_TAGS = ("simulation",)
 
 
 def inputs(request: Request) -> list[Path]:
-    """What the system depends on, the stimuli, the model, and the environment."""
+    """What the system depends on, the stimuli, the model, the environment, and what else code of the user reads."""
     stimuli, model = _path(request, "stimuli"), _path(request, "model")
-    return [*generator.inputs(request), *_bag_files(stimuli), model, *_environment(request)]
+    return [*generator.inputs(request), *_bag_files(stimuli), model, *_environment(request), *_files(request)]
 
 
 def generate(request: Request) -> GeneratedCore:
@@ -129,6 +129,10 @@ def _path(request: Request, parameter: str) -> Path:
 def _environment(request: Request) -> dict[Path, SourceRef | None]:
     """The files of the environment, each with its place in the requesting core."""
     return {request.files_root / file: source for file, source in request.listed("environment").items()}
+
+
+def _files(request: Request) -> list[Path]:
+    return [request.files_root / file for file in request.listed("files")]
 
 
 def _bag_files(path: Path) -> list[Path]:

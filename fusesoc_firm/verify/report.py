@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm import __version__
+from fusesoc_firm.files import write_if_changed
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.render import render, write_if_changed
+from fusesoc_firm.render import render
 from fusesoc_firm.verify.campaign import Entry, Settings
 from fusesoc_firm.verify.complexity import Level, Statistics
 from fusesoc_firm.verify.judge import versions

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 
 from tests.bench import (
     applications,
@@ -21,6 +22,7 @@ from tests.bench import (
     links,
     manager,
     simulators,
+    store,
     systems,
     timing,
     use,
@@ -60,26 +62,21 @@ def main() -> int:
 
 
 def _measure(part: str, seed: int, broken: int) -> list[Table]:
-    if part == "systems":
-        return systems.measure(seed, _tell)
-    yosys = Yosys()
-    if part == "area":
-        return area.measure(yosys, _tell)
-    if part == "manager":
-        return manager.measure(yosys, _tell)
-    if part == "timing":
-        return timing.measure(Nextpnr(yosys), _tell)
-    if part == "use":
-        return use.measure(seed, _tell)
-    if part == "links":
-        return links.measure(yosys, _tell)
-    if part == "applications":
-        return applications.measure(yosys, _tell)
-    if part == "images":
-        return images.measure(yosys, seed, _tell)
-    if part == "simulators":
-        return simulators.measure(_tell)
-    return cycles.measure(seed, _tell) if part == "cycles" else fuzz.measure(seed, _tell, broken)
+    measures: dict[str, Callable[[], list[Table]]] = {
+        "area": lambda: area.measure(Yosys(), _tell),
+        "manager": lambda: manager.measure(Yosys(), _tell),
+        "timing": lambda: timing.measure(Nextpnr(Yosys()), _tell),
+        "use": lambda: use.measure(seed, _tell),
+        "cycles": lambda: cycles.measure(seed, _tell),
+        "fuzz": lambda: fuzz.measure(seed, _tell, broken),
+        "images": lambda: images.measure(Yosys(), seed, _tell),
+        "links": lambda: links.measure(Yosys(), _tell),
+        "applications": lambda: applications.measure(Yosys(), _tell),
+        "systems": lambda: systems.measure(seed, _tell),
+        "simulators": lambda: simulators.measure(_tell),
+        "store": lambda: store.measure(_tell),
+    }
+    return measures[part]()
 
 
 def _tell(line: str) -> None:

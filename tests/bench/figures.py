@@ -19,6 +19,7 @@ from tests.bench import (
     manager,
     nextpnr,
     simulators,
+    store,
     systems,
     timing,
     use,
@@ -41,6 +42,7 @@ _HEADINGS = {
     "applications": "Applications",
     "systems": "Systems",
     "simulators": "Simulators",
+    "store": "Store",
 }
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
@@ -62,12 +64,13 @@ _METHODS = {
     "systems": "Time that a user waits for a large system.",
     "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
         same frames and stalls in every simulator, and the same bytes back.""",
+    "store": "What is generated on a second run of FuseSoC, and what that costs.",
 }
 _INTRODUCTION = """
     Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
-    `cycles`, `fuzz`, `images`, `links`, `applications`, `systems`, `simulators`). 'not converted' is a message that no
-    converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of
-    `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
+    `cycles`, `fuzz`, `images`, `links`, `applications`, `systems`, `simulators`, `store`). 'not converted' is a message
+    that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder
+    of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -78,7 +81,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    modules = (area, manager, timing, use, cycles, fuzz, images, links, applications, systems, simulators)
+    modules = (area, manager, timing, use, cycles, fuzz, images, links, applications, systems, simulators, store)
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
 
@@ -102,8 +105,9 @@ def _section_of(text: str, heading: str) -> str:
 
 
 def _versions(part: str) -> str:
-    if part == "systems":
-        return f"With Python {platform.python_version()} and rosbags {metadata.version('rosbags')}."
+    if part in ("systems", "store"):
+        packages = ["rosbags", *(["fusesoc"] if part == "store" else [])]
+        return f"With {', '.join([f'Python {platform.python_version()}', *map(_package, packages)])}."
     if part == "use":
         return f"With Python {platform.python_version()}, NumPy {metadata.version('numpy')}."
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
@@ -117,6 +121,10 @@ def _versions(part: str) -> str:
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
     return f"With {', '.join(tools)}."
+
+
+def _package(name: str) -> str:
+    return f"{name} {metadata.version(name)}"
 
 
 def _first_line(program: str) -> str:

@@ -30,7 +30,7 @@ def entries(root: Path) -> list[Path]:
 def test_show(root: Path, capsys: Captured) -> None:
     assert main(["cache", "show"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines == [f"folder   {root}", "entries  3", "size     29.7 KiB of 1.0 GiB"]
+    assert lines == [f"folder   {root}", "entries  3", "size     29.9 KiB of 1.0 GiB"]
     entries(root)[0].write_bytes(b"")
     assert main(["cache", "show", "--entries"]) == 0
     shown = capsys.readouterr().out.splitlines()[3:]
@@ -55,7 +55,7 @@ def test_clean(root: Path, capsys: Captured) -> None:
     assert capsys.readouterr().out == f"9.9 KiB removed from {root}\n"
     assert main(["cache", "clean"]) == 0
     assert [*root.iterdir()] == []
-    assert capsys.readouterr().out == f"19.8 KiB removed from {root}\n"
+    assert capsys.readouterr().out == f"20.0 KiB removed from {root}\n"
 
 
 def test_clean_to_a_wrong_size() -> None:

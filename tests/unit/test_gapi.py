@@ -55,7 +55,7 @@ class Bench:
 
     def __init__(self, folder: Path) -> None:
         self.echo = Echo()
-        self.missing: list[str] = []
+        self.programs: list[str] = []
         self.project = folder / "project"
         self.work = folder / "work"
         self.project.mkdir()
@@ -77,7 +77,7 @@ class Bench:
             Parameter("paths", "list", "folders"),
             Parameter("file", "str", "a file that says it all", replaces=("spec", "width")),
         )
-        generator = Generator(known, self.echo.inputs, self.echo.generate, lambda _: self.missing)
+        generator = Generator(known, self.echo.inputs, self.echo.generate, lambda _: self.programs)
         return main("echo", ["system_input.yml"], {"echo": generator})
 
 
@@ -279,18 +279,18 @@ def test_a_program_that_is_missing_is_named_with_its_package(
     bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    far = GENERATORS["far"].missing_programs
+    far = GENERATORS["far"].programs
     found = {
         simulator: far(Request("far", "a:b:c:1", tmp_path, {"product": "simulation", "simulator": simulator}))
         for simulator in ("ghdl", "icarus", "verilator")
     }
     assert found == {
-        "ghdl": ["ghdl"],
-        "icarus": ["ghdl", "iverilog"],
-        "verilator": ["ghdl", "verilator", "g++", "make"],
+        "ghdl": ("ghdl",),
+        "icarus": ("ghdl", "iverilog"),
+        "verilator": ("ghdl", "verilator", "g++", "make"),
     }
     assert far(Request("far", "a:b:c:1", tmp_path, {"product": "system", "simulator": "icarus"})) == []
-    bench.missing = ["iverilog"]
+    bench.programs = ["iverilog"]
     assert bench.run(spec="spec.yaml") == 0
     output = capsys.readouterr().out
     assert "echo: error: not installed: iverilog" in output

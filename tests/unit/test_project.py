@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import shutil
 import subprocess
@@ -12,6 +13,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.gapi import main as generate
 from fusesoc_firm.library_path import library_root
 from fusesoc_firm.own_code import PACKAGE
 from fusesoc_firm.project import project_cores
@@ -159,11 +161,24 @@ def test_graph(project: Path, capsys: Captured) -> None:
     assert main(["graph", "me:p:top", "--format", "dot"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert '  "me:p:top:1.0" -> "me:p:top-size:1.0"' in lines
-    assert '  "me:p:top-size:1.0" -> "msg/my_msgs/msg/Size.msg"' in lines
+    assert '  "me:p:top-size:1.0" -> "top/msg/my_msgs/msg/Size.msg"' in lines
     assert '  "me:p:top:1.0" -> "me:p:branch:1.0"' in lines
     assert '  "me:p:leaf:1.0" [shape=box]' not in lines
     assert main(["graph", "me:p:branch", "--target", "sim", "--format", "dot"]) == 0
     assert '  "me:p:branch:1.0" -> "me:p:leaf:1.0"' in capsys.readouterr().out.splitlines()
+
+
+def test_files_of_one_name_are_two_and_any_name_can_be_drawn(project: Path, capsys: Captured) -> None:
+    for name in ("one", 'the "other"'):
+        message = project / name / "msg/my_msgs/msg/Size.msg"
+        message.parent.mkdir(parents=True)
+        message.write_text("uint8 a\n")
+        core = TOP.replace("me:p:top", f"me:p:{name[:3]}").replace("me:p:tree", "me:p:one")
+        (project / name / "x.core").write_text(core.replace('"me:p:one", ', "") if name == "one" else core)
+    assert main(["graph", "me:p:the", "--format", "dot"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert '  "me:p:one-size:1.0" -> "one/msg/my_msgs/msg/Size.msg"' in lines
+    assert '  "me:p:the-size:1.0" -> "the \\"other\\"/msg/my_msgs/msg/Size.msg"' in lines
 
 
 @pytest.mark.skipif(not shutil.which("dot"), reason="Graphviz is not installed")
@@ -182,6 +197,7 @@ def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatc
     ("arguments", "message"),
     [
         (["me:p:bush"], "'me:p:bush' is no core that FuseSoC knows here"),
+        (["me:p:a bush"], "'me:p:a bush' is no core that FuseSoC knows here"),
         (["me:p:top", "--target", "fly"], "'me:p:top:1.0' has no target 'fly'"),
     ],
 )
@@ -284,3 +300,81 @@ def test_what_is_no_lock_file_is_a_fault(project: Path, capsys: Captured, text: 
     assert "cannot read" in locked(capsys)[0]
     (project / "top/top.lock").write_text(text)
     assert "is no lock file" in locked(capsys)[0]
+
+
+def test_what_a_dependency_has_generated_is_locked_too(project: Path, capsys: Captured) -> None:
+    message = project / "maker/msg/my_msgs/msg/Size.msg"
+    message.parent.mkdir(parents=True)
+    message.write_text("uint32 a\n")
+    (project / "maker/maker.core").write_text(TOP.replace("me:p:top", "me:p:maker").replace('"me:p:tree", ', ""))
+    (project / "top/top.core").write_text(TOP.replace("me:p:tree", "me:p:maker"))
+    main(["lock", "me:p:top"])
+    capsys.readouterr()
+    lock = yaml.safe_load((project / "top/top.lock").read_text())
+    names = [name for name in lock["messages"] if name.startswith("my_msgs")]
+    assert names == ["my_msgs/Size (ROS 2)", "my_msgs/Size (ROS 2) of me:p:maker-size:1.0"]
+    assert {lock["messages"][name]["source"] for name in names} == {"msg/my_msgs/msg/Size.msg"}
+    message.write_text("uint32 a # its size\n")
+    assert [line.partition(" is ")[0] for line in locked(capsys)] == [
+        "message my_msgs/Size (ROS 2) of me:p:maker-size:1.0: sha256",
+        "core me:p:maker:1.0: sha256",
+    ]
+
+
+def call(project: Path, **more: object) -> int:
+    """Call the generator as FuseSoC does for the top core."""
+    work = project.parent / "work"
+    work.mkdir(exist_ok=True)
+    parameters = {"message": "my_msgs/Size", "ros": 2, "paths": ["msg"], **more}
+    given = {"files_root": str(project / "top"), "vlnv": "me:p:top-size:1.0", "parameters": parameters}
+    (work / "call.yml").write_text(yaml.safe_dump(given))
+    with contextlib.chdir(work):
+        return generate("firm", ["call.yml"])
+
+
+@pytest.mark.parametrize("by", ["parameter", "environment"])
+def test_a_generator_refuses_what_is_not_locked(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch, by: str
+) -> None:
+    main(["lock", "me:p:top"])
+    lock = project / "top/top.lock"
+    more = {"locked": "top.lock"} if by == "parameter" else {}
+    if by == "environment":
+        monkeypatch.setenv("FUSESOC_FIRM_LOCKED", str(lock))
+    assert call(project, **more) == 0
+    capsys.readouterr()
+    size = project / "top/msg/my_msgs/msg/Size.msg"
+    size.write_text("uint8 b\n")
+    assert call(project, **more) == 1
+    error = capsys.readouterr().err
+    assert "error: message my_msgs/Size (ROS 2): sha256 is " in error
+    assert "error: message my_msgs/Size (ROS 2): signature is RIHS01_" in error
+    assert f"      = by {lock}\n" in error
+    assert call(project, **{**more, "message": "geometry_msgs/Vector3"}) == 1
+    assert "message geometry_msgs/Vector3 (ROS 2) is used, but not locked" in capsys.readouterr().err
+    size.write_text("uint8 a\n")
+    # It is in the store, and compared all the same.
+    assert call(project, **more) == 0
+    monkeypatch.setattr("fusesoc_firm.lock.digests", lambda: {"naming.py": "edited"})
+    assert call(project, **more) == 1
+    assert "tool fusesoc-firm: sha256 is " in capsys.readouterr().err
+    monkeypatch.undo()
+    monkeypatch.setenv("FUSESOC_FIRM_CACHE", str(project.parent / "home"))
+    lock.unlink()
+    if by == "parameter":
+        assert call(project, **more) == 1
+        assert f"cannot read {lock}" in capsys.readouterr().err
+
+
+def test_a_lock_file_of_the_environment_is_absolute(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FUSESOC_FIRM_LOCKED", "top.lock")
+    assert call(project) == 1
+    assert "write FUSESOC_FIRM_LOCKED=$PWD/top.lock" in capsys.readouterr().err
+
+
+def test_with_and_without_a_lock_file_the_store_has_one_answer(project: Path, capsys: Captured) -> None:
+    main(["lock", "me:p:top"])
+    assert call(project) == call(project, locked="top.lock") == 0
+    assert [line.split()[2] for line in capsys.readouterr().out.splitlines()[1:]] == ["generated", "from"]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.render import TemplateError, render, write_if_changed
+from fusesoc_firm.render import TemplateError, render
 
 Expand = Callable[..., str]
 
@@ -129,15 +129,3 @@ def test_only_plain_data_is_a_context(expand: Expand, context: dict[str, object]
 def test_a_missing_template_is_named() -> None:
     with pytest.raises(TemplateError, match=r"template vhdl/nothing: cannot read nothing\.mustache"):
         render("vhdl/nothing", {})
-
-
-def test_write_if_changed_keeps_an_unchanged_file(tmp_path: Path) -> None:
-    path = tmp_path / "a" / "b.vhd"
-    assert write_if_changed(path, "é\n")
-    before = path.stat()
-    assert not write_if_changed(path, "é\n".encode())
-    assert path.stat().st_mtime_ns == before.st_mtime_ns
-    assert path.stat().st_ino == before.st_ino
-    assert write_if_changed(path, "other\r\n")
-    assert path.read_bytes() == b"other\r\n"
-    assert [entry.name for entry in path.parent.iterdir()] == ["b.vhd"]

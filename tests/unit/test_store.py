@@ -22,12 +22,11 @@ from fusesoc_firm.store import (
     Key,
     Made,
     Store,
-    default_root,
     default_store,
     parse_size,
-    read_entry,
     request_digest,
 )
+from fusesoc_firm.store_files import default_root, read_entry
 
 REQUEST = "ab" + "0" * 62
 CODE = {"render.py": "1", "frame.py": "2", "a.mustache": "3"}
@@ -146,9 +145,9 @@ def test_a_store_that_can_only_be_read_gives_what_it_has(
 
     obtain(tmp_path)
     before = stored(tmp_path)
-    for function in ("mkdir", "unlink", "replace"):
-        monkeypatch.setattr(Path, function, refuse)
-    monkeypatch.setattr(os, "utime", refuse)
+    monkeypatch.setattr(Path, "unlink", refuse)
+    for function in ("makedirs", "replace", "utime"):
+        monkeypatch.setattr(os, function, refuse)
     monkeypatch.setattr(store_module, "_locked", refuse)
     assert obtain(tmp_path) == Entry(FILES, True)
     assert capfd.readouterr().err == ""
@@ -242,13 +241,13 @@ def build():
 Store(Path(sys.argv[1]), 2**30).obtain(lambda: Key(sys.argv[2], {}), build)
 """
 HANG_BEFORE_RENAME = """
-import sys, time
+import os, sys, time
 from pathlib import Path
 from fusesoc_firm.store import Key, Made, Store
 def replace(*_):
     print("in the middle", flush=True)
     time.sleep(600)
-Path.replace = replace
+os.replace = replace
 Store(Path(sys.argv[1]), 2**30).obtain(lambda: Key(sys.argv[2], {}), lambda: Made({"a.vhd": b"whole"}, []))
 """
 
@@ -264,6 +263,49 @@ def test_a_process_that_ends_in_the_middle_leaves_no_entry_and_no_lock(
     process.communicate()
     assert not any(path.suffix in (".entry", ".uses") for path in stored(tmp_path))
     assert obtain(tmp_path) == Entry(FILES, False)
+    assert find(tmp_path) == FILES
+
+
+def test_one_that_is_stopped_is_not_waited_for_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    process = start(HANG_IN_BUILD, tmp_path, REQUEST)
+    wait_for(process, "in the middle")
+    process.send_signal(signal.SIGSTOP)
+    monkeypatch.setattr(store_module, "_LONGEST_WAIT_SECONDS", 0.2)
+    begin = time.monotonic()
+    # What the other process asked for.
+    made = Store(tmp_path, LARGE).obtain(lambda: Key(REQUEST, {}), lambda: Made(FILES, []))
+    assert time.monotonic() - begin >= 0.2
+    assert made == Entry(FILES, False)
+    assert find(tmp_path, code={}) == FILES
+    # Its lock is its own to remove.
+    assert len([*tmp_path.rglob("*.lock")]) == 1
+    process.kill()
+    process.communicate()
+
+
+class Gone:
+    """A file that was opened, and removed on another machine before it was read."""
+
+    def __enter__(self) -> Gone:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def read(self) -> bytes:
+        raise OSError(errno.ESTALE, "Stale file handle")
+
+
+def test_what_is_gone_while_it_is_read_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    obtain(tmp_path)
+    real = open
+
+    def open_stale(path: Path | str, mode: str) -> object:
+        return Gone() if str(path).endswith((".entry", ".uses")) else real(path, mode)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("builtins.open", open_stale)
+        assert obtain(tmp_path) == Entry(FILES, False)
     assert find(tmp_path) == FILES
 
 
@@ -312,7 +354,7 @@ def age(root: Path, request: str, seconds: float) -> None:
     entry = next(
         file.path
         for file in Store(root, LARGE).entries()
-        if (found := read_entry(file.path)) and found.about["core"] == request
+        if (found := read_entry(file.path)) and found[0]["core"] == request
     )
     for path in (entry, next(root.rglob(f"{request}.uses"))):
         os.utime(path, (time.time() - seconds,) * 2)
@@ -432,4 +474,4 @@ def test_a_limit_that_is_no_size_is_a_fault() -> None:
     ],
 )
 def test_where_the_store_lies(environment: dict[str, str], expected: Path) -> None:
-    assert default_root(environment) == expected
+    assert default_root(environment) == str(expected)

@@ -135,18 +135,21 @@ def test_faults(tmp_path: Path, capsys: Captured) -> None:
         return capsys.readouterr().err
 
     path = copy / "quat2euler_system.vhd"
-    assert "lines" in fault(f"{path}:9999")
-    assert "lines" in fault(f"{path}:0")
-    assert "is of no template: it is data, or a copy of a source" in fault(
+    last = len(path.read_text().splitlines())
+    for number in (last + 1, 0):
+        assert f"has no line {number}, its last one is {last}" in fault(f"{path}:{number}")
+    source = SPECS / "quat2euler/rtl/quat2euler.vhd"
+    assert f"is of no template\n      = it is a copy of {source}\n" in fault(
         f"{copy / 'quat2euler/rtl/quat2euler.vhd'}:1"
     )
     (copy / "robot.vhd").write_text("")
-    assert "is no file of the generated core" in fault(f"{copy / 'robot.vhd'}:1")
+    assert "'robot.vhd' is none of the generated core's files" in fault(f"{copy / 'robot.vhd'}:1")
     path.write_text(path.read_text() + "-- edited\n")
     assert "is not what would be generated now" in fault(f"{path}:1")
     (tmp_path / "a.vhd").write_text("")
-    assert "no call of a generator made" in fault(str(tmp_path / "a.vhd"))
-    assert "cannot read" in fault(f"{copy / 'nothing.vhd'}:1")
+    assert "no generator made" in fault(str(tmp_path / "a.vhd"))
+    for place in (f"{copy / 'nothing.vhd'}:1", f"{path}:x", f"{path}:-1", str(copy), ""):
+        assert "there is no file" in fault(place)
 
 
 def test_recording_ends(tmp_path: Path) -> None:

@@ -1,0 +1,49 @@
+"""Files that appear at once: no reader, on this machine or on another that shares the folder, sees half of one.
+
+Of Python's library no more is imported than a file needs, as an answer out of the store waits for it.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+
+TEMPORARY = ".new-"
+"""What the name of a file begins with that is not whole yet."""
+
+
+def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file beside its place, and put it there by one rename. Raises `OSError`."""
+    folder = os.path.dirname(os.fspath(path))
+    os.makedirs(folder or ".", exist_ok=True)
+    # A name that no process of any machine has; a process id is one's own only where it runs.
+    temporary = os.path.join(folder, f"{TEMPORARY}{os.urandom(8).hex()}")
+    try:
+        with open(temporary, "xb") as file:
+            file.write(data)
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool:
+    """Write a file, whole, unless it holds just that already; tell whether it was written.
+
+    An unchanged file keeps its time, so nothing behind it is built again. Raises `OSError`.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    if read_file(path) == data:
+        return False
+    write_whole(path, data)
+    return True
+
+
+def read_file(path: str | os.PathLike[str]) -> bytes | None:
+    """The content of a file; None if there is none that can be read."""
+    try:
+        with open(path, "rb") as file:
+            return file.read()
+    except OSError:
+        return None

@@ -1,0 +1,116 @@
+"""Which files and folders this process reads, as Python itself tells (audit hooks, PEP 578).
+
+What a generator reads has to be among the inputs that its key covers, or an edit would go unnoticed. What Python
+consists of and what its packages hold is left out, as their versions count, and so is this package, whose files are
+counted apart. So is what is the machine's: `/dev`, `/etc`, `/proc`, `/sys`. What other programs read is not seen.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import sysconfig
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+
+from fusesoc_firm.own_code import PACKAGE
+
+# Events of Python with a path as their first argument.
+_OF_FILES = ("open", "sqlite3.connect")
+_OF_FOLDERS = ("os.listdir", "os.scandir")
+_OF_TEMPORARY = ("tempfile.mkdtemp", "tempfile.mkstemp")
+_MACHINE = ("/dev", "/etc", "/proc", "/sys")
+_PATHS_OF_PYTHON = ("stdlib", "platstdlib", "purelib", "platlib")
+# What folders of installed packages are called, Debian's and those of each user included.
+_PACKAGE_FOLDERS = ("site-packages", "dist-packages")
+
+
+@dataclass
+class Reads:
+    """Absolute paths of what was read, in the order in which it was; `python_path` is where Python finds packages."""
+
+    files: dict[str, None] = field(default_factory=dict)
+    folders: dict[str, None] = field(default_factory=dict)
+    temporary: list[str] = field(default_factory=list)
+    python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
+
+
+# Those that are noted now, the innermost last.
+_current: list[Reads] = []
+
+
+@contextmanager
+def noted(reads: Reads) -> Iterator[None]:
+    """Within it, what is read is added to `reads`."""
+    _install_hook()
+    _current.append(reads)
+    try:
+        yield
+    finally:
+        _current.remove(reads)
+
+
+@cache
+def _install_hook() -> None:
+    """Once: a hook stays for as long as the process lives."""
+    sys.addaudithook(_hook)
+
+
+def _hook(event: str, arguments: tuple[object, ...]) -> None:
+    if not _current:
+        return
+    if event in _OF_FILES:
+        if event != "open" or _is_read(*arguments[1:]):
+            _note(arguments[0], is_file=True)
+    elif event in _OF_FOLDERS:
+        # An import lists the folders of Python's path, and never scans one.
+        if event != "os.listdir" or arguments[0] not in _current[-1].python_path:
+            _note(arguments[0], is_file=False)
+    elif event in _OF_TEMPORARY:
+        _current[-1].temporary.append(_absolute(str(arguments[0])))
+
+
+def _is_read(mode: object, flags: object) -> bool:
+    if isinstance(mode, str):
+        return "r" in mode
+    return isinstance(flags, int) and flags & os.O_ACCMODE != os.O_WRONLY
+
+
+def _note(path: object, *, is_file: bool) -> None:
+    # A number is a file that is open already, and None the current folder.
+    if not isinstance(path, str | bytes) or (text := os.fsdecode(path)) == ":memory:":
+        return
+    absolute, reads = _absolute(text), _current[-1]
+    # An archive may be on Python's path, too.
+    is_apart = is_file and absolute in reads.python_path
+    if not is_apart and not _is_below(absolute, (*_apart(), *reads.temporary)) and not _is_of_package(absolute, reads):
+        (reads.files if is_file else reads.folders)[absolute] = None
+
+
+def _absolute(path: str) -> str:
+    return os.path.abspath(path)
+
+
+@cache
+def _apart() -> tuple[str, ...]:
+    """Folders of what is counted apart."""
+    paths = sysconfig.get_paths()
+    return (*_MACHINE, str(PACKAGE), *(paths[name] for name in _PATHS_OF_PYTHON), sys.executable)
+
+
+def _is_below(path: str, folders: tuple[str, ...]) -> bool:
+    return any(path == folder or path.startswith(f"{folder}{os.sep}") for folder in folders)
+
+
+def _is_of_package(path: str, reads: Reads) -> bool:
+    """Tell whether a file is one of a package that Python finds elsewhere."""
+    for folder in reads.python_path:
+        if path.startswith(f"{folder}{os.sep}"):
+            if os.path.basename(folder) in _PACKAGE_FOLDERS:
+                return True
+            first = os.path.join(folder, path[len(folder) + 1 :].partition(os.sep)[0])
+            if os.path.isfile(os.path.join(first, "__init__.py")) or first.endswith("-info"):
+                return True
+    return False
