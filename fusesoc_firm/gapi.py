@@ -29,6 +29,9 @@ from fusesoc_firm.store import Entry, Files, Key, Made, default_store, request_d
 MESSAGES = "firm_messages"
 # The largest that `math_real.uniform` takes, which draws the stalls.
 _LARGEST_SEED = 2147483562
+# FuseSoC does so at the start of every run of a target.
+_REMOVED = """the folder that this generator was started in was removed: the same target is being run twice at once
+      = 'firm build' does this without harm"""
 
 
 @dataclass(frozen=True)
@@ -198,6 +201,11 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+    except FileNotFoundError:
+        if _is_here():
+            raise
+        print(f"{command}: error: {_REMOVED}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
@@ -207,6 +215,14 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     origin = "from store" if entry.is_from_store else "generated"
     print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
     return 0
+
+
+def _is_here() -> bool:
+    """Whether the current folder has not been removed."""
+    try:
+        return bool(Path.cwd())
+    except FileNotFoundError:
+        return False
 
 
 def _mark_run(request: Request) -> None:
@@ -259,6 +275,32 @@ def obtain(request: Request, generator: Generator) -> Entry:
     return default_store().obtain(
         lambda: _key(request, generator), lambda: Made(as_files(generator.generate(request), request), used_code())
     )
+
+
+class _NotStoredError(Exception):
+    """The store does not have what was asked for."""
+
+
+def answer_from_store(command: str, path: Path) -> bool:
+    """Write what FuseSoC's file asks for into the current folder; False, and nothing is written, if that must be made.
+
+    So it is where anything is out of the ordinary, too: then whoever makes it says what.
+    """
+
+    def refuse() -> Made:
+        raise _NotStoredError
+
+    generator = GENERATORS[command]
+    start = time.monotonic()
+    try:
+        request = read_request(command, path, generator.parameters)
+        if generator.missing_programs(request):
+            return False
+        _write(default_store().obtain(lambda: _key(request, generator), refuse).files)
+    except (InputError, _NotStoredError):
+        return False
+    print(f"{command}: {request.name} from store in {time.monotonic() - start:.2f} s", flush=True)
+    return True
 
 
 def used_before(request: Request, generator: Generator) -> list[str] | None:

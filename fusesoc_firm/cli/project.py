@@ -77,6 +77,11 @@ def _list_affected(arguments: argparse.Namespace) -> None:
         print(f"{name:{width}}  {reason}")
 
 
+def check_locked(core: str) -> None:
+    """Raise `InputError` with everything in which a core differs from its lock file."""
+    _lock(argparse.Namespace(core=core, locked=True))
+
+
 def _lock(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.gapi import MESSAGES
     from fusesoc_firm.lock import check_lock, lock_of, lock_path, lock_text, read_lock
@@ -90,10 +95,10 @@ def _lock(arguments: argparse.Namespace) -> None:
     used = lock_of(core, depends, requests)
     if locked is None:
         write(path, lock_text(used))
-        print(_shown(path))
+        print(shown(path))
     else:
         check_lock(locked, used)
-        print(f"{_shown(path)}: nothing differs")
+        print(f"{shown(path)}: nothing differs")
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
@@ -104,7 +109,7 @@ def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
         for instance in core.instances:
             files |= _files_behind(instance, changed)
         first = next((path for path in changed if path in files), None)
-        return None if first is None else _shown(first)
+        return None if first is None else shown(first)
 
     return touched
 
@@ -162,6 +167,7 @@ def _inputs(request: Request) -> list[Path]:
     return [path.resolve() for path in GENERATORS[request.command].inputs(request)]
 
 
-def _shown(path: Path) -> str:
+def shown(path: Path) -> str:
+    """A path as short as it can be told here."""
     here = Path.cwd().resolve()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
