@@ -17,10 +17,9 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from fusesoc_firm.building.plan import GeneratorCall
 from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.gapi import GENERATORS, MESSAGES, Call, make_request, obtain, used_before
-from fusesoc_firm.generation import GeneratedCore, Request
+from fusesoc_firm.generation import GeneratedCore, GeneratorCall, Request
 from fusesoc_firm.own_code import digests
 from fusesoc_firm.render import forget_templates
 

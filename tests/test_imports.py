@@ -44,6 +44,8 @@ ALLOWED: dict[str, set[str]] = {
     "why": _SYSTEM,
     "lock": _SYSTEM | {"own_code", "project"},
     "project": {"diagnostics", "render"},
+    # It knows FuseSoC, and generators only as FuseSoC calls them.
+    "building": {"diagnostics", "generation", "workers"},
     "store": {"diagnostics"},
     "library_path": set(),
     "workers": {"diagnostics"},
@@ -57,7 +59,7 @@ ALLOWED: dict[str, set[str]] = {
     "parameters": {"diagnostics", "generation", "requesting_core"},
 }
 # The doors join the stages; __init__ holds the version.
-DOORS = {"gapi", "cli"}
+DOORS = {"gapi", "batch", "cli"}
 _PREFIX = "fusesoc_firm"
 
 

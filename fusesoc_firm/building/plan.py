@@ -11,16 +11,7 @@ from typing import Any
 
 from fusesoc_firm.building.place_lock import PlaceLock
 from fusesoc_firm.diagnostics import Diagnostics, fail
-
-
-@dataclass(frozen=True)
-class GeneratorCall:
-    """A call of a generator as FuseSoC will make it: the new core's name, the requesting core's folder, parameters."""
-
-    generator: str
-    vlnv: str
-    files_root: str
-    parameters: Mapping[str, Any]
+from fusesoc_firm.generation import GeneratorCall
 
 
 @dataclass(frozen=True)

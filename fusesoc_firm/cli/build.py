@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Generator, Sequence
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -91,11 +92,17 @@ def _outcomes(plan: Plan, arguments: argparse.Namespace, bar: Any) -> Generator[
     jobs = arguments.jobs or len(os.sched_getaffinity(0))
     plan.fetch()
     # What is locked is checked by each call.
-    if not arguments.locked:
+    if not arguments.locked and _generators_run_here():
         _generate(plan, jobs, bar)
         save_time(_answer)
     options += ["--setup", "--build"] * arguments.build_only
-    yield from Pool(tuple(options), jobs, bar.write).run(plan)
+    yield from Pool(tuple(options), jobs, partial(bar.write, file=sys.stderr)).run(plan)
+
+
+def _generators_run_here() -> bool:
+    """Whether the Python that runs this is the one that generators are to run in."""
+    chosen = os.environ.get("FUSESOC_FIRM_PYTHON")
+    return not chosen or Path(chosen).absolute() == Path(sys.executable).absolute()
 
 
 def _generate(plan: Plan, jobs: int, bar: Any) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, images, manager, nextpnr, simulators, systems, timing, use, yosys
+from tests.bench import area, builds, cycles, fuzz, images, manager, nextpnr, simulators, systems, timing, use, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
@@ -24,6 +24,7 @@ _HEADINGS = {
     "fuzz": "Fuzzing",
     "images": "Images",
     "systems": "Systems",
+    "builds": "Builds",
     "simulators": "Simulators",
 }
 _METHODS = {
@@ -40,14 +41,15 @@ _METHODS = {
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
     "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
     "systems": "Time that a user waits for a large system.",
+    "builds": "Time that a user waits for many cores.",
     "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
         same frames and stalls in every simulator, and the same bytes back.""",
 }
 _INTRODUCTION = """
     Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
-    `cycles`, `fuzz`, `images`, `systems`, `simulators`). 'not converted' is a message that no converter is made of yet,
-    or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`.
-    'met' and 'MISSED' tell how a row stands to its bar.
+    `cycles`, `fuzz`, `images`, `systems`, `builds`, `simulators`). 'not converted' is a message that no converter is
+    made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of
+    `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -58,7 +60,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    modules = (area, manager, timing, use, cycles, fuzz, images, systems, simulators)
+    modules = (area, manager, timing, use, cycles, fuzz, images, systems, builds, simulators)
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
 
@@ -84,6 +86,8 @@ def _section_of(text: str, heading: str) -> str:
 def _versions(part: str) -> str:
     if part == "systems":
         return f"With Python {platform.python_version()} and rosbags {metadata.version('rosbags')}."
+    if part == "builds":
+        return f"With Python {platform.python_version()}, FuseSoC {metadata.version('fusesoc')} and two processors."
     if part == "use":
         return f"With Python {platform.python_version()}, NumPy {metadata.version('numpy')}."
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]

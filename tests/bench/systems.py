@@ -108,7 +108,7 @@ def run(job: Job, folder: Path) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as place:
         store = Path(place, "store") if job.is_cold else folder / "store"
         environment = {**os.environ, "FUSESOC_FIRM_CACHE": str(store), "PYTHONPATH": str(REPOSITORY)}
-        before, start = _processor_time(), time.monotonic()
+        before, start = processor_time(), time.monotonic()
         subprocess.run(
             [sys.executable, *job.command(folder)],
             cwd=place,
@@ -117,10 +117,10 @@ def run(job: Job, folder: Path) -> tuple[float, float]:
             capture_output=True,
             text=True,
         )
-        return time.monotonic() - start, _processor_time() - before
+        return time.monotonic() - start, processor_time() - before
 
 
-def _processor_time() -> float:
+def processor_time() -> float:
     """Seconds of all processes that have ended."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
