@@ -2,8 +2,9 @@
 
     python -m fusesoc_firm.batch GENERATOR < calls.json
 
-Such a process does the calls of one generator, so that it uses the files of ours that a call by itself would use, and
-none of another one's. What it cannot make it leaves alone: FuseSoC's own call makes it, or says what is wrong.
+Such a process imports what one generator needs, once, and does each call in a copy of itself. So nothing of ours counts
+as used for a call but what it would use by itself. What cannot be made is left alone: FuseSoC's own call makes it, or
+says what is wrong.
 """
 
 from __future__ import annotations
@@ -12,16 +13,16 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Generator, Iterable
+from collections.abc import Generator as Steps
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import InputError, fail
-from fusesoc_firm.gapi import GENERATORS, MESSAGES, Call, make_request, obtain, used_before
+from fusesoc_firm.gapi import GENERATORS, MESSAGES, Call, Generator, make_request, obtain, used_before
 from fusesoc_firm.generation import GeneratedCore, GeneratorCall, Request
 from fusesoc_firm.own_code import digests
-from fusesoc_firm.render import forget_templates
 
 # So many are worth a process of their own.
 _LEAST = 4
@@ -29,7 +30,7 @@ _LEAST = 4
 _OF_CORES = "messages"
 
 
-def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Generator[None, None, None]:
+def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None]:
     """Make them in at most `jobs` processes at once; a step for each call that was made, found or left alone.
 
     Whenever it is left, none of them runs on. Meanwhile this process imports what it takes to find such calls in the
@@ -42,7 +43,7 @@ def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Generator[None, None, 
         yield from _run(generator, [mine[number::count] for number in range(count)], mine[0])
 
 
-def _run(generator: str, shares: list[list[GeneratorCall]], first: GeneratorCall) -> Generator[None, None, None]:
+def _run(generator: str, shares: list[list[GeneratorCall]], first: GeneratorCall) -> Steps[None, None, None]:
     steps, end = os.pipe()
     processes = [
         subprocess.Popen(
@@ -60,8 +61,7 @@ def _run(generator: str, shares: list[list[GeneratorCall]], first: GeneratorCall
             assert process.stdin
             with process.stdin, suppress(BrokenPipeError):
                 json.dump([vars(call) for call in share], process.stdin, default=str)
-        with suppress(InputError):
-            used_before(_request(first), GENERATORS[generator])
+        _load(first)
         while done := os.read(steps, 100):
             yield from [None] * len(done)
     finally:
@@ -88,20 +88,37 @@ def _request(call: GeneratorCall) -> Request:
 def main() -> None:
     """Make the calls on standard input; a byte on standard output for each."""
     (name,) = sys.argv[1:]
-    generator = GENERATORS[name]
+    calls = [GeneratorCall(**item) for item in json.load(sys.stdin)]
     code = digests()
+    _load(calls[0])
+    for call in calls:
+        if process := os.fork():
+            os.waitpid(process, 0)
+            os.write(sys.stdout.fileno(), b".")
+        else:
+            try:
+                _make(call, GENERATORS[name], code)
+            finally:
+                os._exit(0)
+
+
+def _make(call: GeneratorCall, generator: Generator, code: Mapping[str, str]) -> None:
+    """Make a call in a process that has imported modules when our files were as `code` says."""
 
     def generate(request: Request) -> GeneratedCore:
         core = generator.generate(request)
         if digests() != code:
-            fail("a file of ours was edited, which this process has read before")
+            fail("a file of ours was edited since")
         return core
 
-    for item in json.load(sys.stdin):
-        forget_templates()
-        with suppress(InputError):
-            obtain(_request(GeneratorCall(**item)), replace(generator, generate=generate))
-        os.write(sys.stdout.fileno(), b".")
+    with suppress(InputError):
+        obtain(_request(call), replace(generator, generate=generate))
+
+
+def _load(call: GeneratorCall) -> None:
+    """Import what it takes to find such a call in the store, which copies of this process then have."""
+    with suppress(InputError):
+        used_before(_request(call), GENERATORS[call.generator])
 
 
 if __name__ == "__main__":

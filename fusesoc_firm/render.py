@@ -140,23 +140,14 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
 
 def template_text(name: str, templates: Path = TEMPLATES) -> str:
     """The text of `templates/<name>.mustache`. Raises `OSError`."""
-    _note_use(name, templates)
+    if templates == TEMPLATES:
+        _READ.add(f"{name}.mustache")
     return (templates / f"{name}.mustache").read_text(encoding="utf-8")
 
 
 def templates_read() -> frozenset[str]:
-    """Which files below `TEMPLATES` this process has used so far, or since it was told to forget."""
+    """Which files below `TEMPLATES` this process has read so far."""
     return frozenset(_READ)
-
-
-def forget_templates() -> None:
-    """Begin anew to note which templates are used."""
-    _READ.clear()
-
-
-def _note_use(name: str, templates: Path) -> None:
-    if templates == TEMPLATES:
-        _READ.add(f"{name}.mustache")
 
 
 def write_if_changed(path: Path, content: str | bytes) -> bool:
@@ -286,14 +277,9 @@ def _require_plain(value: object, path: str) -> None:
         raise TemplateError(f"'{path or 'the context'}' is {_kind(value)}; a context holds plain data only")
 
 
-def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file, which is read once and used many times."""
-    _note_use(name, templates)
-    return _parse_once(name, templates)
-
-
 @cache
-def _parse_once(name: str, templates: Path) -> tuple[_Node, ...]:
+def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
+    """The tree of a template file."""
     try:
         return _tree(name, template_text(name, templates))
     except OSError as error:

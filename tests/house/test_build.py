@@ -8,8 +8,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fusesoc import edalizer
@@ -288,3 +289,38 @@ def test_many_instances_are_generated_before_fusesoc_asks(project: Path, calls: 
     assert calls.read_text() == ""
     log = place(project, "one", "sim.log").read_text()
     assert len(re.findall(r"^firm: one-\w+ from store", log, re.MULTILINE)) == 7
+
+
+@pytest.fixture
+def cluster() -> Iterator[str]:
+    distributed: Any = pytest.importorskip("distributed", reason="no distributed; make test installs it")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=":0"
+    ) as machines:
+        yield machines.scheduler_address
+
+
+@pytest.mark.xdist_group("dask")
+def test_on_a_cluster(project: Path, cluster: str) -> None:
+    status, out, err = build(
+        project, "one", "two", "--target", "good", "bad", "--setup", "--cluster", cluster, EDALIZE_LAUNCHER="mine"
+    )
+    assert status == 1
+    assert err[-1] == "error: 2 of 4 builds failed"
+    rows = [line.split() for line in out if " build/me_project_" in line and "ends with" not in line]
+    results = [(row[0].split(":")[2], row[1], row[2]) for row in rows if not row[0].startswith("    ")]
+    for core in ("one", "two"):
+        assert (core, "good", "ok") in results and (core, "bad", "failed") in results
+        assert "launcher is mine" in place(project, core, "good.log").read_text().splitlines()
+    assert sum("no such luck" in line for line in out) == 2
+    assert not list((project / "build").glob(".firm_build*"))
+
+
+@pytest.mark.xdist_group("dask")
+def test_ctrl_c_ends_what_runs_on_a_cluster(project: Path, cluster: str) -> None:
+    running = start(project, "one", "two", "--target", "long", "--setup", "--cluster", cluster)
+    wait_until(lambda: len(processes(project)) == 4)
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=30)
+    assert (running.returncode, err.splitlines()[-1]) == (130, "interrupted")
+    wait_until(lambda: not any(map(is_running, processes(project))), 10)
