@@ -2,9 +2,8 @@
 
     python -m fusesoc_firm.batch GENERATOR < calls.json
 
-Such a process imports what one generator needs, once, and does each call in a copy of itself. So nothing of ours counts
-as used for a call but what it would use by itself. What cannot be made is left alone: FuseSoC's own call makes it, or
-says what is wrong.
+Such a process does the calls of one generator, so that it uses the files of ours that a call by itself would use, and
+none of another one's. What cannot be made is left alone: FuseSoC's own call makes it, or says what is wrong.
 """
 
 from __future__ import annotations
@@ -23,11 +22,14 @@ from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.gapi import GENERATORS, MESSAGES, Call, Generator, make_request, obtain, used_before
 from fusesoc_firm.generation import GeneratedCore, GeneratorCall, Request
 from fusesoc_firm.own_code import digests
+from fusesoc_firm.render import forget_rendered
 
 # So many are worth a process of their own.
 _LEAST = 4
 # The parameter that names cores with messages.
 _OF_CORES = "messages"
+# Modules that keep what took long to find out, and nothing rendered; `render` notes what it keeps.
+_WITHOUT_TEMPLATES = ("own_code", "render", "requesting_core", "store")
 
 
 def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None]:
@@ -88,22 +90,30 @@ def _request(call: GeneratorCall) -> Request:
 def main() -> None:
     """Make the calls on standard input; a byte on standard output for each."""
     (name,) = sys.argv[1:]
-    calls = [GeneratorCall(**item) for item in json.load(sys.stdin)]
     code = digests()
-    _load(calls[0])
-    for call in calls:
-        if process := os.fork():
-            os.waitpid(process, 0)
-            os.write(sys.stdout.fileno(), b".")
-        else:
-            try:
-                _make(call, GENERATORS[name], code)
-            finally:
-                os._exit(0)
+    for item in json.load(sys.stdin):
+        _forget()
+        with suppress(InputError):
+            _make(GeneratorCall(**item), GENERATORS[name], code)
+        os.write(sys.stdout.fileno(), b".")
+
+
+def _forget() -> None:
+    """Forget which templates were rendered, and all that our modules keep, which could be made of them."""
+    forget_rendered()
+    for name, module in [*sys.modules.items()]:
+        package, _, rest = name.partition(".")
+        if package == "fusesoc_firm" and rest not in _WITHOUT_TEMPLATES:
+            for value in [*vars(module).values()]:
+                if hasattr(value, "cache_clear"):
+                    value.cache_clear()
 
 
 def _make(call: GeneratorCall, generator: Generator, code: Mapping[str, str]) -> None:
-    """Make a call in a process that has imported modules when our files were as `code` says."""
+    """Make a call in a process that has imported modules when our files were as `code` says.
+
+    Raises `InputError`.
+    """
 
     def generate(request: Request) -> GeneratedCore:
         core = generator.generate(request)
@@ -111,8 +121,7 @@ def _make(call: GeneratorCall, generator: Generator, code: Mapping[str, str]) ->
             fail("a file of ours was edited since")
         return core
 
-    with suppress(InputError):
-        obtain(_request(call), replace(generator, generate=generate))
+    obtain(_request(call), replace(generator, generate=generate))
 
 
 def _load(call: GeneratorCall) -> None:

@@ -26,7 +26,12 @@ _DIGESTS: dict[Path, tuple[tuple[int, int, int], str]] = {}
 
 def digests(package: Path = PACKAGE) -> dict[str, str]:
     """The SHA-256 of every module, data file and template of a package's folder, its library left out, by name."""
-    return {name: _digest(package / name) for name in _names(package)}
+    return {name: _digest(_path(package, name)) for name in _names(package)}
+
+
+@cache
+def _path(package: Path, name: str) -> Path:
+    return package / name
 
 
 def _digest(path: Path) -> str:
@@ -63,9 +68,10 @@ def _is_data(name: str, folders: set[str]) -> bool:
 
 def _names(package: Path) -> list[str]:
     found: list[str] = []
+    start = len(str(package)) + 1
     for folder, folders, files in os.walk(package):
         # In the library lie cores, and links to folders of any size.
         folders[:] = [name for name in folders if name not in ("library", "__pycache__")]
-        above = Path(folder).relative_to(package).as_posix()
-        found += [name if above == "." else f"{above}/{name}" for name in files if name.endswith(_COUNTED)]
+        above = f"{folder}/"[start:]
+        found += [f"{above}{name}" for name in files if name.endswith(_COUNTED)]
     return sorted(found)
