@@ -35,6 +35,9 @@ from fusesoc_firm.tools import explanation, missing, simulation_programs
 MESSAGES = "firm_messages"
 # The largest that `math_real.uniform` takes, which draws the stalls.
 _LARGEST_SEED = 2147483562
+# FuseSoC does so at the start of every run of a target.
+_REMOVED = """the folder that this generator was started in was removed: the same target is being run twice at once
+      = 'firm build' does this without harm"""
 
 
 @dataclass(frozen=True)
@@ -213,6 +216,11 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
+    except FileNotFoundError:
+        if _is_here():
+            raise
+        print(f"{command}: error: {_REMOVED}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
@@ -222,6 +230,14 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     origin = "from store" if entry.is_from_store else "generated"
     print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
     return 0
+
+
+def _is_here() -> bool:
+    """Whether the current folder has not been removed."""
+    try:
+        return bool(Path.cwd())
+    except FileNotFoundError:
+        return False
 
 
 def _check_locked(request: Request) -> bool:
@@ -303,6 +319,32 @@ def obtain(request: Request, generator: Generator, path: Path | None = None) -> 
         return Made(as_files(core, request), used_code())
 
     return default_store().obtain(key, build, _stored_call(request, generator, path, of_key) if path else None)
+
+
+class _NotStoredError(Exception):
+    """The store does not have what was asked for."""
+
+
+def answer_from_store(command: str, path: Path) -> bool:
+    """Write what FuseSoC's file asks for into the current folder; False, and nothing is written, if that must be made.
+
+    So it is where anything is out of the ordinary, too: then whoever makes it says what.
+    """
+
+    def refuse() -> Made:
+        raise _NotStoredError
+
+    generator = GENERATORS[command]
+    start = time.monotonic()
+    try:
+        request = read_request(command, path, generator.parameters)
+        if missing(generator.programs(request)) or _check_locked(request) or _marks(request):
+            return False
+        _write(default_store().obtain(lambda: _key(request, generator, Reads()), refuse).files)
+    except (InputError, _NotStoredError):
+        return False
+    print(f"{command}: {request.name} from store in {time.monotonic() - start:.2f} s", flush=True)
+    return True
 
 
 def used_before(request: Request, generator: Generator) -> list[str] | None:

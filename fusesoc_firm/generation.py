@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -15,6 +16,16 @@ from fusesoc_firm.diagnostics import SourceRef
 
 Plain = str | int | bool | list[str] | None
 """What a generator's parameter can be; None is one that was not given and has no default."""
+
+
+@dataclass(frozen=True)
+class GeneratorCall:
+    """A call of a generator as FuseSoC will make it: the new core's name, the requesting core's folder, parameters."""
+
+    generator: str
+    vlnv: str
+    files_root: str
+    parameters: Mapping[str, Any]
 
 
 @dataclass(frozen=True)

@@ -10,16 +10,21 @@ import hashlib
 import json
 import os
 import sys
+import time
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parent
 _DATA = (".yaml", ".csv")
 _COUNTED = (".py", ".mustache", *_DATA)
+# A file can be edited twice within what its time tells apart.
+_NEW_SECONDS = 2
+_DIGESTS: dict[Path, tuple[tuple[int, int, int], str]] = {}
 
 
 def digests(package: Path = PACKAGE) -> dict[str, str]:
     """The SHA-256 of every module, data file and template of a package's folder, its library left out, by name."""
-    return {name: hashlib.sha256((package / name).read_bytes()).hexdigest() for name in all_names(package)}
+    return {name: _digest(_path(package, name)) for name in all_names(package)}
 
 
 def digest() -> str:
@@ -27,27 +32,53 @@ def digest() -> str:
     return hashlib.sha256(json.dumps(digests(), sort_keys=True).encode()).hexdigest()
 
 
+@cache
+def _path(package: Path, name: str) -> Path:
+    return package / name
+
+
+def _digest(path: Path) -> str:
+    """The SHA-256 of a file; not read again while its state is the same, unless it is so new that this may err."""
+    status = path.stat()
+    state = (status.st_ino, status.st_size, status.st_mtime_ns)
+    if (known := _DIGESTS.get(path)) and known[0] == state:
+        return known[1]
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    if time.time() - status.st_mtime > _NEW_SECONDS:
+        _DIGESTS[path] = (state, digest)
+    return digest
+
+
 def used_code() -> list[str]:
     """Those of the names in `digests` that this process has used so far, sorted."""
     from fusesoc_firm.render import TEMPLATES, templates_read
 
     files = [getattr(module, "__file__", None) for module in [*sys.modules.values()]]
-    modules = {path for file in files if file and (path := Path(file).resolve()).is_relative_to(PACKAGE)}
-    folders = {path.parent for path in modules}
-    used = modules | {TEMPLATES / name for name in templates_read()}
-    return sorted(name for name in all_names() if (path := PACKAGE / name) in used or _is_data(path, folders))
+    modules = {name for file in files if file and (name := _own_name(file))}
+    folders = {name.rpartition("/")[0] for name in modules}
+    templates = TEMPLATES.relative_to(PACKAGE).as_posix()
+    used = modules | {f"{templates}/{name}" for name in templates_read()}
+    return [name for name in all_names() if name in used or _is_data(name, folders)]
 
 
-def _is_data(path: Path, folders: set[Path]) -> bool:
-    return path.suffix in _DATA and path.parent in folders
+@cache
+def _own_name(file: str) -> str | None:
+    """The name of one of our own files; None for another."""
+    path = Path(file).resolve()
+    return path.relative_to(PACKAGE).as_posix() if path.is_relative_to(PACKAGE) else None
+
+
+def _is_data(name: str, folders: set[str]) -> bool:
+    return name.endswith(_DATA) and name.rpartition("/")[0] in folders
 
 
 def all_names(package: Path = PACKAGE) -> list[str]:
     """The names in `digests`, sorted."""
     found: list[str] = []
+    start = len(str(package)) + 1
     for folder, folders, files in os.walk(package):
         # In the library lie cores, and links to folders of any size.
         folders[:] = [name for name in folders if name not in ("library", "__pycache__")]
-        above = os.path.relpath(folder, package)
-        found += [os.path.normpath(os.path.join(above, name)) for name in files if name.endswith(_COUNTED)]
+        above = f"{folder}/"[start:]
+        found += [f"{above}{name}" for name in files if name.endswith(_COUNTED)]
     return sorted(found)

@@ -26,6 +26,7 @@ from chevron.tokenizer import ChevronError, tokenize
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 # Those of them that this process has read: what it made depends on no others.
 _READ: set[str] = set()
+_RENDERED: set[str] = set()
 
 
 class TemplateError(Exception):
@@ -141,12 +142,21 @@ def template_text(name: str, templates: Path = TEMPLATES) -> str:
     """The text of `templates/<name>.mustache`. Raises `OSError`."""
     if templates == TEMPLATES:
         _READ.add(f"{name}.mustache")
+    return _text(name, templates)
+
+
+def _text(name: str, templates: Path) -> str:
     return (templates / f"{name}.mustache").read_text(encoding="utf-8")
 
 
 def templates_read() -> frozenset[str]:
-    """Which files below `TEMPLATES` this process has read so far."""
-    return frozenset(_READ)
+    """Which files below `TEMPLATES` this process has read or rendered so far."""
+    return frozenset(_READ | _RENDERED)
+
+
+def forget_rendered() -> None:
+    """Forget which files were rendered. Those whose text was asked for count as long as the process lives."""
+    _RENDERED.clear()
 
 
 @dataclass(frozen=True)
@@ -257,11 +267,17 @@ def _require_plain(value: object, path: str) -> None:
         raise TemplateError(f"'{path or 'the context'}' is {_kind(value)}; a context holds plain data only")
 
 
-@cache
 def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file."""
+    """The tree of a template file, which is rendered now."""
+    if templates == TEMPLATES:
+        _RENDERED.add(f"{name}.mustache")
+    return _parse_once(name, templates)
+
+
+@cache
+def _parse_once(name: str, templates: Path) -> tuple[_Node, ...]:
     try:
-        return _tree(name, template_text(name, templates))
+        return _tree(name, _text(name, templates))
     except OSError as error:
         raise TemplateError(f"cannot read {name.rpartition('/')[2]}.mustache: {error.strerror}") from error
 

@@ -7,6 +7,7 @@ looked up again. Where it is not found, or a parameter comes from an inherited s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import yaml
@@ -59,13 +60,19 @@ def find_requesting_core(folder: Path, new_core: str) -> RequestingCore:
     """Find the core in `folder` whose generator instance makes the core of this name (`<core>-<instance>`)."""
     for path in sorted(folder.glob("*.core")):
         try:
-            text = read_yaml(path)
+            text = _read(path, path.stat().st_mtime_ns)
         except InputError:
             continue
         if entry := _entry(text.root, new_core):
             name = _item(text.root, "name")
             return RequestingCore(text, entry, ":".join(str(name[1].value).split(":")[:3]) if name else "")
     return RequestingCore()
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, _changed: int) -> YamlText:
+    """A core file, which a process that makes many of its instances reads once."""
+    return read_yaml(path)
 
 
 def _entry(root: yaml.Node | None, new_core: str) -> tuple[yaml.Node, yaml.Node] | None:

@@ -27,6 +27,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO
@@ -306,12 +307,18 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
         "request": request,
         "inputs": {name: None if data is None else digest(data) for name, data in inputs.items()},
         "code": sorted(code),
-        "versions": {name: version(name) for name in IMPORTED},
+        "versions": {name: _version(name) for name in IMPORTED},
         "python": sys.version_info[:2],
         # What a compiler made of an accelerator runs on one kind of machine only.
         "machine": platform.machine(),
     }
     return digest_of(parts)
+
+
+@cache
+def _version(package: str) -> str:
+    """Of what this process has imported; looking it up takes longer than all else of a key."""
+    return version(package)
 
 
 def _locked(path: Path) -> tuple[IO[bytes], bool]:

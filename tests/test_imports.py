@@ -49,6 +49,8 @@ ALLOWED: dict[str, set[str]] = {
     "why": _SYSTEM,
     "lock": _SYSTEM | {"project", "tools"},
     "project": {"diagnostics", "render"},
+    # It knows FuseSoC, and generators only as FuseSoC calls them.
+    "building": {"diagnostics", "generation", "workers"},
     "store": {"diagnostics", "files", "recall", "store_files"},
     "library_path": set(),
     "workers": {"diagnostics"},
@@ -64,7 +66,7 @@ ALLOWED: dict[str, set[str]] = {
     "parameters": {"diagnostics", "generation", "requesting_core"},
 }
 # The doors join the stages; __init__ holds the version.
-DOORS = {"gapi", "cli"}
+DOORS = {"gapi", "batch", "cli"}
 _PREFIX = "fusesoc_firm"
 
 

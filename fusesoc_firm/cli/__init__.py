@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from fusesoc_firm import __version__
+from fusesoc_firm.cli.build import add_build
 from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
 from fusesoc_firm.cli.message import add_message
@@ -53,6 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     add_message(commands)
     add_system(commands)
     add_scheduler(commands)
+    add_build(commands)
     add_project(commands)
     add_why(commands)
     add_cache(commands)

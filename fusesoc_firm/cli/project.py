@@ -58,7 +58,7 @@ def _draw_cores(arguments: argparse.Namespace) -> None:
     def sources(instance: Instance) -> list[str]:
         request = _request(instance)
         # Told from here, files of one name in two cores are two.
-        return [] if request is None else [*map(_shown, _inputs(request))]
+        return [] if request is None else [*map(shown, _inputs(request))]
 
     dot = core_graph(arguments.core, arguments.target, sources)
     picture = dot if arguments.format == "dot" else svg(dot)
@@ -98,11 +98,11 @@ def _lock(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.project import dependencies
 
     if arguments.locked:
-        print(f"{_shown(check_locked(arguments.core))}: nothing differs")
+        print(f"{shown(check_locked(arguments.core))}: nothing differs")
         return
     core, depends = dependencies(arguments.core)
     write(lock_path(core), lock_text(_used(core, depends)))
-    print(_shown(lock_path(core)))
+    print(shown(lock_path(core)))
 
 
 def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
@@ -133,7 +133,7 @@ def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
         # What is behind a generated core takes longer to tell.
         for instance in core.instances if changed and not found else ():
             found = found or _first(changed, _files_behind(instance, changed))
-        return _shown(found) if found else None
+        return shown(found) if found else None
 
     return touched
 
@@ -195,6 +195,7 @@ def _inputs(request: Request) -> list[Path]:
     return [path.resolve() for path in GENERATORS[request.command].inputs(request)]
 
 
-def _shown(path: Path) -> str:
+def shown(path: Path) -> str:
+    """A path as short as it can be told here."""
     here = Path.cwd().resolve()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

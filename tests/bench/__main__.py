@@ -15,6 +15,7 @@ from collections.abc import Callable
 from tests.bench import (
     applications,
     area,
+    builds,
     cycles,
     figures,
     fuzz,
@@ -73,6 +74,7 @@ def _measure(part: str, seed: int, broken: int) -> list[Table]:
         "links": lambda: links.measure(Yosys(), _tell),
         "applications": lambda: applications.measure(Yosys(), _tell),
         "systems": lambda: systems.measure(seed, _tell),
+        "builds": lambda: builds.measure(_tell),
         "simulators": lambda: simulators.measure(_tell),
         "store": lambda: store.measure(_tell),
     }

@@ -12,6 +12,7 @@ from tests import yowasp
 from tests.bench import (
     applications,
     area,
+    builds,
     cycles,
     fuzz,
     images,
@@ -41,6 +42,7 @@ _HEADINGS = {
     "links": "Links and crossings",
     "applications": "Applications",
     "systems": "Systems",
+    "builds": "Builds",
     "simulators": "Simulators",
     "store": "Store",
 }
@@ -62,15 +64,16 @@ _METHODS = {
         measured as in 'Area', for ECP5 with `{yosys.ECP5.synthesis}` and for iCE40 UltraPlus with
         `{yosys.ICE40.synthesis}`. The targets `synth_*` do the same with the Yosys that is installed.""",
     "systems": "Time that a user waits for a large system.",
+    "builds": "Time that a user waits for many cores.",
     "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
         same frames and stalls in every simulator, and the same bytes back.""",
     "store": "What is generated on a second run of FuseSoC, and what that costs.",
 }
 _INTRODUCTION = """
     Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
-    `cycles`, `fuzz`, `images`, `links`, `applications`, `systems`, `simulators`, `store`). 'not converted' is a message
-    that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder
-    of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
+    `cycles`, `fuzz`, `images`, `links`, `applications`, `systems`, `builds`, `simulators`, `store`). 'not converted' is
+    a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names
+    a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -81,7 +84,21 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    modules = (area, manager, timing, use, cycles, fuzz, images, links, applications, systems, simulators, store)
+    modules = (
+        area,
+        manager,
+        timing,
+        use,
+        cycles,
+        fuzz,
+        images,
+        links,
+        applications,
+        systems,
+        builds,
+        simulators,
+        store,
+    )
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
 
@@ -108,6 +125,8 @@ def _versions(part: str) -> str:
     if part in ("systems", "store"):
         packages = ["rosbags", *(["fusesoc"] if part == "store" else [])]
         return f"With {', '.join([f'Python {platform.python_version()}', *map(_package, packages)])}."
+    if part == "builds":
+        return f"With Python {platform.python_version()}, {_package('fusesoc')} and two processors."
     if part == "use":
         return f"With Python {platform.python_version()}, NumPy {metadata.version('numpy')}."
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]

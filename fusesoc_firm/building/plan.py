@@ -1,0 +1,141 @@
+"""What is to be built: cores and targets as FuseSoC knows them, where each is built, and what is generated for it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.building.place_lock import PlaceLock
+from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.generation import GeneratorCall
+
+
+@dataclass(frozen=True)
+class Build:
+    """A target of a core (its full name), and the folder that it is built in."""
+
+    core: str
+    target: str
+    work_root: Path
+
+    @property
+    def log(self) -> Path:
+        """Where its output goes."""
+        return self.work_root.with_name(f"{self.work_root.name}.log")
+
+    @property
+    def lock(self) -> Path:
+        """The file that says who works in its folder."""
+        return self.work_root.with_name(f"{self.work_root.name}.lock")
+
+    def __str__(self) -> str:
+        return f"{self.core} {self.target}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Builds, and FuseSoC itself with its libraries read, to do them."""
+
+    fusesoc: Any = field(repr=False)
+    build_root: Path
+    builds: tuple[Build, ...]
+
+    def generator_calls(self) -> list[GeneratorCall]:
+        """All that is to be generated, once each. Raises `InputError` if something that is depended on is missing."""
+        found: dict[tuple[str, str, str], GeneratorCall] = {}
+        for build in self.builds:
+            for core, flags in self._solved(build):
+                for call in _calls(core, flags):
+                    found[call.vlnv, call.files_root, repr(call.parameters)] = call
+        return list(found.values())
+
+    def fetch(self) -> None:
+        """Have FuseSoC download the cores that are kept elsewhere, which it cannot do several times at once."""
+        for build in self.builds:
+            for core, _ in self._solved(build):
+                if core.provider and core.cache_status() != "downloaded":
+                    lock = PlaceLock(Path(f"{core.files_root}.lock"))
+                    if owner := lock.acquire():
+                        fail(f"{core.name} is being downloaded by {owner}", hint="start again when it is there")
+                    try:
+                        core.setup()
+                    finally:
+                        lock.release()
+
+    def _solved(self, build: Build) -> list[tuple[Any, Mapping[str, Any]]]:
+        """The cores of a build, each with the flags that hold in it."""
+        from fusesoc.coremanager import DependencyError
+        from fusesoc.vlnv import Vlnv
+
+        top = self.fusesoc.get_core(build.core)
+        flags = {**top.get_flags(build.target), "target": build.target}
+        try:
+            cores = self.fusesoc.cm.get_depends(Vlnv(build.core), {**flags, "is_toplevel": True})
+        except DependencyError as error:
+            fail(f"{build.core} depends on what FuseSoC does not know here: {error.value}")
+        return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
+
+
+def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | None = None) -> Plan:
+    """Every one of the targets of every one of the cores, once, with the configuration that FuseSoC has here.
+
+    Raises `InputError` with all cores and targets that there are not.
+    """
+    from fusesoc.config import Config
+    from fusesoc.fusesoc import Fusesoc
+
+    config = Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
+    # One folder for all that is built is no place for many builds.
+    config.args_work_root = None
+    config.args_build_root = str(Path(build_root or config.build_root).absolute())
+    fusesoc = Fusesoc(config)
+    faults = Diagnostics()
+    names = [name for core in cores if (name := _full_name(fusesoc, core, faults))]
+    builds = [
+        Build(name, target, Path(fusesoc.get_work_root(fusesoc.get_core(name), flags)))
+        for name, target in dict.fromkeys(product(names, targets))
+        if (flags := _flags(fusesoc, name, target, faults))
+    ]
+    faults.raise_if_any()
+    return Plan(fusesoc, Path(config.build_root), tuple(builds))
+
+
+def _full_name(fusesoc: Any, core: str, faults: Diagnostics) -> str | None:
+    """The full name of a core; without a colon it is the name alone, as for `fusesoc run`."""
+    from fusesoc.coremanager import DependencyError
+
+    known = [name for name in fusesoc.get_cores() if name.split(":")[2].lower() == core.lower()]
+    families = sorted({name.rpartition(":")[0] for name in known})
+    if len(families) > 1:
+        faults.error(f"'{core}' can be {' or '.join(families)}")
+        return None
+    try:
+        return str(fusesoc.get_core(families[0] if families else core).name)
+    except (DependencyError, SyntaxError):
+        faults.error(f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
+        return None
+
+
+def _flags(fusesoc: Any, name: str, target: str, faults: Diagnostics) -> dict[str, Any] | None:
+    """The flags of a target; None, and it is said, if it cannot be built."""
+    core = fusesoc.get_core(name)
+    known = core.get_data({}).targets
+    if target not in known:
+        faults.error(f"{name} has no target '{target}'", hint=f"it has: {', '.join(known) or 'none'}")
+        return None
+    flags = {**core.get_flags(target), "target": target}
+    if not core.get_flow(flags) and "tool" not in flags:
+        faults.error(f"target '{target}' of {name} cannot be built", hint="it has neither 'flow' nor 'default_tool'")
+        return None
+    return flags
+
+
+def _calls(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
+    for call in core.get_ttptttg(dict(flags)):
+        name = core.name
+        vlnv = f"{name.vendor}:{name.library}:{name.name}-{call['name']}:{name.version}"
+        yield GeneratorCall(call["generator"], vlnv, str(Path(core.files_root).absolute()), call["config"])

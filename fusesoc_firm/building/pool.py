@@ -1,0 +1,136 @@
+"""Builds on this machine, several at once; of one place in the build root, one at a time."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+
+from fusesoc_firm.building.place_lock import BEAT_SECONDS, PlaceLock
+from fusesoc_firm.building.plan import Build, Plan
+from fusesoc_firm.building.process import build_in_this_process, last_lines
+
+_POLL_SECONDS = 0.2
+# Between being asked to end and being made to.
+_PATIENCE_SECONDS = 5.0
+_END_POLL_SECONDS = 0.02
+SHOWN_LINES = 20
+"""Of the log of a build that failed."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a build: whether all went well, the seconds it took, and the last lines of its log if not."""
+
+    build: Build
+    is_good: bool
+    seconds: float
+    last_lines: tuple[str, ...] = ()
+
+
+@dataclass
+class _Running:
+    build: Build
+    lock: PlaceLock
+    process: BaseProcess
+    started: float
+    beaten: float
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Does builds with the options of `fusesoc run`, at most `jobs` at once; `tell` hears of those that wait."""
+
+    options: tuple[str, ...]
+    jobs: int
+    tell: Callable[[str], None]
+
+    def run(self, plan: Plan) -> Iterator[Outcome]:
+        """Each build's outcome, as they come. Whenever it is left, nothing that it started runs on."""
+        waiting = {build: PlaceLock(build.lock) for build in plan.builds}
+        running: list[_Running] = []
+        told: set[Build] = set()
+        alive = os.pipe()
+        try:
+            while waiting or running:
+                for build, lock in list(waiting.items())[: self.jobs]:
+                    if len(running) < self.jobs and self._take(build, lock, told):
+                        del waiting[build]
+                        running.append(self._start(plan, build, lock, alive))
+                wait([item.process.sentinel for item in running], _POLL_SECONDS)
+                for item in [*running]:
+                    if item.process.exitcode is not None or not _holds(item):
+                        running.remove(item)
+                        yield _finish(item)
+        finally:
+            _end(running)
+            for end in alive:
+                os.close(end)
+
+    def _take(self, build: Build, lock: PlaceLock, told: set[Build]) -> bool:
+        owner = lock.acquire()
+        if owner and build not in told:
+            self.tell(f"{build}: waiting for {owner}, which works in {build.work_root}")
+            told.add(build)
+        return owner is None
+
+    def _start(self, plan: Plan, build: Build, lock: PlaceLock, alive: tuple[int, int]) -> _Running:
+        process = multiprocessing.get_context("fork").Process(
+            target=build_in_this_process, args=(plan.fusesoc, build, self.options, alive)
+        )
+        process.start()
+        return _Running(build, lock, process, time.monotonic(), time.monotonic())
+
+
+def _holds(item: _Running) -> bool:
+    """Whether a build still has its place; shows from time to time that it does."""
+    if time.monotonic() - item.beaten < BEAT_SECONDS:
+        return True
+    item.beaten = time.monotonic()
+    return item.lock.beat()
+
+
+def _finish(item: _Running) -> Outcome:
+    status = item.process.exitcode
+    _end([item])
+    seconds = time.monotonic() - item.started
+    if status == 0:
+        return Outcome(item.build, True, seconds)
+    lines = last_lines(item.build.log, SHOWN_LINES)
+    if status is None:
+        lines = [f"another machine took {item.build.work_root}, as it had not seen this build for a while"]
+    elif status < 0:
+        lines.append(f"ended by {signal.Signals(-status).name}")
+    return Outcome(item.build, False, seconds, tuple(lines))
+
+
+def _end(items: list[_Running]) -> None:
+    """End what builds have started, as far as it runs, then let others have their places."""
+    patience = time.monotonic() + _PATIENCE_SECONDS
+    for item in items:
+        _signal(item.process, signal.SIGTERM)
+    for item in items:
+        item.process.join(max(0.0, patience - time.monotonic()))
+        while time.monotonic() < patience and _signal(item.process, signal.SIGTERM):
+            time.sleep(_END_POLL_SECONDS)
+        _signal(item.process, signal.SIGKILL)
+        item.process.join()
+        item.lock.release()
+
+
+def _signal(process: BaseProcess, number: signal.Signals) -> bool:
+    """Signal a build and all that it started; False if nothing of it is left."""
+    assert process.pid
+    try:
+        os.killpg(process.pid, number)
+    except ProcessLookupError:
+        # It leads no group yet, or is no more.
+        if process.is_alive():
+            os.kill(process.pid, number)
+        return process.is_alive()
+    return True

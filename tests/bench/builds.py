@@ -1,0 +1,158 @@
+"""Time to generate 200 converters: `fusesoc run` for one core after another, and `firm build` on one and two cores."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.library_path import library_root
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import RosVersion
+from tests.bench.systems import processor_time
+from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
+from tests.sim.ghdl import REPOSITORY
+
+TITLE = "200 converters, generated with an empty store"
+CONVERTERS = 200
+WIDTHS = (8, 32)
+RUNS = 2
+SECONDS, SPEED_UP = 10.0, 1.7
+
+_COLUMNS = ("converters", "by", "processors", "wall, s", "processor, s", "speed-up", "bar", "result")
+_NOTE = f"""
+    Subscriber and publisher of {CONVERTERS // len(WIDTHS)} messages of ROS 2 at {len(WIDTHS)} widths, set up for a tool
+    in a new build root, the start of Python included. Of `firm build` the fastest of {RUNS} runs, since what else the
+    machine does can only add; runs on one processor and on two take turns. `fusesoc run` is started once for each core,
+    one after another. All leave the same bytes. What FuseSoC itself does for the generated cores of a single core it
+    does one after another, so that layout gains less from a second processor.
+    """
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How the converters are spread: so many cores, each with as many."""
+
+    cores: int
+    has_bar: bool
+
+    @property
+    def name(self) -> str:
+        each = CONVERTERS // self.cores
+        return f"{self.cores} cores of {each}" if self.cores > 1 else f"a core of {each}"
+
+
+LAYOUTS = (Layout(20, has_bar=True), Layout(1, has_bar=False))
+_FLOW = "toplevel: x, flow: generic, flow_options: {tool: ghdl}"
+_PLAIN, _FIRM = "fusesoc run", "firm build"
+
+
+def keys() -> dict[str, list[tuple[str, ...]]]:
+    """The first cells of every row, by table."""
+    rows: list[tuple[str, ...]] = [(layout.name, _PLAIN, "2") for layout in LAYOUTS if layout.has_bar]
+    return {TITLE: rows + [(layout.name, _FIRM, count) for layout in LAYOUTS for count in ("1", "2")]}
+
+
+def measure(tell: Tell) -> list[Table]:
+    """Run all; `tell` hears of each."""
+    rows: list[tuple[str, ...]] = []
+    for layout in LAYOUTS:
+        with tempfile.TemporaryDirectory() as place:
+            write_library(Path(place), layout.cores)
+            for row in _rows(layout, Path(place)):
+                tell(" ".join(row))
+                rows.append(row)
+    return [Table(TITLE, _COLUMNS, tuple(rows), _NOTE)]
+
+
+def write_library(folder: Path, cores: int) -> None:
+    """A library of so many cores, which have all the converters generated."""
+    names = [str(name) for name in MessageLibrary(RosVersion.ROS2).names()][: CONVERTERS // len(WIDTHS)]
+    wanted = [(name, width) for width in WIDTHS for name in names]
+    (folder / "fusesoc.conf").write_text(
+        f"[library.firm]\nlocation = {library_root()}\n[library.bench]\nlocation = library\n"
+    )
+    for core in range(cores):
+        instances = {f"i{number}": item for number, item in enumerate(wanted[core::cores])}
+        lines = [
+            "CAPI=2:",
+            f"name: bench:lib:c{core}:1.0",
+            'filesets: {base: {depend: ["robot:firm:generators"]}}',
+            "generate:",
+            *(
+                f"  {name}: {{generator: firm, parameters: {{message: {message}, ros: 2, width: {width}}}}}"
+                for name, (message, width) in instances.items()
+            ),
+            "targets:",
+            f"  default: {{filesets: [base], generate: [{', '.join(instances)}], {_FLOW}}}",
+            "",
+        ]
+        path = folder / "library" / f"c{core}" / f"c{core}.core"
+        path.parent.mkdir(parents=True)
+        path.write_text("\n".join(lines))
+
+
+def _rows(layout: Layout, folder: Path) -> list[tuple[str, ...]]:
+    cores = [f"bench:lib:c{core}" for core in range(layout.cores)]
+    fusesoc = [str(Path(sys.executable).parent / "fusesoc"), "run", "--setup", "--target=default"]
+    firm = [sys.executable, "-m", "fusesoc_firm.cli", "build", "--setup", "--target", "default"]
+    plain = run(fusesoc, [[core] for core in cores], folder, 2) if layout.has_bar else None
+    turns = [(run(firm, [cores], folder, 1), run(firm, [cores], folder, 2)) for _ in range(RUNS)]
+    one, two = (min(runs, key=lambda item: item.wall) for runs in zip(*turns, strict=True))
+    speed_up = one.wall / two.wall
+    bar = f"{SECONDS:g} s, {SPEED_UP}" if layout.has_bar else f"{SECONDS:g} s"
+    result = MET if two.wall <= SECONDS and (speed_up >= SPEED_UP or not layout.has_bar) else MISSED
+    expected = plain or one
+    if any(item.files != expected.files for turn in turns for item in turn):
+        result = FAILED
+    return [
+        *([(layout.name, _PLAIN, "2", *plain.cells(), "", "", "")] if plain else []),
+        (layout.name, _FIRM, "1", *one.cells(), "", "", ""),
+        (layout.name, _FIRM, "2", *two.cells(), f"{speed_up:.2f}", bar, result),
+    ]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Seconds of the wall clock and of the processors, and the files that tools are given, by path."""
+
+    wall: float
+    processor: float
+    files: dict[str, bytes]
+
+    def cells(self) -> tuple[str, str]:
+        """The figures in a row."""
+        return f"{self.wall:.1f}", f"{self.processor:.1f}"
+
+
+def run(command: list[str], starts: list[list[str]], folder: Path, processors: int) -> Run:
+    """Start a command with these cores, then with those, with so many processors in all, and an empty store.
+
+    Raises `CalledProcessError`.
+    """
+    available = sorted(os.sched_getaffinity(0))
+    assert len(available) >= processors, f"this needs {processors} processors"
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        variables = {"PYTHONPATH": str(REPOSITORY), "FUSESOC_FIRM_CACHE": str(Path(place, "store"))}
+        before, start = processor_time(), time.monotonic()
+        for cores in starts:
+            subprocess.run(
+                [*command, "--build-root", str(Path(place, "build")), *cores],
+                cwd=folder,
+                env={**os.environ, **variables},
+                check=True,
+                capture_output=True,
+                text=True,
+                preexec_fn=lambda: os.sched_setaffinity(0, available[:processors]),
+            )
+        return Run(time.monotonic() - start, processor_time() - before, generated(Path(place)))
+
+
+def generated(place: Path) -> dict[str, bytes]:
+    """What tools are given, by its path in the build root."""
+    files = (place / "build").glob("*/default/src/bench_lib_*/*")
+    return {str(path.relative_to(place)): path.read_bytes() for path in files}
