@@ -76,8 +76,10 @@ def serve(system: DerivedSystem, folder: Path, taken: BinaryIO, given: BinaryIO)
             except CodecError as error:
                 print(f"a message of '{topic.block}' is none: {error}", file=sys.stderr, flush=True)
                 continue
-            for block, answer in functions.take(End(topic.block), message):
-                given.write(pack_frame(ids[block], encode_used(ports.outputs[ids[block]].frame, answer)))
+            given.writelines(
+                pack_frame(ids[block], encode_used(ports.outputs[ids[block]].frame, answer))
+                for block, answer in functions.take(End(topic.block), message)
+            )
             given.flush()
 
 
