@@ -66,16 +66,21 @@ def test_a_payload_that_is_too_short_is_an_error_and_the_rest_goes_on(driver: Dr
     assert outcome.log[0].startswith("converter 0 reports an error in cycle ")
 
 
-def test_a_simulator_that_is_killed_is_started_again(driver: Driver, built: BuiltSimulator, tmp_path: Path) -> None:
-    """While it has frames, some of them half."""
+def test_a_simulator_that_is_killed_ends_the_node_or_is_started_again(
+    driver: Driver, built: BuiltSimulator, tmp_path: Path
+) -> None:
+    """While it has frames: no time is free of them. The second one is let live."""
     script, mark = shlex.quote(str(built.script())), shlex.quote(str(tmp_path / "mark"))
     command = (
-        f"if test -e {mark}; then exec {script}; fi; touch {mark};"
+        f"if test -e {mark}; then exec {script}; fi; touch {mark}; exec 2>/dev/null;"
         f" {script} & child=$!; (sleep 1; kill -9 $child) 3<&- 4>&- & wait $child"
     )
     lines = puts([(0, payload) for payload in quaternions(20000)])
-    died = run(driver, lines, f"pipe:{command}", converters=1, drain=100, overflow="drop_oldest")
+    died = run(driver, lines, f"pipe:{command}", converters=1, drain=60000)
     assert died.said["status"] == "1"
-    lines = [*puts([(0, payload) for payload in quaternions(3)]), "await 3"]
-    again = run(driver, lines, f"pipe:{command}", converters=1, drain=60000)
-    assert again.said["status"] == "0" and len(again.published[0]) == 3
+    assert died.said["error"] == "the simulator ended with status 137 (signal 9)"
+    assert died.published[0]
+    (tmp_path / "mark").unlink()
+    few = [*lines[:30], "await 20"]
+    again = run(driver, few, f"pipe:{command.replace('sleep 1', 'sleep 0.2')}", converters=1, restarts=1, drain=60000)
+    assert again.said["status"] == "0" and len(again.published[0]) >= 20
