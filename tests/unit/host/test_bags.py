@@ -31,9 +31,9 @@ def version(kind: str) -> RosVersion:
     return RosVersion.ROS1 if kind == "ros1" else RosVersion.ROS2
 
 
-def subscriber(block: str, message: str, ros: RosVersion, number: int = 0) -> Converter:
+def subscriber(block: str, message: str, ros: RosVersion, number: int = 0, topic: str = "") -> Converter:
     name = parse_name(message)
-    return Converter(block, frame_of(name, MessageLibrary(ros).closure(name)), number)
+    return Converter(block, frame_of(name, MessageLibrary(ros).closure(name)), number, given_name=topic)
 
 
 def write(folder: Path, kind: str, recordings: Iterable[Recording]) -> Path:
@@ -68,8 +68,8 @@ def test_messages_go_by_topic_or_type_in_order_of_time(tmp_path: Path, kind: str
     ]
     ros = version(kind)
     subscribers = [
-        subscriber("arm_left", "geometry_msgs/Point", ros, 0),
-        subscriber("arm_right", "geometry_msgs/Point", ros, 1),
+        subscriber("arm_left", "geometry_msgs/Point", ros, 0, "/arm/left"),
+        subscriber("arm_right", "geometry_msgs/Point", ros, 1, "/arm/right"),
         subscriber("wind", "geometry_msgs/Vector3", ros, 2),
     ]
     found = read_stimuli(write(tmp_path, kind, recordings), subscribers)
@@ -105,7 +105,8 @@ def test_a_topic_that_could_go_to_two(tmp_path: Path, kind: str) -> None:
     with pytest.raises(InputError) as raised:
         read_stimuli(path, subscribers)
     assert str(raised.value) == (
-        f"error: topic /middle of {path} could go to left, right\n      = name the topic like one of them"
+        f"error: topic /middle of {path} could go to left, right\n"
+        "      = name the topic like one of them, or give one the key 'topic'"
     )
 
 
