@@ -67,9 +67,9 @@ class BagWriter:
         self._writer.write(self._connections[topic], stamp, payload)
 
 
-def form_of(path: Path, otherwise: Form) -> Form:
-    """The form that a bag's name says: that of a file with its ending, or `otherwise`."""
-    return _FILES.get(path.suffix, otherwise)
+def form_of(path: Path) -> Form | None:
+    """The form that a bag's name says: that of a file with its ending, if it has one."""
+    return _FILES.get(path.suffix)
 
 
 def check_writable(path: Path, *, force: bool) -> None:
