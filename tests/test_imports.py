@@ -34,6 +34,7 @@ ALLOWED: dict[str, set[str]] = {
     "scheduling": {"diagnostics", "workers"},
     "system": _CONVERTER | {"prompts", "scheduling"},
     "host": _SYSTEM,
+    "replay": _SYSTEM | {"host"},
     # The cores of its bench lie in the library.
     "verify": _SYSTEM | {"library_path", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.

@@ -12,6 +12,7 @@ from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
+from fusesoc_firm.cli.replay import add_replay
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
@@ -53,6 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     add_message(commands)
     add_system(commands)
     add_scheduler(commands)
+    add_replay(commands)
     add_project(commands)
     add_why(commands)
     add_cache(commands)

@@ -72,15 +72,14 @@ def _seconds(text: str) -> float:
 
 def _replay(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.host.bags import Form
-    from fusesoc_firm.replay.command import Recording, Selection, replay
+    from fusesoc_firm.host.simulator import start_simulator
+    from fusesoc_firm.replay.command import Settings, Source, Target, replay
 
     loaded = load(arguments)
-    form = Form(arguments.format) if arguments.format else None
     replay(
         loaded,
-        arguments.source,
-        Recording(arguments.target, form, arguments.force, arguments.latency),
-        Selection(arguments.limit, arguments.start, arguments.duration, dict(arguments.map)),
-        arguments.quiet,
+        Source(arguments.source, arguments.limit, arguments.start, arguments.duration),
+        Target(arguments.target, Form(arguments.format) if arguments.format else None, arguments.force),
+        Settings(dict(arguments.map), arguments.quiet, arguments.latency),
         lambda: start_simulator(loaded, arguments.tool),
     )

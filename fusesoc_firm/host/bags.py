@@ -108,7 +108,9 @@ def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
     """A bag to be read within the context. Raises `InputError`, with the `hint` where it is no bag at all."""
     with ExitStack() as stack:
         with _readable(path, hint):
-            readers: list[Reader] = [stack.enter_context(reader) for reader in _readers(path)]
+            readers = _readers(path)
+            for reader in readers:
+                stack.enter_context(reader)
             streams: dict[Stream, int] = {}
             for connection in (item for reader in readers for item in reader.connections):
                 stream = _stream(connection)

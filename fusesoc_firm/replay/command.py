@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import islice
@@ -32,18 +32,18 @@ _SHOWN = 100
 
 
 @dataclass(frozen=True)
-class Selection:
-    """Which messages of a bag: at most `limit`, from `start` seconds behind its beginning on, for `duration` seconds.
+class Source:
+    """What is replayed: messages of a bag, at most `limit`.
 
-    `names` are topics of blocks that the specification calls otherwise.
+    They begin `start` seconds behind its beginning, and are those of `duration` seconds.
     """
 
+    path: Path
     limit: int | None = None
     start: float = 0
     duration: float | None = None
-    names: Mapping[str, str] = field(default_factory=dict)
 
-    def messages(self, bag: Bag, topics: Sequence[str]) -> Iterator[Recorded]:
+    def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
         """The messages of some topics that are meant."""
         first = bag.start + round(self.start * 10**9)
         stop = None if self.duration is None else first + round(self.duration * 10**9)
@@ -51,63 +51,63 @@ class Selection:
 
 
 @dataclass(frozen=True)
-class Recording:
-    """Where the answers go: `form` is that of the file's name, else that of the bag that is replayed, unless given.
-
-    With latency, a stamp is that of the cause and the time that the hardware took.
-    """
+class Target:
+    """Where the answers go; the `form` is that which the name says, else that of the source, unless it is given."""
 
     path: Path
     form: Form | None = None
     force: bool = False
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How it is done: `names` are the topics of blocks that the specification calls otherwise.
+
+    The hardware is at rest after `quiet` cycles without a beat. With latency, a stamp is that of the cause and the time
+    that the hardware took.
+    """
+
+    names: Mapping[str, str]
+    quiet: int
     has_latency: bool = False
 
 
 def replay(
     loaded: LoadedSystem,
-    source: Path,
-    recording: Recording,
-    selection: Selection,
-    quiet: int,
+    source: Source,
+    target: Target,
+    settings: Settings,
     start_simulator: Callable[[], Simulator],
 ) -> None:
     """Replay a bag and print what came of it; `start_simulator` is called when all else is right.
 
-    Raises `InputError`, also if a message was refused; what the others led to is recorded then.
+    Raises `InputError`, also if a message did not go through; what the others led to is recorded then.
     """
-    if source.exists() and recording.path.exists() and source.samefile(recording.path):
-        fail(f"{recording.path} is what is to be replayed")
-    check_writable(recording.path, force=recording.force)
-    clock = _clock(loaded) if recording.has_latency else None
+    if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
+        fail(f"{target.path} is what is to be replayed")
+    check_writable(target.path, force=target.force)
+    clock = _clock(loaded) if settings.has_latency else None
     system = loaded.system
-    blocks = [item.block for item in (*stimulated(system), *published(system))]
-    for block in selection.names:
-        if block not in blocks:
-            fail(f"the system has no subscriber and no publisher '{block}'", hint=nearest(block, blocks))
-    subscribers = renamed(stimulated(system), selection.names)
-    topics = {
-        item.block: RecordedTopic.of(item.name, loaded.libraries[item.frame.ros].closure(item.frame.message))
-        for item in renamed(published(system), selection.names)
-    }
-    with open_bag(source) as bag:
-        form = _form(recording, bag.form)
-        _check_speaks(published(system), recording.path, form)
-        routes = routes_of(bag, subscribers, _signatures(loaded, subscribers))
-        _check_routes(bag, routes, subscribers, selection.names)
-        accelerators = [type_.accelerator for type_ in system.software.types]
+    _check_names(settings.names, [item.block for item in (*stimulated(system), *published(system))])
+    subscribers = renamed(stimulated(system), settings.names)
+    publishers = renamed(published(system), settings.names)
+    topics = {item.block: _recorded(item, loaded) for item in publishers}
+    with open_bag(source.path) as bag:
+        form = _form(target, bag.form)
+        _check_speaks(publishers, target.path, form)
+        routes = _routes(bag, loaded, subscribers, settings.names)
         with (
-            importable_sources(accelerators, loaded.folder),
+            importable_sources([type_.accelerator for type_ in system.software.types], loaded.folder),
             start_simulator() as simulator,
-            write_bag(recording.path, form, list(topics.values())) as target,
+            write_bag(target.path, form, list(topics.values())) as written,
         ):
-            run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), quiet)
-            going = _Replay(bag, routes, run, topics, target, clock)
-            going.play(selection)
-        going.print_summary(recording.path)
+            run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
+            going = _Replay(bag, routes, run, topics, written, clock)
+            going.play(source)
+        going.print_summary(target.path)
     if going.errors:
-        fail(
-            f"{going.errors} errors; {going.refused} of {going.played.total()} messages did not go through as they should"
-        )
+        errors = "1 error" if going.errors == 1 else f"{going.errors} errors"
+        fail(f"{errors}; {going.refused} of {going.played.total()} messages did not go through")
 
 
 @dataclass
@@ -118,7 +118,7 @@ class _Replay:
     routes: Mapping[Stream, Route]
     run: SystemRun
     topics: Mapping[str, RecordedTopic]
-    target: BagWriter
+    written: BagWriter
     clock: Fraction | None
     played: Counter[Stream] = field(default_factory=Counter)
     sent: Counter[str] = field(default_factory=Counter)
@@ -126,14 +126,14 @@ class _Replay:
     errors: int = 0
     is_over: bool = False
 
-    def play(self, selection: Selection) -> None:
+    def play(self, source: Source) -> None:
         """Replay all messages; what ends it early is told, too."""
         expected = sum(count for stream, count in self.bag.streams.items() if stream in self.routes)
-        total = expected if selection.limit is None else min(expected, selection.limit)
-        topics = [stream.topic for stream in self.routes]
+        total = expected if source.limit is None else min(expected, source.limit)
+        topics = {stream.topic for stream in self.routes}
         with tqdm(total=total, unit="msg", disable=None, file=sys.stderr) as bar:
             try:
-                for recorded in selection.messages(self.bag, topics):
+                for recorded in source.messages(self.bag, topics):
                     self._play(recorded)
                     bar.update()
                     if self.is_over:
@@ -153,7 +153,7 @@ class _Replay:
             for subscriber in () if route.misfit else route.subscribers:
                 self.run.take(subscriber, recorded.payload, recorded.stamp)
         except (StuckError, TransportError) as error:
-            faults.append(f"{error}; nothing behind it is replayed")
+            faults.append(f"nothing from here on is replayed: {error}")
             self.is_over = True
         for sent in self.run.sent:
             self._record(sent)
@@ -165,7 +165,7 @@ class _Replay:
 
     def _record(self, sent: Sent) -> None:
         latency = sent.latency(self.clock) if self.clock else 0
-        self.target.write(self.topics[sent.topic.block], sent.cause.stamp + latency, sent.payload)
+        self.written.write(self.topics[sent.topic.block], sent.cause.stamp + latency, sent.payload)
         self.sent[sent.topic.block] += 1
 
     def _report(self, fault: str) -> None:
@@ -177,15 +177,14 @@ class _Replay:
         """What went in and came out, topic by topic."""
         if self.errors > _SHOWN:
             print(f"and {self.errors - _SHOWN} errors more", file=sys.stderr)
-        rows = [("in", *self._way(stream), self.played[stream]) for stream in self.routes]
-        rows += [("out", block, topic.name, topic.type, self.sent[block]) for block, topic in self.topics.items()]
-        widths = [max(len(str(row[column])) for row in rows) for column in range(len(rows[0]))]
-        for row in rows:
-            *words, count = (str(cell).ljust(width) for cell, width in zip(row, widths, strict=True))
-            print("  ".join(words), count.strip().rjust(widths[-1]))
+        rows = [("in", *self._way(stream), str(self.played[stream])) for stream in self.routes]
+        rows += [("out", block, topic.name, topic.type, str(self.sent[block])) for block, topic in self.topics.items()]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for *words, count in rows:
+            print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
         dropped = {stream: count for stream, count in self.bag.streams.items() if stream not in self.routes}
-        for stream, count in dropped.items():
-            print(f"nobody takes {stream.topic} of {stream.type}: {count}")
+        for stream, number in dropped.items():
+            print(f"nobody takes {stream.topic} of {stream.type}: {number}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out, {sum(dropped.values())} dropped,"
             f" {self.errors} errors, {self.run.simulator.cycle} cycles"
@@ -201,6 +200,18 @@ def seconds(stamp: int) -> str:
     return f"{stamp // 10**9}.{stamp % 10**9:09d}"
 
 
+def _recorded(topic: Topic, loaded: LoadedSystem) -> RecordedTopic:
+    return RecordedTopic.of(topic.name, loaded.libraries[topic.frame.ros].closure(topic.frame.message))
+
+
+def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
+    faults = Diagnostics()
+    for block in names:
+        if block not in blocks:
+            faults.error(f"the system has no subscriber and no publisher '{block}'", hint=nearest(block, blocks))
+    faults.raise_if_any()
+
+
 def _clock(loaded: LoadedSystem) -> Fraction:
     """The frequency of clk in Hz. Raises `InputError`."""
     text = loaded.specification.project.clock
@@ -213,12 +224,12 @@ def _clock(loaded: LoadedSystem) -> Fraction:
     return found
 
 
-def _form(recording: Recording, like: Form) -> Form:
+def _form(target: Target, like: Form) -> Form:
     """The form of the bag to write."""
-    said = form_of(recording.path)
-    if recording.form and said and recording.form is not said:
-        fail(f"{recording.path} is to be a bag as {recording.form.value}, but ends like one as {said.value}")
-    return recording.form or said or like
+    said = form_of(target.path)
+    if target.form and said and target.form is not said:
+        fail(f"{target.path} is to be a bag as {target.form.value}, but ends like one as {said.value}")
+    return target.form or said or like
 
 
 def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
@@ -231,20 +242,22 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
     faults.raise_if_any()
 
 
-def _check_routes(
-    bag: Bag, routes: Mapping[Stream, Route], subscribers: Sequence[Topic], names: Mapping[str, str]
-) -> None:
-    """Raise `InputError` if nobody takes anything, or a topic that was asked for is not there."""
+def _routes(
+    bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
+) -> dict[Stream, Route]:
+    """Who takes what. Raises `InputError` if nobody takes anything, or a topic that was asked for is not there."""
     faults = Diagnostics()
     topics = {stream.topic for stream in bag.streams}
     for item in subscribers:
         if item.block in names and item.name not in topics:
             faults.error(f"{bag.path} has no topic {item.name} for '{item.block}'", hint=nearest(item.name, topics))
     faults.raise_if_any()
+    routes = routes_of(bag, subscribers, _signatures(loaded, subscribers))
     if not routes:
         wanted = ", ".join(f"{item.name} of {item.frame.message}" for item in subscribers)
         there = ", ".join(f"{stream.topic} of {stream.type}" for stream in bag.streams) or "nothing"
         fail(f"{bag.path} holds no topic that the system takes: {wanted}", hint=f"it holds {there}")
+    return routes
 
 
 def _signatures(loaded: LoadedSystem, topics: Sequence[Topic]) -> dict[tuple[RosVersion, MessageName], str]:

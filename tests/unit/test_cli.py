@@ -62,6 +62,7 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["scheduler"],
         ["scheduler", "bench"],
         ["scheduler", "choose"],
+        ["replay"],
         ["graph"],
         ["affected"],
         ["why"],
