@@ -72,14 +72,19 @@ def _seconds(text: str) -> float:
 
 def _replay(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.host.bags import Form
-    from fusesoc_firm.host.simulator import start_simulator
+    from fusesoc_firm.host.simulator import CoreSources, build_simulator
+    from fusesoc_firm.host.transport.simulator import Simulator
     from fusesoc_firm.replay.command import Settings, Source, Target, replay
 
-    loaded = load(arguments)
+    def start() -> Simulator:
+        sources = CoreSources(arguments.path, arguments.distro or "")
+        built = build_simulator(arguments.spec, arguments.tool, sources=sources)
+        return Simulator(built.command(), built.folder)
+
     replay(
-        loaded,
+        load(arguments),
         Source(arguments.source, arguments.limit, arguments.start, arguments.duration),
         Target(arguments.target, Form(arguments.format) if arguments.format else None, arguments.force),
         Settings(dict(arguments.map), arguments.quiet, arguments.latency),
-        lambda: start_simulator(loaded, arguments.tool),
+        start,
     )

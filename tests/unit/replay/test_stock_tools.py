@@ -25,12 +25,12 @@ HAS_ROSBAG = not subprocess.run([PYTHON, "-c", "import rosbag"], capture_output=
 # Messages that only the specification's paths have: constants, bounds, arrays, a message within, and that twice.
 OWN = {
     1: {
-        "Plan": "# A way.\nuint8 FAST = 2   # m/s\nstring NAME = to # there\nHeader header\nown_msgs/Step[] steps\n"
+        "Plan": "# A way.\nuint8 FAST = 2  # m/s\nstring NAME = to # there\nHeader header\nown_msgs/Step[] steps\n"
         "Step last\ntime[2] times\nuint8 mode\n",
         "Step": "float32 LENGTH=0.5\nfloat64 x\nstring label\nduration took\ngeometry_msgs/Point at\n",
     },
     2: {
-        "Plan": '# A way.\nuint8 FAST = 2   # m/s\nstring NAME = "to"\nstd_msgs/Header header\nown_msgs/Step[<=4] steps\n'
+        "Plan": 'uint8 FAST = 2   # m/s\nstring NAME = "to"\nstd_msgs/Header header\nown_msgs/Step[<=4] steps\n'
         "Step last\nuint8 mode 1\nint32[] numbers [1, 2]\n",
         "Step": 'float32 LENGTH=0.5\nfloat64 x 0.5\nstring<=8 label "none"\ngeometry_msgs/Point at\n',
     },
@@ -126,7 +126,8 @@ def test_rosbag_of_ros1(tmp_path: Path) -> None:
         "for topic, message, time in rosbag.Bag(sys.argv[1]).read_messages():\n"
         "    print(topic, time.to_nsec(), getattr(message, 'mode', message))\n"
         "    if topic == '/plan_out':\n"
-        "        print(message.FAST, message.NAME, message.header.frame_id, [s.label for s in message.steps], message.times[1])\n"
+        "        labels = [step.label for step in message.steps]\n"
+        "        print(message.FAST, message.NAME, message.header.frame_id, labels, message.times[1])\n"
     )
     done = subprocess.run([PYTHON, "-c", script, path], capture_output=True, text=True, check=True)
     assert done.stderr == ""
