@@ -14,6 +14,7 @@ from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
 from fusesoc_firm.cli.replay import add_replay
 from fusesoc_firm.cli.scheduler import add_scheduler
+from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
@@ -53,6 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_message(commands)
     add_system(commands)
+    add_simulator(commands)
     add_scheduler(commands)
     add_replay(commands)
     add_project(commands)

@@ -99,7 +99,7 @@ def recorded(folder: Path, ros: int, form: Form) -> tuple[Path, Typestore, list[
     blocks = passing("plan", "own_msgs/Plan", ros) + passing("p", "geometry_msgs/Point", ros)
     target = folder / {Form.ROS1: "out.bag", Form.MCAP: "out.mcap", Form.SQLITE3: "out"}[form]
     run(load(specification(folder, blocks), folder), source, Target(target, form), "echo", "echo")
-    expected = [(f"{topic}_out", *others) for topic, *others in items]
+    expected = [(f"{topic}_out", type_, stamp, payload) for topic, type_, stamp, payload in items]
     assert read(target) == expected
     return target, store, expected
 
