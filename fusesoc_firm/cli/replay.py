@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import add_sources, command, load, positive
+from fusesoc_firm.cli.common import command, load, positive
+from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
 
 _QUIET = 1000
 
@@ -31,7 +32,6 @@ def add_replay(commands: Any) -> None:
         "--format", choices=("ros1", "sqlite3", "mcap"), help="of --out (default: as it ends, or as that of --in)"
     )
     replay.add_argument("--force", action="store_true", help="replace the bag that is at --out")
-    replay.add_argument("--tool", choices=("ghdl", "verilator"), default="ghdl", help="the simulator (default: ghdl)")
     replay.add_argument(
         "--map",
         type=_mapping,
@@ -53,7 +53,7 @@ def add_replay(commands: Any) -> None:
         metavar="CYCLES",
         help="without a beat, after which the system is at rest (default: %(default)s)",
     )
-    add_sources(replay)
+    add_simulator_options(replay)
 
 
 def _mapping(text: str) -> tuple[str, str]:
@@ -72,14 +72,12 @@ def _seconds(text: str) -> float:
 
 def _replay(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.host.bags import Form
-    from fusesoc_firm.host.simulator import CoreSources, build_simulator
     from fusesoc_firm.host.transport.simulator import Simulator
     from fusesoc_firm.replay.command import Settings, Source, Target, replay
 
     def start() -> Simulator:
-        sources = CoreSources(arguments.path, arguments.distro or "")
-        built = build_simulator(arguments.spec, arguments.tool, sources=sources)
-        return Simulator(built.command(), built.folder)
+        built = built_simulator(arguments)
+        return Simulator(built.command(seed=arguments.seed, stall_percent=arguments.stall_percent), built.folder)
 
     replay(
         load(arguments),

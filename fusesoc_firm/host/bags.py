@@ -18,7 +18,7 @@ from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
 
-from rosbags.interfaces import Connection
+from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Rosbag1Reader
 from rosbags.rosbag2 import Reader as Rosbag2Reader
 from rosbags.rosbag2.reader import DirectoryReader
@@ -53,14 +53,15 @@ class Form(Enum):
 
 
 class Stream(NamedTuple):
-    """The messages of a topic that are of one type, with the signature of what their writer took for that type.
+    """The messages of a topic that are of one type, with what their writer took for that type.
 
-    The signature is empty where the bag does not say.
+    Both its signature and its definition, a text as `message/joint.py` has it, are empty where the bag does not say.
     """
 
     topic: str
     type: str
     signature: str
+    definition: str
 
 
 class Recorded(NamedTuple):
@@ -151,7 +152,9 @@ def _form(reader: Reader) -> Form:
 
 
 def _stream(connection: Connection) -> Stream:
-    return Stream(connection.topic, connection.msgtype, connection.digest)
+    is_text = connection.msgdef.format is MessageDefinitionFormat.MSG
+    definition = connection.msgdef.data if is_text else ""
+    return Stream(connection.topic, connection.msgtype, connection.digest, definition)
 
 
 @contextmanager

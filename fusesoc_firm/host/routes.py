@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.host.bags import BAGS, Bag, Stream, open_bag
+from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived import Topic
@@ -108,10 +109,17 @@ class _Routing:
                 return f"it is a {_spelled(stream)}, but '{item.block}' takes {wanted}"
             if item.frame.ros != self.bag.form.ros:
                 return f"it is of {self.bag.form.ros.title}, but '{item.block}' speaks {item.frame.ros.title}"
-            ours, theirs = self.signatures.get((item.frame.ros, wanted)), stream.signature
-            if ours and _is_signature(theirs) and ours != theirs:
-                return f"it is another {wanted} than that of '{item.block}': {theirs}, not {ours}"
+            ours, theirs = self.signatures.get((item.frame.ros, wanted)), self._signatures(stream, wanted)
+            if ours and theirs and ours not in theirs:
+                return f"it is another {wanted} than that of '{item.block}': {theirs[0]}, not {ours}"
         return ""
+
+    def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
+        """What the bag says of a message: that of its definition, too, as not every writer knows all rules."""
+        said = [stream.signature] if _is_signature(stream.signature) else []
+        if stream.definition and (defined := signature_of_text(message, stream.definition, self.bag.form.ros)):
+            said.append(defined)
+        return said
 
 
 def _message(stream: Stream) -> MessageName | None:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from fusesoc_firm.message.model import (
     Constant,
     DefaultValue,
     MessageDefinition,
-    MessageName,
     RosVersion,
     Scalar,
 )
-
-_SEPARATOR = f"{'=' * 80}\n"
 
 
 def to_text(definition: MessageDefinition, signature: str = "") -> str:
@@ -29,13 +26,6 @@ def to_text(definition: MessageDefinition, signature: str = "") -> str:
     header = [f"# {definition.name} ({ros.title})", *([f"# signature: {signature}"] if signature else [])]
     blocks = [header, _aligned(constants), _aligned(fields)]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
-
-
-def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> str:
-    """The definition and behind it all others of `definitions`, in the form in which bags hold what a topic means."""
-    others = [definition for other, definition in definitions.items() if other != name]
-    parts = [to_text(definitions[name]), *(f"MSG: {item.name}\n{to_text(item)}" for item in reversed(others))]
-    return _SEPARATOR.join(parts)
 
 
 def _aligned(rows: Sequence[tuple[str, str, str]]) -> list[str]:
