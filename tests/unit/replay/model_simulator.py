@@ -3,6 +3,7 @@
 What the system does with a frame for subscriber k is the k-th of these kinds:
 
     echo      publisher k sends the payload, 20 cycles behind the last beat in
+    across    publisher 1 - k does so
     twice     it does so again 300 cycles later
     late      it does so after 5000 cycles
     broken    it does so unless the payload begins with 0xee: that is a pulse of the converter's frame_error
@@ -79,6 +80,8 @@ class Model:
             end = self.send(subscriber, frames[0], last + 20)
             if kind == "twice":
                 self.send(subscriber, frames[0], end + 300)
+        elif kind == "across":
+            self.send(1 - subscriber, le(1 - subscriber, 1) + frames[0][1:], last + 20)
         elif kind == "late":
             self.send(subscriber, frames[0], last + 5000)
         elif kind in ("parts", "beginning"):

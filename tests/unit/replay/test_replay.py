@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rosbags.rosbag1 import Writer as Rosbag1Writer
 
 from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.host.bags import Form
 from fusesoc_firm.replay.command import Source, Target
+from fusesoc_firm.system.generator import LoadedSystem
 from tests.unit.replay.replays import (
     FORMS,
     POINT,
@@ -20,6 +23,7 @@ from tests.unit.replay.replays import (
     read,
     run,
     specification,
+    store_of,
     write,
 )
 
@@ -71,8 +75,6 @@ def test_the_same_twice_gives_the_same_bytes(tmp_path: Path, form: str) -> None:
     ],
 )
 def test_the_name_says_the_form(tmp_path: Path, name: str, form: str | None, files: list[str]) -> None:
-    from fusesoc_firm.host.bags import Form
-
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
     items = points("sqlite3", 3)
     source = bag(tmp_path, "sqlite3", items)
@@ -84,8 +86,6 @@ def test_the_name_says_the_form(tmp_path: Path, name: str, form: str | None, fil
 
 
 def test_a_form_against_the_name(tmp_path: Path) -> None:
-    from fusesoc_firm.host.bags import Form
-
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
     with pytest.raises(InputError, match="is to be a bag as sqlite3, but ends like one as mcap"):
         run(loaded, bag(tmp_path, "mcap", points("mcap", 1)), Target(tmp_path / "o.mcap", Form.SQLITE3), "echo")
@@ -325,6 +325,28 @@ def test_a_frame_that_is_not_over(tmp_path: Path, capsys: Captured) -> None:
     ]
 
 
+def test_a_bag_that_is_damaged_within(tmp_path: Path, capsys: Captured) -> None:
+    items = points("ros1", 100)
+    source = tmp_path / "in.bag"
+    writer = Rosbag1Writer(source)
+    writer.set_compression(Rosbag1Writer.CompressionFormat.LZ4)
+    writer.chunk_threshold = 1000
+    with writer:
+        connection = writer.add_connection("/p", POINT, typestore=store_of("ros1"))
+        for _, _, stamp, data in items:
+            writer.write(connection, stamp, data)
+    content = bytearray(source.read_bytes())
+    chunk = content.find(b"compression=lz4", len(content) // 2)
+    content[chunk + 60 : chunk + 100] = bytes(40)
+    source.write_bytes(content)
+    with pytest.raises(InputError, match="1 error; 0 of"):
+        run(load(specification(tmp_path, passing("p", "geometry_msgs/Point"))), source, tmp_path / "o.bag", "echo")
+    assert "is not a bag that can be read" in capsys.readouterr().err
+    found = read(tmp_path / "o.bag")
+    assert 0 < len(found) < len(items)
+    assert found == renamed(items[: len(found)], "/p_out")
+
+
 def test_many_faults_are_counted(tmp_path: Path, capsys: Captured) -> None:
     items = [(*item[:3], item[3][:5]) for item in points("ros1", 130)]
     with pytest.raises(InputError, match="130 errors; 130 of 130 messages"):
@@ -348,3 +370,71 @@ def test_bursts_are_joined(tmp_path: Path) -> None:
     assert read(tmp_path / "out") == [
         (topic, pose, stamp, data) for stamp in (10, 20) for topic in ("/a_out", "/b_out")
     ]
+
+
+# --- software --------------------------------------------------------------------------------------------------------
+
+# p -> hardware -> scale in software -> hardware -> far, and p -> count in software -> counted.
+TYPES = """\
+accelerators:
+  - {name: pass, type: VHDL, sources: pass.vhd, interface: {input: [INTERFACE], output: [INTERFACE]}}
+  - {name: scale, type: ROS-SW, sources: functions.py, interface: {input: [INTERFACE], output: [INTERFACE]}}
+  - {name: count, type: ROS-SW, sources: functions.py, interface: {input: [INTERFACE], output: [INTERFACE]}}
+""".replace("INTERFACE", "{middleware: ROS, message: geometry_msgs/Point}")
+BLOCKS = [
+    "name: p, mode: subscriber, middleware: ROS, message: geometry_msgs/Point, outgoing: [{name: a}, {name: counter}]",
+    "name: a, type: pass, outgoing: [{name: scaled}]",
+    "name: scaled, type: scale, outgoing: [{name: b}]",
+    "name: b, type: pass, outgoing: [{name: far}]",
+    "name: far, mode: publisher, middleware: ROS, message: geometry_msgs/Point",
+    "name: counter, type: count, outgoing: [{name: counted}]",
+    "name: counted, mode: publisher, middleware: ROS, message: geometry_msgs/Point",
+]
+FUNCTIONS = """\
+seen = 0
+
+def scale(m):
+    if m["x"] == 3:
+        raise ValueError("three is no number")
+    return {**m, "x": 2 * m["x"]}
+
+def count(m):
+    global seen
+    seen += 1
+    return None if seen % 2 else {**m, "y": float(seen)}
+"""
+
+
+def software(folder: Path, types: str = TYPES) -> LoadedSystem:
+    (folder / "pass.vhd").touch()
+    (folder / "functions.py").write_text(FUNCTIONS)
+    return load(specification(folder, BLOCKS, types))
+
+
+def test_software_runs_within(tmp_path: Path, capsys: Captured) -> None:
+    items = points("ros1", 6)
+    source = bag(tmp_path, "ros1", items)
+    with pytest.raises(InputError, match="1 error; 1 of 6 messages"):
+        run(software(tmp_path), source, tmp_path / "o.bag", "across", "across")
+    expected = []
+    for number, (_, type_, stamp, _) in enumerate(items):
+        if number % 2:
+            expected.append(("/counted", type_, stamp, payload("ros1", POINT, float(number), number + 1.0, 0.0)))
+        if number != 3:
+            expected.append(("/far", type_, stamp, payload("ros1", POINT, 2.0 * number, 0.0, 0.0)))
+    assert sorted(read(tmp_path / "o.bag")) == sorted(expected)
+    message = "message 3 to 'scaled': three is no number"
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith(
+        f"error: {source}: /p, message 3, at 1000000000.030000000: {tmp_path}/functions.py:5:9: "
+    )
+    assert lines[0].endswith(f"'scale' raised ValueError for {message}")
+
+
+def test_software_elsewhere_takes_and_gives_topics(tmp_path: Path) -> None:
+    types = TYPES.replace("name: scale, type: ROS-SW, sources: functions.py,", "name: scale, type: ROS-SW,")
+    items = [item for p, s in zip(points("ros1", 3), points("ros1", 3, "/scaled_out"), strict=True) for item in (p, s)]
+    run(software(tmp_path, types), bag(tmp_path, "ros1", items), tmp_path / "o.bag", "across", "across")
+    found = read(tmp_path / "o.bag")
+    assert [item for item in found if item[0] == "/scaled_in"] == renamed(points("ros1", 3), "/scaled_in")
+    assert [item for item in found if item[0] == "/far"] == renamed(points("ros1", 3), "/far")
