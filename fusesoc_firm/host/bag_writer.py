@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -88,20 +89,31 @@ def _is_of_bag(file: Path) -> bool:
 
 @contextmanager
 def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterator[BagWriter]:
-    """A bag at `path` with some topics; it takes the place of what is there at the context's end, unless that fails."""
-    with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
-        made = Path(folder, path.name)
-        with _writer(made, form) as writer:
-            bag = BagWriter(writer)
-            for topic in topics:
-                bag.add(topic)
-            yield bag
-        if path.suffix in _FILES and made.is_dir():
-            # A bag of ROS 2 as one file: the folder holds it beside its metadata, which it has inside, too.
-            made = made / f"{path.name}{path.suffix}"
-        if path.is_dir():
-            shutil.rmtree(path)
-        made.replace(path)
+    """A bag at `path` with some topics; it takes the place of what is there at the context's end, unless that fails.
+
+    Raises `InputError` if it cannot be written.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
+            made = Path(folder, path.name)
+            with _writer(made, form) as writer:
+                bag = BagWriter(writer)
+                for topic in topics:
+                    bag.add(topic)
+                yield bag
+            _put(made, path)
+    except (OSError, sqlite3.Error) as error:
+        fail(f"cannot write {path}: {error}")
+
+
+def _put(made: Path, path: Path) -> None:
+    """Let a bag take its place."""
+    if path.suffix in _FILES and made.is_dir():
+        # A bag of ROS 2 as one file: the folder has it beside its metadata, which it holds, too.
+        made = made / f"{path.name}{path.suffix}"
+    if path.is_dir():
+        shutil.rmtree(path)
+    made.replace(path)
 
 
 def _writer(path: Path, form: Form) -> Rosbag1Writer | Rosbag2Writer:

@@ -98,7 +98,7 @@ def replay(
         routes = _routes(bag, loaded, subscribers, settings.names)
         with (
             importable_sources([type_.accelerator for type_ in system.software.types], loaded.folder),
-            start_simulator() as simulator,
+            _started(start_simulator) as simulator,
             write_bag(target.path, form, list(topics.values())) as written,
         ):
             run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
@@ -142,6 +142,8 @@ class _Replay:
                 self._report(str(error).removeprefix("error: "))
             if left := self.run.unfinished:
                 self._report(left)
+            if not self.is_over:
+                self._end()
 
     def _play(self, recorded: Recorded) -> None:
         """Let a message in, record what comes of it, and report what is wrong with it."""
@@ -162,6 +164,13 @@ class _Replay:
         for fault in faults:
             self._report(f"{recorded.stream.topic}, message {recorded.number}, at {seconds(recorded.stamp)}: {fault}")
         faults.clear()
+
+    def _end(self) -> None:
+        """End the simulation, which may have something to say."""
+        try:
+            self.run.simulator.quit()
+        except TransportError as error:
+            self._report(str(error))
 
     def _record(self, sent: Sent) -> None:
         latency = sent.latency(self.clock) if self.clock else 0
@@ -198,6 +207,13 @@ class _Replay:
 def seconds(stamp: int) -> str:
     """A time in ns as people read it, to the last digit."""
     return f"{stamp // 10**9}.{stamp % 10**9:09d}"
+
+
+def _started(start_simulator: Callable[[], Simulator]) -> Simulator:
+    try:
+        return start_simulator()
+    except TransportError as error:
+        fail(str(error))
 
 
 def _recorded(topic: Topic, loaded: LoadedSystem) -> RecordedTopic:

@@ -13,14 +13,9 @@ from pathlib import Path
 
 from rosbags.typesys import Stores, get_typestore
 
-from fusesoc_firm.host.simulator import CoreSources, build_simulator
-from fusesoc_firm.host.transport.simulator import Simulator
-from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.stores import distributions
-from fusesoc_firm.replay.command import Settings, Source, Target, replay
-from fusesoc_firm.system.generator import load_system
 from fusesoc_firm.verify.stimuli import Stimuli, kinds
 from tests.unit.frame.oracle import Oracle
 from tests.unit.replay.replays import Item, read, write
@@ -77,28 +72,18 @@ class PassThrough:
             found[name] = [oracle.serialise(name, value) for value in values]
         return found
 
-    def replayed(self, folder: Path, tool: str) -> tuple[list[Item], list[Item]]:
-        """The messages that went in, and those that came out, under the topics that they had. Raises `InputError`."""
+    def bag(self, folder: Path) -> tuple[Path, list[Item]]:
+        """A bag, and what is in it."""
         items = self.items()
-        form = "ros1" if self.ros is RosVersion.ROS1 else "mcap"
-        source = write(
-            folder / "in.bag" if form == "ros1" else folder / "in",
-            form,
-            items,
-            get_typestore(_STORES[self.distribution]),
-        )
-        target = folder / ("out.bag" if form == "ros1" else "out.mcap")
-        spec = self.specification(folder)
-        loaded = load_system(spec, libraries((), None, self.distribution))
-        built = build_simulator(spec, tool, build_root=folder / "build", sources=CoreSources(distro=self.distribution))
-        replay(
-            loaded,
-            Source(source),
-            Target(target),
-            Settings({}, QUIET),
-            lambda: Simulator(built.command(), built.folder),
-        )
-        return items, [(topic.removesuffix("_out"), *rest) for topic, *rest in read(target)]  # type: ignore[misc]
+        store = get_typestore(_STORES[self.distribution])
+        if self.ros is RosVersion.ROS1:
+            return write(folder / "in.bag", "ros1", items, store), items
+        return write(folder / "in", "mcap", items, store), items
+
+
+def received(path: Path) -> list[Item]:
+    """The messages that came out, under the topics that they had."""
+    return [(topic.removesuffix("_out"), type_, stamp, data) for topic, type_, stamp, data in read(path)]
 
 
 def _block(name: str) -> str:

@@ -13,7 +13,7 @@ from fusesoc_firm.host.bursts import BurstJoiner, JoinedFrame
 from fusesoc_firm.message.model import RosVersion
 from tests.sim.applications import SPECS
 from tests.sim.images import image
-from tests.sim.pass_through import PassThrough, all_names
+from tests.sim.pass_through import QUIET, PassThrough, all_names, received
 from tests.sim.quaternions import quaternion_bag, worst_error
 from tests.sim.systems import DATA
 from tests.unit.frame.oracle import Oracle
@@ -66,17 +66,20 @@ FEW = {
 }
 
 
-@pytest.mark.parametrize("distribution", FEW)
-def test_what_passes_through_is_the_same(tmp_path: Path, distribution: str) -> None:
-    sent, received = PassThrough(distribution, FEW[distribution], 6, SEED).replayed(tmp_path, "ghdl")
-    assert received == sent
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("distribution", ["noetic", "humble"])
-def test_every_message_passes_through_as_it_is(tmp_path: Path, distribution: str) -> None:
-    sent, received = PassThrough(distribution, all_names(distribution), 4, SEED).replayed(tmp_path, "ghdl")
-    assert received == sent
+@pytest.mark.parametrize(
+    ("distribution", "names"),
+    [
+        *FEW.items(),
+        *(pytest.param(name, all_names(name), marks=pytest.mark.thorough, id=f"all-{name}") for name in FEW),
+    ],
+)
+def test_what_passes_through_is_the_same(tmp_path: Path, distribution: str, names: list[str]) -> None:
+    system = PassThrough(distribution, names, 6, SEED)
+    source, sent = system.bag(tmp_path)
+    target = tmp_path / ("out.bag" if source.suffix == ".bag" else "out")
+    options = ("--distro", distribution, "--quiet", str(QUIET))
+    replay(system.specification(tmp_path), source, target, tmp_path / "build", *options)
+    assert received(target) == sent
 
 
 # --- bursts and software ---------------------------------------------------------------------------------------------

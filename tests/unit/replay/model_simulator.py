@@ -11,6 +11,7 @@ What the system does with a frame for subscriber k is the k-th of these kinds:
     beginning only the first of these bursts is sent
     stuck     only the first frame is ever taken
     unknown   the pulse of an id_error
+    grumpy    as echo, but the end of the simulation has status 4
     dies      it ends with status 3
     silent    nothing
 """
@@ -76,7 +77,7 @@ class Model:
         frames = [le(subscriber + number, 1) + le(len(payload), 4) + payload for number in range(2)]
         if kind == "broken" and payload[:1] == b"\xee":
             self.report(last, b"E" + le(subscriber, 2) + le(last, 8))
-        elif kind in ("echo", "twice", "broken"):
+        elif kind in ("echo", "twice", "broken", "grumpy"):
             end = self.send(subscriber, frames[0], last + 20)
             if kind == "twice":
                 self.send(subscriber, frames[0], end + 300)
@@ -122,7 +123,7 @@ def main(requests: BinaryIO, reports: BinaryIO) -> None:
         reports.write(model.run(cycles))
         reports.flush()
         if letter == b"Q":
-            return
+            sys.exit(4 if "grumpy" in model.kinds else 0)
 
 
 if __name__ == "__main__":

@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag1 import Writer as Rosbag1Writer
 
+from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.bags import Form
-from fusesoc_firm.replay.command import Source, Target
+from fusesoc_firm.host.transport.simulator import Simulator
+from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.system.generator import LoadedSystem
 from tests.unit.replay.replays import (
     FORMS,
@@ -125,6 +127,46 @@ def test_nothing_is_left_of_a_replay_that_cannot_begin(tmp_path: Path) -> None:
         f"      = it holds /s of {STRING}"
     )
     assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--map", "/a"], "'/a' is not TOPIC=BLOCK"),
+        (["--map", "=a"], "'=a' is not TOPIC=BLOCK"),
+        (["--limit", "0"], "0 is less than 1"),
+        (["--start", "-1"], "'-1' is no number of seconds"),
+        (["--duration", "inf"], "'inf' is no number of seconds"),
+        (["--duration", "ten"], "'ten' is no number of seconds"),
+        (["--format", "csv"], "invalid choice: 'csv'"),
+    ],
+)
+def test_a_wrong_command_line(options: list[str], words: str, capsys: Captured) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["replay", "spec.yaml", "--in", "a.bag", "--out", "b.bag", *options])
+    assert words in capsys.readouterr().err
+
+
+def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 1)))
+    source = bag(tmp_path, "ros1", points("ros1", 1))
+    with pytest.raises(InputError, match=r"there is no folder .*/none for o\.bag"):
+        run(loaded, source, tmp_path / "none" / "o.bag", "echo")
+
+
+def test_a_simulator_that_cannot_be_started(tmp_path: Path) -> None:
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 1)))
+    source = Source(bag(tmp_path, "ros1", points("ros1", 1)))
+    with pytest.raises(InputError, match="the simulator cannot be started"):
+        replay(
+            loaded, source, Target(tmp_path / "o.bag"), Settings({}, 9), lambda: Simulator(["true"], tmp_path / "none")
+        )
+    assert not (tmp_path / "o.bag").exists()
+
+
+def test_a_simulator_that_does_not_end_well(tmp_path: Path, capsys: Captured) -> None:
+    assert replayed(tmp_path, "ros1", points("ros1", 1), capsys, "grumpy") == ["the simulator ended with status 4"]
+    assert len(read(tmp_path / "o.bag")) == 1
 
 
 # --- stamps ----------------------------------------------------------------------------------------------------------
