@@ -94,6 +94,11 @@ class Simulator:
             os.close(from_us)
             os.close(to_us)
 
+    @property
+    def pid(self) -> int:
+        """The simulator's process."""
+        return self._process.pid
+
     def request(self, frame: bytes) -> None:
         """Put a frame behind those that are to be sent to the system. Raises `TransportError`."""
         if not 1 <= len(frame) <= MOST_CYCLES:
