@@ -18,7 +18,7 @@ from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.host.bursts import BurstError, BurstJoiner
 from fusesoc_firm.host.functions import Functions, Message
 from fusesoc_firm.host.software import sent_elsewhere
-from fusesoc_firm.host.transport.simulator import ErrorPulse, Simulator, Taken
+from fusesoc_firm.host.transport.simulator import MOST_CYCLES, ErrorPulse, Simulator, Taken
 from fusesoc_firm.host.transport.transport import Burst
 from fusesoc_firm.system.derived import Converter, DerivedSystem, End, Topic
 
@@ -93,6 +93,10 @@ class SystemRun:
     def _entries(self) -> Mapping[str, End]:
         """What software that is not here sends, by name."""
         return {topic.block: end for topic, end in sent_elsewhere(self.system).items()}
+
+    @cached_property
+    def _here(self) -> set[str]:
+        return _software_here(self.system)
 
     @cached_property
     def _successors(self) -> Mapping[str, set[str]]:
@@ -179,21 +183,21 @@ class SystemRun:
 
     def _patience(self) -> int:
         left = self._deadline - self.simulator.cycle
-        return max(1, left if self._waiting else min(left, self.quiet - self.simulator.quiet))
+        wanted = left if self._waiting else min(left, self.quiet - self.simulator.quiet)
+        return min(max(1, wanted), MOST_CYCLES)
 
     def _receive(self, burst: Burst, cause: Cause) -> None:
         try:
             frame = self._joiner.push(burst.data, burst.tid)
-        except BurstError as error:
-            self.faults.append(str(error))
-            return
-        if frame is None:
-            return
-        publisher = self.system.publishers[frame.id]
-        if publisher.software and publisher.software.block in _software_here(self.system):
-            self._give(End(publisher.block), decode(publisher.frame, frame.payload), cause)
-        else:
-            self._send(publisher, frame.payload, cause, burst.last_cycle)
+            if frame is None:
+                return
+            publisher = self.system.publishers[frame.id]
+            if publisher.software and publisher.software.block in self._here:
+                self._give(End(publisher.block), decode(publisher.frame, frame.payload), cause)
+            else:
+                self._send(publisher, frame.payload, cause, burst.last_cycle)
+        except (BurstError, CodecError) as error:
+            self.faults.append(f"what the hardware sends is wrong: {error}")
 
     def _send(self, topic: Topic, payload: bytes, cause: Cause, last_cycle: int | None) -> None:
         self.sent.append(Sent(topic, payload, self._causes.get(topic.block, cause), last_cycle))

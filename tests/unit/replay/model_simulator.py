@@ -8,6 +8,7 @@ What the system does with a frame for subscriber k is the k-th of these kinds:
     late      it does so after 5000 cycles
     broken    it does so unless the payload begins with 0xee: that is a pulse of the converter's frame_error
     parts     publishers k and k + 1 send the payload as two bursts each, one between the other's
+    garbled   publisher k sends more than it announces, and then a frame of an id that there is not
     beginning only the first of these bursts is sent
     stuck     only the first frame is ever taken
     unknown   the pulse of an id_error
@@ -91,6 +92,9 @@ class Model:
             end = last + 20
             for number, burst in enumerate(begun + rest if kind == "parts" else begun[:1]):
                 end = self.send(subscriber + number % 2, burst, end + 1)
+        elif kind == "garbled":
+            self.send(subscriber, frames[0] + bytes(9), last + 20)
+            self.send(200, le(200, 1) + frames[0][1:], last + 60)
         elif kind == "unknown":
             self.report(last, b"E" + le(65535, 2) + le(last, 8))
 

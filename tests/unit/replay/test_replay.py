@@ -389,6 +389,14 @@ def test_a_bag_that_is_damaged_within(tmp_path: Path, capsys: Captured) -> None:
     assert found == renamed(items[: len(found)], "/p_out")
 
 
+def test_a_hardware_that_sends_what_it_must_not(tmp_path: Path, capsys: Captured) -> None:
+    place = "/p, message 0, at 1000000000.000000000: what the hardware sends is wrong: "
+    assert replayed(tmp_path, "ros1", points("ros1", 1), capsys, "garbled") == [
+        f"{place}the frame of id 0 is 9 bytes longer than it announces",
+        f"{place}the id is 200, but the publishers are 0 to 0",
+    ]
+
+
 def test_many_faults_are_counted(tmp_path: Path, capsys: Captured) -> None:
     items = [(*item[:3], item[3][:5]) for item in points("ros1", 130)]
     with pytest.raises(InputError, match="130 errors; 130 of 130 messages"):
