@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -271,6 +272,7 @@ def test_one_subscriber_and_two_topics_of_its_type(tmp_path: Path) -> None:
         ({"limit": 3}, range(3)),
         ({"start": 0.05}, range(5, 20)),
         ({"duration": 0.05}, range(5)),
+        ({"start": 0.05, "duration": 0.1}, range(5, 15)),
         ({"start": 0.05, "duration": 0.1, "limit": 4}, range(5, 9)),
         ({"start": 0.15, "duration": 9}, range(15, 20)),
     ],
@@ -455,10 +457,12 @@ def count(m):
 """
 
 
-def software(folder: Path, types: str = TYPES) -> LoadedSystem:
+def software(
+    folder: Path, types: str = TYPES, blocks: Sequence[str] = BLOCKS, project: str = "width: 64"
+) -> LoadedSystem:
     (folder / "pass.vhd").touch()
     (folder / "functions.py").write_text(FUNCTIONS)
-    return load(specification(folder, BLOCKS, types))
+    return load(specification(folder, blocks, types, project))
 
 
 def test_software_runs_within(tmp_path: Path, capsys: Captured) -> None:
@@ -481,10 +485,20 @@ def test_software_runs_within(tmp_path: Path, capsys: Captured) -> None:
     assert lines[0].endswith(f"'scale' raised ValueError for {message}")
 
 
+def test_the_latency_through_software_begins_with_the_message(tmp_path: Path) -> None:
+    items = points("ros1", 1)
+    loaded = software(tmp_path, project="width: 64, clock: 1 GHz")
+    run(loaded, bag(tmp_path, "ros1", items), tmp_path / "o.bag", "across", "across", has_latency=True)
+    # Twice as long as without software, and a cycle between.
+    assert [stamp for topic, _, stamp, _ in read(tmp_path / "o.bag") if topic == "/far"] == [items[0][2] + 26 + 27]
+
+
 def test_software_elsewhere_takes_and_gives_topics(tmp_path: Path) -> None:
     types = TYPES.replace("name: scale, type: ROS-SW, sources: functions.py,", "name: scale, type: ROS-SW,")
+    blocks = [block.replace("outgoing: [{name: b}]", "outgoing: [{name: b}, {name: near}]") for block in BLOCKS]
+    blocks.append("name: near, mode: publisher, middleware: ROS, message: geometry_msgs/Point")
     items = [item for p, s in zip(points("ros1", 3), points("ros1", 3, "/scaled_out"), strict=True) for item in (p, s)]
-    run(software(tmp_path, types), bag(tmp_path, "ros1", items), tmp_path / "o.bag", "across", "across")
+    run(software(tmp_path, types, blocks), bag(tmp_path, "ros1", items), tmp_path / "o.bag", "across", "across")
     found = read(tmp_path / "o.bag")
-    assert [item for item in found if item[0] == "/scaled_in"] == renamed(points("ros1", 3), "/scaled_in")
-    assert [item for item in found if item[0] == "/far"] == renamed(points("ros1", 3), "/far")
+    for topic in ("/scaled_in", "/far", "/near"):
+        assert [item for item in found if item[0] == topic] == renamed(points("ros1", 3), topic)
