@@ -10,14 +10,16 @@ from typing import Any
 import pytest
 import yaml
 from mcap.reader import make_reader
+from mcap.writer import CompressionType
 from mcap_ros2.decoder import DecoderFactory
+from mcap_ros2.writer import Writer as McapWriter
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from fusesoc_firm.host.bags import Form
 from fusesoc_firm.replay.command import Target
-from tests.unit.replay.replays import Item, load, passing, read, run, specification, write
+from tests.unit.replay.replays import Item, load, passing, payload, read, run, specification, write
 
 PYTHON = "/usr/bin/python3"
 HAS_ROSBAG = not subprocess.run([PYTHON, "-c", "import rosbag"], capture_output=True, check=False).returncode
@@ -180,3 +182,45 @@ def test_the_tables_of_sqlite3(tmp_path: Path) -> None:
     assert {item["topic_metadata"]["type_description_hash"] for item in metadata["topics_with_message_count"]} == set(
         hashes.values()
     )
+
+
+# --- what others record ----------------------------------------------------------------------------------------------
+
+WRITE = """
+import sys, genpy, rosbag
+from genpy.dynamic import generate_dynamic
+point = generate_dynamic("geometry_msgs/Point", "float64 x\\nfloat64 y\\nfloat64 z\\n")["geometry_msgs/Point"]
+with rosbag.Bag(sys.argv[1], "w", compression=sys.argv[2], chunk_threshold=1000) as bag:
+    for number in range(100):
+        bag.write("/p", point(float(number), 0.0, 0.0), genpy.Time(1000, number))
+"""
+
+
+@pytest.mark.skipif(not HAS_ROSBAG, reason="python3-rosbag is not installed")
+@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
+def test_a_bag_of_rosbag(tmp_path: Path, compression: str) -> None:
+    source = tmp_path / "in.bag"
+    subprocess.run([PYTHON, "-c", WRITE, source, compression], capture_output=True, check=True)
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 1)))
+    run(loaded, source, tmp_path / "out.bag", "echo")
+    stamps = [10**12 + number for number in range(100)]
+    values = [payload("ros1", POINT, float(number), 0.0, 0.0) for number in range(100)]
+    expected = [("/p_out", POINT, *each) for each in zip(stamps, values, strict=True)]
+    assert read(tmp_path / "out.bag") == expected
+
+
+@pytest.mark.parametrize("compression", CompressionType)
+def test_a_bag_of_mcap(tmp_path: Path, compression: CompressionType) -> None:
+    source = tmp_path / "in.mcap"
+    with source.open("wb") as file:
+        writer = McapWriter(file, chunk_size=1000, compression=compression)
+        schema = writer.register_msgdef(POINT, "float64 x\nfloat64 y\nfloat64 z")
+        for number in range(100):
+            value = {"x": float(number), "y": 0.0, "z": 0.0}
+            writer.write_message("/p", schema, value, log_time=number, publish_time=number)
+        writer.finish()  # type: ignore[no-untyped-call]
+    loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
+    run(loaded, source, tmp_path / "out.mcap", "echo")
+    assert [(stamp, data) for _, _, stamp, data in read(tmp_path / "out.mcap")] == [
+        (number, payload("mcap", POINT, float(number), 0.0, 0.0)) for number in range(100)
+    ]
