@@ -259,8 +259,10 @@ class SimulatorTransport:
         """Send a whole frame; waits while the system takes none. Raises `TransportError`."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_over or self._frames < self._pace.most_frames)
-            if self._is_over:
-                raise self._error or TransportError("the transport is closed")
+            if self._is_closed:
+                raise TransportError("the transport is closed")
+            if self._error:
+                raise self._error
             self._frames += 1
             self._sent.append(frame)
             self._changed.notify_all()
@@ -295,6 +297,11 @@ class SimulatorTransport:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    @property
+    def waiting_bytes(self) -> int:
+        """The bytes of the bursts that have come and that nobody has received."""
+        return self._bytes
 
     @property
     def _is_over(self) -> bool:
