@@ -35,6 +35,7 @@ _ROS1_MAGIC = b"#ROSBAG"
 _REMEDIES = {
     "not indexed": "it was not closed: rosbag reindex {path}",
     "index looks damaged": "it is cut off: rosbag reindex {path}",
+    "are in its journal": "it was not closed: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
     "end magic is invalid": "it was not closed, or is cut off: mcap recover {path}",
 }
 
@@ -109,6 +110,7 @@ def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
     """A bag to be read within the context. Raises `InputError`, with the `hint` where it is no bag at all."""
     with ExitStack() as stack:
         with _readable(path, hint):
+            _check_journals(path)
             readers = _readers(path)
             for reader in readers:
                 stack.enter_context(reader)
@@ -128,6 +130,14 @@ def _readers(path: Path) -> list[Reader]:
             raise FileNotFoundError("there is no metadata.yaml in it, no .db3 and no .mcap")
         return [Rosbag2Reader(file) for file in files]
     return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
+
+
+def _check_journals(path: Path) -> None:
+    """Raise `ValueError` where SQLite has not put all messages into the file yet, as rosbags would miss them."""
+    for file in path.glob("*.db3") if path.is_dir() else [path]:
+        journal = file.with_name(f"{file.name}-wal")
+        if journal.exists() and journal.stat().st_size:
+            raise ValueError(f"messages of {file.name} are in its journal {journal.name}")
 
 
 def _is_ros1(path: Path) -> bool:

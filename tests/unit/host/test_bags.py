@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import sqlite3
 import tracemalloc
 from collections.abc import Iterable
 from pathlib import Path
@@ -225,6 +227,19 @@ def test_a_bag_that_was_not_closed(tmp_path: Path, kind: str, hint: str) -> None
     with pytest.raises(InputError) as raised:
         read_x(path, kind)
     assert hint.format(path=path) in str(raised.value)
+
+
+def test_messages_in_a_journal_are_not_missed(tmp_path: Path) -> None:
+    path = write(tmp_path, "sqlite3", many("sqlite3", 10))
+    with contextlib.closing(sqlite3.connect(path / "recorded.db3")) as database:
+        database.execute("pragma journal_mode=wal")
+        database.execute("update messages set timestamp = timestamp + 1")
+        database.commit()
+        for bag in (path, path / "recorded.db3"):
+            with pytest.raises(InputError, match=r"in its journal recorded\.db3-wal\n.*sqlite3 FILE 'pragma"):
+                read_x(bag, "sqlite3")
+        database.execute("pragma wal_checkpoint(truncate)")
+        assert read_x(path, "sqlite3") == list(range(10))
 
 
 @pytest.mark.parametrize("kind", KINDS)
