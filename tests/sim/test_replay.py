@@ -13,7 +13,7 @@ from fusesoc_firm.host.bursts import BurstJoiner, JoinedFrame
 from fusesoc_firm.message.model import RosVersion
 from tests.sim.applications import SPECS
 from tests.sim.images import image
-from tests.sim.pass_through import QUIET, PassThrough, all_names, received
+from tests.sim.pass_through import QUIET, PassThrough, received, systems_of_all
 from tests.sim.quaternions import quaternion_bag, worst_error
 from tests.sim.systems import DATA
 from tests.unit.frame.oracle import Oracle
@@ -66,20 +66,26 @@ FEW = {
 }
 
 
-@pytest.mark.parametrize(
-    ("distribution", "names"),
-    [
-        *FEW.items(),
-        *(pytest.param(name, all_names(name), marks=pytest.mark.thorough, id=f"all-{name}") for name in FEW),
-    ],
-)
-def test_what_passes_through_is_the_same(tmp_path: Path, distribution: str, names: list[str]) -> None:
-    system = PassThrough(distribution, names, 6, SEED)
-    source, sent = system.bag(tmp_path)
-    target = tmp_path / ("out.bag" if source.suffix == ".bag" else "out")
-    options = ("--distro", distribution, "--quiet", str(QUIET))
-    replay(system.specification(tmp_path), source, target, tmp_path / "build", *options)
+def pass_through(system: PassThrough, folder: Path) -> None:
+    source, sent = system.bag(folder)
+    target = folder / ("out.bag" if source.suffix == ".bag" else "out")
+    options = ("--distro", system.distribution, "--quiet", str(QUIET))
+    replay(system.specification(folder), source, target, folder / "build", *options)
     assert received(target) == sent
+
+
+@pytest.mark.parametrize("distribution", FEW)
+def test_what_passes_through_is_the_same(tmp_path: Path, distribution: str) -> None:
+    pass_through(PassThrough(distribution, FEW[distribution], 6, SEED), tmp_path)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("distribution", FEW)
+def test_every_message_passes_through_as_it_is(tmp_path: Path, distribution: str) -> None:
+    for number, system in enumerate(systems_of_all(distribution, 4, SEED)):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        pass_through(system, folder)
 
 
 # --- bursts and software ---------------------------------------------------------------------------------------------
