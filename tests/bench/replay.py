@@ -33,8 +33,8 @@ _COLUMNS = ("bag", "simulator", "messages", "build, s", "replay, s", "found", "b
 _NOTE = """
     Angles are compared with those of Python's math, modulo a turn. Messages that pass through are those of rosbags'
     type store of the distribution, serialised by rosbags; what is recorded must have the same bytes, padding included,
-    the same stamps and the same order; each system has 18 types. Seconds are those of the clock on the wall, with three
-    rows at once on a machine that had much else to do.
+    the same stamps and the same order; each system has 18 types. Seconds are those of the clock on the wall,
+    whatever else the machine does meanwhile.
     """
 
 
