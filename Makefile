@@ -24,7 +24,7 @@ TOOLS :=
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
-# Parts of the bench, all if empty: BENCH='area manager timing use cycles fuzz images links applications systems builds simulators store'.
+# Parts of the bench, all if empty, such as BENCH='area cycles'; BENCH=--help lists them.
 BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
@@ -47,7 +47,7 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED
 	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator yosys dot:graphviz tclsh:tcl
+test: TOOLS = iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 test: setup ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -65,7 +65,7 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing use cycles fuzz images links applications systems builds simulators store'
+bench: setup $(VENV)/.bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean

@@ -35,6 +35,7 @@ ALLOWED: dict[str, set[str]] = {
     "system": _CONVERTER | {"prompts", "scheduling"},
     # It builds simulators of systems, by FuseSoC and with the library.
     "host": _SYSTEM | {"launcher", "library_path", "store"},
+    "replay": _SYSTEM | {"host"},
     # The cores of its bench lie in the library.
     "verify": _SYSTEM | {"files", "library_path", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.

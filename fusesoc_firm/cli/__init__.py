@@ -13,6 +13,7 @@ from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
+from fusesoc_firm.cli.replay import add_replay
 from fusesoc_firm.cli.scheduler import add_scheduler
 from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.system import add_system
@@ -57,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     add_simulator(commands)
     add_scheduler(commands)
     add_build(commands)
+    add_replay(commands)
     add_project(commands)
     add_why(commands)
     add_cache(commands)

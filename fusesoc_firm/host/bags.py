@@ -1,85 +1,178 @@
-"""Messages out of a recorded bag: ROS 1, and ROS 2 as sqlite3 or MCAP.
+"""Recorded bags, read message by message.
 
-A message goes to the subscriber whose name is that of its topic (`/` as `_`), else to the only one of its type. Topics
-that fit no subscriber are left out. The payload is what was recorded: nothing is decoded and encoded again.
+    with open_bag(path) as bag:
+        for recorded in bag.messages(topics):
+            ...
+
+ROS 1, and ROS 2 as sqlite3 or MCAP, compressed or not. Nothing is held in memory but the index, and payloads are what
+was recorded: nothing is decoded and encoded again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
-from rosbags.highlevel import AnyReader
-from rosbags.interfaces import Connection
-from rosbags.typesys import Stores, get_typestore
+from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.rosbag1 import Reader as Rosbag1Reader
+from rosbags.rosbag2 import Reader as Rosbag2Reader
+from rosbags.rosbag2.reader import DirectoryReader
+from rosbags.rosbag2.storage_mcap import McapReader
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
-from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived import Topic
 
-Recorded = tuple[Topic, bytes, dict[str, Any]]
-Stream = tuple[str, str]
-"""Topic and type."""
+Reader = Rosbag1Reader | Rosbag2Reader
 
-
-def read_bag(path: Path, subscribers: Sequence[Topic]) -> Iterator[Recorded]:
-    """Subscriber, payload and decoded message of all messages, by time. Raises `InputError`."""
-    ros, connections, messages = _read(path)
-    routes = _routes(connections, ros, subscribers, path)
-    for connection, payload in messages:
-        if subscriber := routes.get(_stream(connection)):
-            try:
-                message = decode(subscriber.frame, payload)
-            except CodecError as error:
-                fail(f"{path}, topic {connection.topic}: {error}")
-            yield subscriber, payload, message
+BAGS = "a bag is a .bag of ROS 1, or a folder, .mcap or .db3 of ROS 2"
+_ROS1_MAGIC = b"#ROSBAG"
+# What is wrong with a bag in rosbags' words, and what mends it.
+_REMEDIES = {
+    "not indexed": "it was not closed: rosbag reindex {path}",
+    "index looks damaged": "it is cut off: rosbag reindex {path}",
+    "are in its journal": "it was not closed: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
+    "end magic is invalid": "it was not closed, or is cut off: mcap recover {path}",
+}
 
 
-def _read(path: Path) -> tuple[RosVersion, list[Connection], list[tuple[Connection, bytes]]]:
-    """All that a bag holds, messages by time."""
-    store = get_typestore(Stores.LATEST)
-    try:
-        with AnyReader([path], default_typestore=store) as reader:
-            messages = [(connection, bytes(payload)) for connection, _, payload in reader.messages()]
-            # A closed reader forgets its connections.
-            return RosVersion.ROS2 if reader.is2 else RosVersion.ROS1, list(reader.connections), messages
-    except Exception as error:  # noqa: BLE001 - a damaged file makes rosbags and what it uses raise anything
-        hint = "stimuli are YAML (.yaml, .yml), a bag of ROS 1 (.bag) or the folder of a bag of ROS 2"
-        fail(f"{path} is not a bag that can be read: {error}", hint=hint)
+class Form(Enum):
+    """How a bag lies on a disk, by the word that commands call it."""
+
+    ROS1 = "ros1"
+    SQLITE3 = "sqlite3"
+    MCAP = "mcap"
+
+    @property
+    def ros(self) -> RosVersion:
+        """Whose messages it holds."""
+        return RosVersion.ROS1 if self is Form.ROS1 else RosVersion.ROS2
+
+
+class Stream(NamedTuple):
+    """The messages of a topic that are of one type, with what their writer took for that type.
+
+    Both its signature and its definition, a text as `message/joint.py` has it, are empty where the bag does not say.
+    """
+
+    topic: str
+    type: str
+    signature: str
+    definition: str
+
+
+class Recorded(NamedTuple):
+    """A message as it was recorded: `number` counts those of its topic from 0, `stamp` is in ns."""
+
+    stream: Stream
+    number: int
+    stamp: int
+    payload: bytes
+
+
+@dataclass(frozen=True)
+class Bag:
+    """An open bag: its form, each stream with the number of its messages, and when it begins (ns)."""
+
+    path: Path
+    form: Form
+    streams: Mapping[Stream, int]
+    start: int
+    _readers: Sequence[Reader] = field(repr=False)
+
+    def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
+        """The messages of some topics by time, up to those before `stop` (ns).
+
+        Raises `InputError` where the bag is damaged.
+        """
+        numbers: dict[str, int] = {}
+        for reader in self._readers:
+            connections = [item for item in reader.connections if item.topic in topics]
+            if not connections:
+                continue  # to a reader none are all
+            found = reader.messages(connections, stop=stop)
+            while True:
+                with _readable(self.path):
+                    item = next(found, None)
+                if item is None:
+                    break
+                connection, stamp, payload = item
+                number = numbers[connection.topic] = numbers.get(connection.topic, -1) + 1
+                yield Recorded(_stream(connection), number, stamp, bytes(payload))
+
+
+@contextmanager
+def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
+    """A bag to be read within the context. Raises `InputError`, with the `hint` where it is no bag at all."""
+    with ExitStack() as stack:
+        with _readable(path, hint):
+            _check_journals(path)
+            readers = _readers(path)
+            for reader in readers:
+                stack.enter_context(reader)
+            streams: dict[Stream, int] = {}
+            for connection in (item for reader in readers for item in reader.connections):
+                stream = _stream(connection)
+                streams[stream] = streams.get(stream, 0) + connection.msgcount
+            bag = Bag(path, _form(readers[0]), streams, min(reader.start_time for reader in readers), readers)
+        yield bag
+
+
+def _readers(path: Path) -> list[Reader]:
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        # Who records ends the folder with this file; what is there can be read without it.
+        files = sorted((file for file in path.iterdir() if file.suffix in (".db3", ".mcap")), key=_natural)
+        if not files:
+            raise FileNotFoundError("there is no metadata.yaml in it, no .db3 and no .mcap")
+        return [Rosbag2Reader(file) for file in files]
+    return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
+
+
+def _check_journals(path: Path) -> None:
+    """Raise `ValueError` where SQLite has not put all messages into the file yet, as rosbags would miss them."""
+    for file in path.glob("*.db3") if path.is_dir() else [path]:
+        journal = file.with_name(f"{file.name}-wal")
+        if journal.exists() and journal.stat().st_size:
+            raise ValueError(f"messages of {file.name} are in its journal {journal.name}")
+
+
+def _is_ros1(path: Path) -> bool:
+    if path.is_dir() or path.suffix == ".bag":
+        return path.suffix == ".bag"
+    with path.open("rb") as file:
+        return file.read(len(_ROS1_MAGIC)) == _ROS1_MAGIC
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """The key by which `bag_10` comes behind `bag_9`."""
+    return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
+
+
+def _form(reader: Reader) -> Form:
+    if isinstance(reader, Rosbag1Reader):
+        return Form.ROS1
+    storage = reader.storage
+    if isinstance(storage, DirectoryReader) and storage.storages:
+        storage = storage.storages[0]
+    return Form.MCAP if isinstance(storage, McapReader) else Form.SQLITE3
 
 
 def _stream(connection: Connection) -> Stream:
-    # rosbags' connections of ROS 2 cannot be keys themselves.
-    return connection.topic, connection.msgtype
+    is_text = connection.msgdef.format is MessageDefinitionFormat.MSG
+    definition = connection.msgdef.data if is_text else ""
+    return Stream(connection.topic, connection.msgtype, connection.digest, definition)
 
 
-def _routes(
-    connections: Sequence[Connection], ros: RosVersion, subscribers: Sequence[Topic], path: Path
-) -> dict[Stream, Topic]:
-    """The subscriber of each topic that has one. Raises `InputError` with every topic that does not fit."""
-    faults = Diagnostics()
-    routes: dict[Stream, Topic] = {}
-    for connection in connections:
-        try:
-            message = parse_name(connection.msgtype)
-        except InputError:
-            continue  # no message that a specification can name
-        fitting = [item for item in subscribers if item.frame.message == message]
-        speaking = [item for item in fitting if item.frame.ros == ros]
-        named = [item for item in speaking if item.block == connection.topic.strip("/").replace("/", "_")]
-        chosen = named or speaking
-        if fitting and not speaking:
-            block, spoken = fitting[0].block, fitting[0].frame.ros.title
-            faults.error(f"topic {connection.topic} of {path} is of {ros.title}, but '{block}' speaks {spoken}")
-        elif len(chosen) > 1:
-            names = ", ".join(item.block for item in chosen)
-            faults.error(
-                f"topic {connection.topic} of {path} could go to {names}", hint="name the topic like one of them"
-            )
-        elif chosen:
-            routes[_stream(connection)] = chosen[0]
-    faults.raise_if_any()
-    return routes
+@contextmanager
+def _readable(path: Path, hint: str = "") -> Iterator[None]:
+    """Within it, whatever a damaged file makes rosbags raise becomes an `InputError`."""
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001 - rosbags and what it uses raise anything
+        said = str(error) or type(error).__name__
+        remedies = (text.format(path=path) for words, text in _REMEDIES.items() if words in said)
+        fail(f"{path} is not a bag that can be read: {said}", hint=next(remedies, hint))

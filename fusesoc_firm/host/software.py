@@ -37,7 +37,7 @@ def stimulated(system: DerivedSystem) -> list[Topic]:
     converters = [item for item in system.subscribers if item.software is None]
     blocks = {item.block for item in converters}
     topics = [item for item in system.software.subscribers if item.block not in blocks]
-    return [*converters, *topics, *_sent_elsewhere(system)]
+    return [*converters, *topics, *sent_elsewhere(system)]
 
 
 def answered(system: DerivedSystem) -> list[Topic]:
@@ -67,7 +67,7 @@ def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], re
     return run.traffic
 
 
-def _sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
+def sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
     """The outputs of software that is not here."""
     return {
         Topic(system.names[end], side.frame): end
@@ -82,7 +82,7 @@ def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], response
     """Raise `InputError` if stimuli or model leave out all that somebody waits for."""
     faults = Diagnostics()
     sent = {stimulus.subscriber.block for stimulus in stimuli}
-    for topic, end in _sent_elsewhere(system).items():
+    for topic, end in sent_elsewhere(system).items():
         if topic.block not in sent:
             hint = f"'{end.block}' has no sources, so what it sends must be among them"
             faults.error(f"the stimuli hold no message of '{topic.block}'", hint=hint)
@@ -110,7 +110,7 @@ class _Run:
 
     @cached_property
     def _ends(self) -> dict[str, End]:
-        return {topic.block: end for topic, end in _sent_elsewhere(self.system).items()}
+        return {topic.block: end for topic, end in sent_elsewhere(self.system).items()}
 
     @cached_property
     def _ways(self) -> dict[str, set[str]]:

@@ -22,6 +22,7 @@ from tests.bench import (
     images,
     links,
     manager,
+    replay,
     simulators,
     store,
     systems,
@@ -76,6 +77,7 @@ def _measure(part: str, seed: int, broken: int) -> list[Table]:
         "systems": lambda: systems.measure(seed, _tell),
         "builds": lambda: builds.measure(_tell),
         "simulators": lambda: simulators.measure(_tell),
+        "replay": lambda: replay.measure(seed, _tell),
         "store": lambda: store.measure(_tell),
     }
     return measures[part]()

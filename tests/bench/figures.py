@@ -19,6 +19,7 @@ from tests.bench import (
     links,
     manager,
     nextpnr,
+    replay,
     simulators,
     store,
     systems,
@@ -45,6 +46,7 @@ _HEADINGS = {
     "builds": "Builds",
     "simulators": "Simulators",
     "store": "Store",
+    "replay": "Replay",
 }
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
@@ -68,12 +70,12 @@ _METHODS = {
     "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
         same frames and stalls in every simulator, and the same bytes back.""",
     "store": "What is generated on a second run of FuseSoC, and what that costs.",
+    "replay": """Bags through `firm replay`: written with rosbags, and what is recorded is read with rosbags.""",
 }
 _INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
-    `cycles`, `fuzz`, `images`, `links`, `applications`, `systems`, `builds`, `simulators`, `store`). 'not converted' is
-    a message that no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names
-    a folder of `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
+    Written by `make bench`; `make bench BENCH='area'` measures a part anew ({parts}). 'not converted' is a message that
+    no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of
+    `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -98,6 +100,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         builds,
         simulators,
         store,
+        replay,
     )
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
@@ -113,7 +116,10 @@ def write(sections: Mapping[str, str]) -> None:
     before = FIGURES.read_text(encoding="utf-8") if FIGURES.is_file() else ""
     known = {part: text for part in parts() if (text := _section_of(before, _HEADINGS[part]))} | dict(sections)
     ordered = [known[part] for part in parts() if part in known]
-    FIGURES.write_text("\n".join([f"# Figures\n\n{filled(_INTRODUCTION)}\n", *ordered]), encoding="utf-8")
+    listed = ", ".join(f"`{part}`" for part in parts())
+    FIGURES.write_text(
+        "\n".join([f"# Figures\n\n{filled(_INTRODUCTION.format(parts=listed))}\n", *ordered]), encoding="utf-8"
+    )
 
 
 def _section_of(text: str, heading: str) -> str:

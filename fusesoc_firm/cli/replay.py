@@ -1,0 +1,92 @@
+"""`firm replay`: a recorded bag through a simulated system."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.cli.common import command, load, positive
+from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
+
+_QUIET = 1000
+
+
+def add_replay(commands: Any) -> None:
+    """Declare the command."""
+    replay = command(
+        commands,
+        "replay",
+        "let a recorded bag go through a simulated system, and record what it answers",
+        "firm replay robot.yaml --in drive.bag --out answers.bag --tool verilator",
+        _replay,
+    )
+    replay.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    replay.add_argument(
+        "--in", dest="source", metavar="BAG", type=Path, required=True, help="of ROS 1 or ROS 2 (sqlite3, MCAP)"
+    )
+    replay.add_argument(
+        "--out", dest="target", metavar="BAG", type=Path, required=True, help="a folder, or F.bag, F.mcap, F.db3"
+    )
+    replay.add_argument(
+        "--format", choices=("ros1", "sqlite3", "mcap"), help="of --out (default: as it ends, or as that of --in)"
+    )
+    replay.add_argument("--force", action="store_true", help="replace the bag that is at --out")
+    replay.add_argument(
+        "--map",
+        type=_mapping,
+        action="append",
+        default=[],
+        metavar="TOPIC=BLOCK",
+        help="the topic of a subscriber or publisher, in place of the specification's; may be repeated",
+    )
+    replay.add_argument("--limit", type=positive, metavar="N", help="only so many messages")
+    replay.add_argument("--start", type=_seconds, default=0, metavar="S", help="begin so many seconds into the bag")
+    replay.add_argument("--duration", type=_seconds, metavar="S", help="only the messages of so many seconds")
+    replay.add_argument(
+        "--latency", action="store_true", help="stamps with the time that the hardware takes, by the system's clock"
+    )
+    replay.add_argument(
+        "--quiet",
+        type=positive,
+        default=_QUIET,
+        metavar="CYCLES",
+        help="without a beat, after which the system is at rest (default: %(default)s)",
+    )
+    add_simulator_options(replay)
+
+
+def _mapping(text: str) -> tuple[str, str]:
+    topic, equals, block = text.rpartition("=")
+    if not equals or not topic or not block:
+        raise argparse.ArgumentTypeError(f"'{text}' is not TOPIC=BLOCK, such as /arm/left=arm_in")
+    return block, topic
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds")
+    return value
+
+
+def _replay(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.host.bags import Form
+    from fusesoc_firm.host.transport.simulator import Simulator
+    from fusesoc_firm.replay.command import Settings, Source, Target, replay
+
+    def start() -> Simulator:
+        built = built_simulator(arguments)
+        return Simulator(built.command(seed=arguments.seed, stall_percent=arguments.stall_percent), built.folder)
+
+    replay(
+        load(arguments),
+        Source(arguments.source, arguments.limit, arguments.start, arguments.duration),
+        Target(arguments.target, Form(arguments.format) if arguments.format else None, arguments.force),
+        Settings(dict(arguments.map), arguments.quiet, arguments.latency),
+        start,
+    )

@@ -1,0 +1,40 @@
+"""A message and all within it as one text, as bags and ROS 1's connections hold what a topic means, and back.
+
+The definitions are parted by lines of 80 `=`; all but the first begin with `MSG: ` and their name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.message.printer import to_text
+from fusesoc_firm.message.signature import signature
+
+_LINE = "=" * 80
+_PARTING = re.compile(rf"^{_LINE}\s*\n\s*MSG:\s*(\S+)\s*?\n", re.MULTILINE)
+
+
+def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> str:
+    """The text of a message and, behind it, of all others of `definitions`."""
+    others = [definition for other, definition in definitions.items() if other != name]
+    parts = [to_text(definitions[name]), *(f"MSG: {item.name}\n{to_text(item)}" for item in reversed(others))]
+    return f"{_LINE}\n".join(parts)
+
+
+def signature_of_text(name: MessageName, text: str, ros: RosVersion) -> str | None:
+    """The signature of a message that is defined by such a text; None if that is faulty, or not all is there."""
+    first, *others = _PARTING.split(text)
+    faults = Diagnostics()
+    parse = middleware_of(ros).parse
+    try:
+        texts = {name: first} | {parse_name(word): part for word, part in zip(others[::2], others[1::2], strict=True)}
+        definitions = {each: parse(part, each, ros, str(each), faults) for each, part in texts.items()}
+        faults.raise_if_any()
+        return signature(name, definitions)
+    except (InputError, KeyError):
+        return None

@@ -1,0 +1,1 @@
+"""A recorded bag through a simulated system, and into another bag."""

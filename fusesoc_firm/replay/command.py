@@ -1,0 +1,281 @@
+"""`firm replay`: a bag through a system, with a progress bar, a line for whatever is refused, and a summary."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from itertools import islice
+from pathlib import Path
+
+from tqdm import tqdm
+
+from fusesoc_firm.diagnostics import Diagnostics, InputError, fail, nearest
+from fusesoc_firm.host.bag_writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
+from fusesoc_firm.host.bags import Bag, Form, Recorded, Stream, open_bag
+from fusesoc_firm.host.functions import Functions, importable_sources
+from fusesoc_firm.host.routes import Route, renamed, routes_of
+from fusesoc_firm.host.software import stimulated
+from fusesoc_firm.host.transport.simulator import Simulator
+from fusesoc_firm.host.transport.transport import TransportError
+from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
+from fusesoc_firm.system.derived import Topic
+from fusesoc_firm.system.generator import LoadedSystem
+from fusesoc_firm.system.timing import frequency
+
+# Lines about messages that were refused; the rest is counted.
+_SHOWN = 100
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is replayed: messages of a bag, at most `limit`.
+
+    They begin `start` seconds behind its beginning, and are those of `duration` seconds.
+    """
+
+    path: Path
+    limit: int | None = None
+    start: float = 0
+    duration: float | None = None
+
+    def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
+        """The messages of some topics that are meant."""
+        first = bag.start + round(self.start * 10**9)
+        stop = None if self.duration is None else first + round(self.duration * 10**9)
+        return islice((item for item in bag.messages(topics, stop) if item.stamp >= first), self.limit)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where the answers go; the `form` is that which the name says, else that of the source, unless it is given."""
+
+    path: Path
+    form: Form | None = None
+    force: bool = False
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How it is done: `names` are the topics of blocks that the specification calls otherwise.
+
+    The hardware is at rest after `quiet` cycles without a beat. With latency, a stamp is that of the cause and the time
+    that the hardware took.
+    """
+
+    names: Mapping[str, str]
+    quiet: int
+    has_latency: bool = False
+
+
+def replay(
+    loaded: LoadedSystem,
+    source: Source,
+    target: Target,
+    settings: Settings,
+    start_simulator: Callable[[], Simulator],
+) -> None:
+    """Replay a bag and print what came of it; `start_simulator` is called when all else is right.
+
+    Raises `InputError`, also if a message did not go through; what the others led to is recorded then.
+    """
+    if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
+        fail(f"{target.path} is what is to be replayed")
+    check_writable(target.path, force=target.force)
+    clock = _clock(loaded) if settings.has_latency else None
+    system = loaded.system
+    _check_names(settings.names, [item.block for item in (*stimulated(system), *published(system))])
+    subscribers = renamed(stimulated(system), settings.names)
+    publishers = renamed(published(system), settings.names)
+    topics = {item.block: _recorded(item, loaded) for item in publishers}
+    with open_bag(source.path) as bag:
+        form = _form(target, bag.form)
+        _check_speaks(publishers, target.path, form)
+        routes = _routes(bag, loaded, subscribers, settings.names)
+        with (
+            importable_sources([type_.accelerator for type_ in system.software.types], loaded.folder),
+            _started(start_simulator) as simulator,
+            write_bag(target.path, form, list(topics.values())) as written,
+        ):
+            run = SystemRun(system, simulator, Functions.of(system.software, loaded.folder), settings.quiet)
+            going = _Replay(bag, routes, run, topics, written, clock)
+            going.play(source)
+        going.print_summary(target.path)
+    if going.errors:
+        errors = "1 error" if going.errors == 1 else f"{going.errors} errors"
+        fail(f"{errors}; {going.refused} of {going.played.total()} messages did not go through")
+
+
+@dataclass
+class _Replay:
+    """A replay while it goes on: what was played of each stream, and what was sent of each block."""
+
+    bag: Bag
+    routes: Mapping[Stream, Route]
+    run: SystemRun
+    topics: Mapping[str, RecordedTopic]
+    written: BagWriter
+    clock: Fraction | None
+    played: Counter[Stream] = field(default_factory=Counter)
+    sent: Counter[str] = field(default_factory=Counter)
+    refused: int = 0
+    errors: int = 0
+    is_over: bool = False
+
+    def play(self, source: Source) -> None:
+        """Replay all messages; what ends it early is told, too."""
+        expected = sum(count for stream, count in self.bag.streams.items() if stream in self.routes)
+        total = expected if source.limit is None else min(expected, source.limit)
+        topics = {stream.topic for stream in self.routes}
+        with tqdm(total=total, unit="msg", disable=None, file=sys.stderr) as bar:
+            try:
+                for recorded in source.messages(self.bag, topics):
+                    self._play(recorded)
+                    bar.update()
+                    if self.is_over:
+                        break
+            except InputError as error:
+                self._report(str(error).removeprefix("error: "))
+            if left := self.run.unfinished:
+                self._report(left)
+            if not self.is_over:
+                self._end()
+
+    def _play(self, recorded: Recorded) -> None:
+        """Let a message in, record what comes of it, and report what is wrong with it."""
+        self.played[recorded.stream] += 1
+        route, faults = self.routes[recorded.stream], self.run.faults
+        if route.misfit:
+            faults.append(route.misfit)
+        try:
+            for subscriber in () if route.misfit else route.subscribers:
+                self.run.take(subscriber, recorded.payload, recorded.stamp)
+        except (StuckError, TransportError) as error:
+            faults.append(f"nothing from here on is replayed: {error}")
+            self.is_over = True
+        for sent in self.run.sent:
+            self._record(sent)
+        self.run.sent.clear()
+        self.refused += bool(faults)
+        for fault in faults:
+            self._report(f"{recorded.stream.topic}, message {recorded.number}, at {seconds(recorded.stamp)}: {fault}")
+        faults.clear()
+
+    def _end(self) -> None:
+        """End the simulation, which may have something to say."""
+        try:
+            self.run.simulator.quit()
+        except TransportError as error:
+            self._report(str(error))
+
+    def _record(self, sent: Sent) -> None:
+        latency = sent.latency(self.clock) if self.clock else 0
+        self.written.write(self.topics[sent.topic.block], sent.cause.stamp + latency, sent.payload)
+        self.sent[sent.topic.block] += 1
+
+    def _report(self, fault: str) -> None:
+        self.errors += 1
+        if self.errors <= _SHOWN:
+            tqdm.write(f"error: {self.bag.path}: {fault}", file=sys.stderr)
+
+    def print_summary(self, path: Path) -> None:
+        """What went in and came out, topic by topic."""
+        if self.errors > _SHOWN:
+            print(f"and {self.errors - _SHOWN} errors more", file=sys.stderr)
+        rows = [("in", *self._way(stream), str(self.played[stream])) for stream in self.routes]
+        rows += [("out", block, topic.name, topic.type, str(self.sent[block])) for block, topic in self.topics.items()]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for *words, count in rows:
+            print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
+        dropped = {stream: count for stream, count in self.bag.streams.items() if stream not in self.routes}
+        for stream, number in dropped.items():
+            print(f"nobody takes {stream.topic} of {stream.type}: {number}")
+        print(
+            f"{path}: {self.played.total()} in, {self.sent.total()} out, {sum(dropped.values())} dropped,"
+            f" {self.errors} errors, {self.run.simulator.cycle} cycles"
+        )
+
+    def _way(self, stream: Stream) -> tuple[str, str, str]:
+        blocks = ", ".join(item.block for item in self.routes[stream].subscribers)
+        return blocks, stream.topic, stream.type
+
+
+def seconds(stamp: int) -> str:
+    """A time in ns as people read it, to the last digit."""
+    return f"{stamp // 10**9}.{stamp % 10**9:09d}"
+
+
+def _started(start_simulator: Callable[[], Simulator]) -> Simulator:
+    try:
+        return start_simulator()
+    except TransportError as error:
+        fail(str(error))
+
+
+def _recorded(topic: Topic, loaded: LoadedSystem) -> RecordedTopic:
+    return RecordedTopic.of(topic.name, loaded.libraries[topic.frame.ros].closure(topic.frame.message))
+
+
+def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
+    faults = Diagnostics()
+    for block in names:
+        if block not in blocks:
+            faults.error(f"the system has no subscriber and no publisher '{block}'", hint=nearest(block, blocks))
+    faults.raise_if_any()
+
+
+def _clock(loaded: LoadedSystem) -> Fraction:
+    """The frequency of clk in Hz. Raises `InputError`."""
+    text = loaded.specification.project.clock
+    if text is None:
+        fail("without a 'clock' in the specification it is not known how long a cycle is")
+    faults = Diagnostics()
+    found = frequency("clock", text, faults)
+    faults.raise_if_any()
+    assert found is not None
+    return found
+
+
+def _form(target: Target, like: Form) -> Form:
+    """The form of the bag to write."""
+    said = form_of(target.path)
+    if target.form and said and target.form is not said:
+        fail(f"{target.path} is to be a bag as {target.form.value}, but ends like one as {said.value}")
+    return target.form or said or like
+
+
+def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
+    """Raise `InputError` if the bag to write cannot hold what the system publishes."""
+    faults = Diagnostics()
+    for topic in topics:
+        if topic.frame.ros != form.ros:
+            message = f"'{topic.block}' speaks {topic.frame.ros.title}, but {path} is to be a bag of {form.ros.title}"
+            faults.error(message, hint="--format says what it is to be")
+    faults.raise_if_any()
+
+
+def _routes(
+    bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
+) -> dict[Stream, Route]:
+    """Who takes what. Raises `InputError` if nobody takes anything, or a topic that was asked for is not there."""
+    faults = Diagnostics()
+    topics = {stream.topic for stream in bag.streams}
+    for item in subscribers:
+        if item.block in names and item.name not in topics:
+            faults.error(f"{bag.path} has no topic {item.name} for '{item.block}'", hint=nearest(item.name, topics))
+    faults.raise_if_any()
+    routes = routes_of(bag, subscribers, _signatures(loaded, subscribers))
+    if not routes:
+        wanted = ", ".join(f"{item.name} of {item.frame.message}" for item in subscribers)
+        there = ", ".join(f"{stream.topic} of {stream.type}" for stream in bag.streams) or "nothing"
+        fail(f"{bag.path} holds no topic that the system takes: {wanted}", hint=f"it holds {there}")
+    return routes
+
+
+def _signatures(loaded: LoadedSystem, topics: Sequence[Topic]) -> dict[tuple[RosVersion, MessageName], str]:
+    frames = dict.fromkeys((item.frame.ros, item.frame.message) for item in topics)
+    return {(ros, name): signature(name, loaded.libraries[ros].closure(name)) for ros, name in frames}

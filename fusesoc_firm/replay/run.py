@@ -1,0 +1,220 @@
+"""A system that is given one message after the other: its simulated hardware, and its software around that.
+
+Each message is let in when the hardware has come to rest after the one before. So it is known what a message led to,
+and the same messages give the same answers, in the same cycles.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.frame.codec import CodecError, decode, pack_frame
+from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.host.bursts import BurstError, BurstJoiner
+from fusesoc_firm.host.functions import Functions, Message
+from fusesoc_firm.host.software import sent_elsewhere
+from fusesoc_firm.host.transport.simulator import MOST_CYCLES, ErrorPulse, Simulator, Taken
+from fusesoc_firm.host.transport.transport import Burst
+from fusesoc_firm.system.derived import Converter, DerivedSystem, End, Topic
+
+# How long a frame may wait until it counts as stuck, and the system send on its own accord until the next message: so
+# many times the quiet of a system at rest, and so many cycles a byte of the frame.
+_QUIETS = 100
+_CYCLES_A_BYTE = 64
+
+
+@dataclass
+class Cause:
+    """A message that was let in: when it was recorded (ns), and the cycle in which the hardware began to take it."""
+
+    stamp: int
+    first_cycle: int | None = None
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A message that left the system, and the last one before that was on the way to it.
+
+    `last_cycle` is that of its last beat; None if software sent it.
+    """
+
+    topic: Topic
+    payload: bytes
+    cause: Cause
+    last_cycle: int | None
+
+    def latency(self, clock_hz: Fraction) -> int:
+        """From the first beat of the cause to its own last one, ns; 0 where one of them did not pass the hardware."""
+        if self.last_cycle is None or self.cause.first_cycle is None:
+            return 0
+        return round((self.last_cycle - self.cause.first_cycle) * 10**9 / clock_hz)
+
+
+class StuckError(Exception):
+    """The hardware does not take a frame, and so none that could be behind it."""
+
+
+@dataclass
+class SystemRun:
+    """A system whose hardware is at rest when it has been quiet, without a beat in any direction, for `quiet` cycles.
+
+    `sent` and `faults` are those since they were emptied last.
+    """
+
+    system: DerivedSystem
+    simulator: Simulator
+    functions: Functions
+    quiet: int
+    sent: list[Sent] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    _waiting: deque[Converter] = field(default_factory=deque)
+    _causes: dict[str, Cause] = field(default_factory=dict)
+    _deadline: int = 0
+
+    @cached_property
+    def _joiner(self) -> BurstJoiner:
+        return BurstJoiner(len(self.system.publishers), self.system.width)
+
+    @cached_property
+    def _subscribers(self) -> Mapping[str, Converter]:
+        return {item.block: item for item in self.system.subscribers}
+
+    @cached_property
+    def _software(self) -> Mapping[str, Topic]:
+        """Where software publishes."""
+        return {item.block: item for item in self.system.software.publishers}
+
+    @cached_property
+    def _entries(self) -> Mapping[str, End]:
+        """What software that is not here sends, by name."""
+        return {topic.block: end for topic, end in sent_elsewhere(self.system).items()}
+
+    @cached_property
+    def _here(self) -> set[str]:
+        return _software_here(self.system)
+
+    @cached_property
+    def _successors(self) -> Mapping[str, set[str]]:
+        found: dict[str, set[str]] = {}
+        for item in (*self.system.connections, *self.system.software.connections):
+            found.setdefault(item.source.block, set()).update(end.block for end in item.sinks)
+        return found
+
+    def take(self, topic: Topic, payload: bytes, stamp: int) -> None:
+        """Let a message in and wait until the hardware is at rest. Raises `StuckError` and `TransportError`.
+
+        What keeps the message from going through is a fault.
+        """
+        try:
+            message = decode(topic.frame, payload)
+        except CodecError as error:
+            self.faults.append(str(error))
+            return
+        entry = self._entries.get(topic.block, End(topic.block))
+        cause = Cause(stamp)
+        self._causes |= dict.fromkeys(self._reached(entry.block), cause)
+        if entry.block == topic.block and topic.block in self._subscribers:
+            self._request(self._subscribers[topic.block], payload)
+        self._give(entry, message, cause)
+        self._settle(cause)
+
+    @property
+    def unfinished(self) -> str:
+        """What is wrong with the end of what the hardware sent; empty if all of it was whole."""
+        blocks = [self.system.publishers[number].block for number in self._joiner.unfinished]
+        return f"the system has not sent the rest of a frame of {', '.join(blocks)}" if blocks else ""
+
+    def _reached(self, block: str) -> set[str]:
+        """A block and all on the way from it."""
+        found: set[str] = set()
+        new = {block}
+        while new:
+            found |= new
+            new = {name for item in new for name in self._successors.get(item, ())} - found
+        return found
+
+    def _request(self, subscriber: Converter, payload: bytes) -> None:
+        self._waiting.append(subscriber)
+        self.simulator.request(pack_frame(subscriber.id, payload))
+        self._postpone(len(payload))
+
+    def _postpone(self, size: int) -> None:
+        """Something went on, with `size` bytes to come: from now on the patience is counted."""
+        self._deadline = max(self._deadline, self.simulator.cycle + _QUIETS * self.quiet + _CYCLES_A_BYTE * size)
+
+    def _give(self, source: End, message: Message, cause: Cause) -> None:
+        """Let software have a message, and the hardware or publishers what it makes of it."""
+        try:
+            given = self.functions.take(source, message)
+        except InputError as error:
+            self.faults.append(str(error).removeprefix("error: "))
+            return
+        for name, answer in given:
+            if subscriber := self._subscribers.get(name):
+                self._request(subscriber, encode_used(subscriber.frame, answer))
+            else:
+                topic = self._software[name]
+                self._send(topic, encode_used(topic.frame, answer), cause, None)
+
+    def _settle(self, cause: Cause) -> None:
+        """Run until the hardware is at rest."""
+        while self._waiting or self._is_busy():
+            for event in self.simulator.run(self._patience()):
+                match event:
+                    case Taken(first_cycle=cycle):
+                        self._waiting.popleft()
+                        self._postpone(0)
+                        if cause.first_cycle is None:
+                            cause.first_cycle = cycle
+                    case Burst():
+                        self._receive(event, cause)
+                    case ErrorPulse(converter=converter):
+                        self.faults.append(self._error(converter))
+            if self._waiting and self.simulator.cycle >= self._deadline:
+                raise StuckError(f"the system does not take it at '{self._waiting[0].block}'")
+
+    def _is_busy(self) -> bool:
+        return self.simulator.quiet < self.quiet and self.simulator.cycle < self._deadline
+
+    def _patience(self) -> int:
+        left = self._deadline - self.simulator.cycle
+        wanted = left if self._waiting else min(left, self.quiet - self.simulator.quiet)
+        return min(max(1, wanted), MOST_CYCLES)
+
+    def _receive(self, burst: Burst, cause: Cause) -> None:
+        try:
+            frame = self._joiner.push(burst.data, burst.tid)
+            if frame is None:
+                return
+            publisher = self.system.publishers[frame.id]
+            if publisher.software and publisher.software.block in self._here:
+                self._give(End(publisher.block), decode(publisher.frame, frame.payload), cause)
+            else:
+                self._send(publisher, frame.payload, cause, burst.last_cycle)
+        except (BurstError, CodecError) as error:
+            self.faults.append(f"what the hardware sends is wrong: {error}")
+
+    def _send(self, topic: Topic, payload: bytes, cause: Cause, last_cycle: int | None) -> None:
+        self.sent.append(Sent(topic, payload, self._causes.get(topic.block, cause), last_cycle))
+
+    def _error(self, converter: int | None) -> str:
+        if converter is None:
+            return "the hardware reports id_error: no subscriber has the frame's id"
+        return f"the hardware reports frame_error at '{self.system.error_blocks[converter]}'"
+
+
+def published(system: DerivedSystem) -> list[Topic]:
+    """Whatever leaves a system: what hardware publishes but for its own software, and what software does."""
+    here = _software_here(system)
+    converters = [item for item in system.publishers if not item.software or item.software.block not in here]
+    return [*converters, *system.software.publishers]
+
+
+def _software_here(system: DerivedSystem) -> set[str]:
+    """The blocks whose functions are known."""
+    return {block.block for block in system.software.blocks if block.type.accelerator.sources}
