@@ -88,6 +88,8 @@ def _system_inputs(request: Request) -> list[Path]:
     from fusesoc_firm.host import node_package, simulation
     from fusesoc_firm.system import generator
 
+    if request.parameters["product"] == "live":
+        return simulation.live_inputs(request)
     if _is_simulation(request):
         return simulation.inputs(request)
     return [*generator.inputs(request), *node_package.headers()]
@@ -97,6 +99,8 @@ def _generate_system(request: Request) -> GeneratedCore:
     from fusesoc_firm.host import node_package, simulation
     from fusesoc_firm.system import generator
 
+    if request.parameters["product"] == "live":
+        return simulation.generate_live(request)
     if _is_simulation(request):
         return simulation.generate(request)
     loaded = generator.load_requested(request)
@@ -117,7 +121,7 @@ def _compiler(request: Request) -> Mapping[str, str]:
 
 
 def _is_simulation(request: Request) -> bool:
-    return request.parameters["product"] == "simulation"
+    return request.parameters["product"] != "system"
 
 
 _PATHS = Parameter("paths", "list", "folders with message definitions, relative to the core")
@@ -158,7 +162,7 @@ GENERATORS: Mapping[str, Generator] = {
     "far": Generator(
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
-            Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation")),
+            Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation", "live")),
             Parameter("board", "str", "the board it is for: one of ours, or a YAML file relative to the core"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
             Parameter("model", "str", "a Python file with the function that says what the system answers"),
