@@ -53,7 +53,7 @@ _DIALECTS = {
 
 
 def headers() -> list[Path]:
-    """The headers that every node comes with."""
+    """The headers of nodes."""
     return sorted(HEADERS.rglob("*.hpp"))
 
 
@@ -83,7 +83,7 @@ def cpp_package(loaded: LoadedSystem, ros: RosVersion | None = None) -> dict[str
         "package.xml": render(_PACKAGE_TEMPLATE, build),
         "CMakeLists.txt": render(dialect.cmake, {"package": package}),
         f"src/{package}.cpp": render(_SOURCE_TEMPLATE, _source(loaded, dialect)),
-        **{f"include/{path.relative_to(HEADERS)}": path.read_text(encoding="utf-8") for path in headers()},
+        **_headers(dialect),
     }
 
 
@@ -107,6 +107,16 @@ def _only(system: DerivedSystem, ros: RosVersion | None) -> RosVersion:
         hint = "the hardware is made for one wire format; 'middleware' in the specification says which"
         fail(f"the topics of {system.name} are of {found[0].title}, not of {ros.title}", hint=hint)
     return found[0]
+
+
+def _headers(dialect: _Dialect) -> dict[str, str]:
+    """All but those for other versions of ROS."""
+    others = {item.header for item in _DIALECTS.values()} - {dialect.header}
+    return {
+        f"include/{path.relative_to(HEADERS)}": path.read_text(encoding="utf-8")
+        for path in headers()
+        if path.name not in others
+    }
 
 
 def _source(loaded: LoadedSystem, dialect: _Dialect) -> dict[str, Any]:
@@ -170,7 +180,8 @@ def _topic(converter: Converter, loaded: LoadedSystem, dialect: _Dialect) -> Map
     message = frame.message
     return {
         "id": converter.id,
-        "topic": converter.name,
+        # A relative name moves with the node's namespace.
+        "topic": converter.given_name or identifier(converter.block),
         "type": str(message) if dialect.has_definitions else f"{message.package}/{kind}/{message.name}",
         "signature": middleware_of(frame.ros).signature(message, definitions),
         "definition": {"constant": _constant(message)} if dialect.has_definitions else None,
