@@ -88,6 +88,8 @@ def _system_inputs(request: Request) -> list[Path]:
     from fusesoc_firm.host import simulation
     from fusesoc_firm.system import generator
 
+    if request.parameters["product"] == "live":
+        return simulation.live_inputs(request)
     return simulation.inputs(request) if _is_simulation(request) else generator.inputs(request)
 
 
@@ -95,6 +97,8 @@ def _generate_system(request: Request) -> GeneratedCore:
     from fusesoc_firm.host import simulation
     from fusesoc_firm.system import generator
 
+    if request.parameters["product"] == "live":
+        return simulation.generate_live(request)
     return simulation.generate(request) if _is_simulation(request) else generator.generate(request)
 
 
@@ -111,7 +115,7 @@ def _compiler(request: Request) -> Mapping[str, str]:
 
 
 def _is_simulation(request: Request) -> bool:
-    return request.parameters["product"] == "simulation"
+    return request.parameters["product"] != "system"
 
 
 _PATHS = Parameter("paths", "list", "folders with message definitions, relative to the core")
@@ -152,7 +156,7 @@ GENERATORS: Mapping[str, Generator] = {
     "far": Generator(
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
-            Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation")),
+            Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation", "live")),
             Parameter("board", "str", "the board it is for: one of ours, or a YAML file relative to the core"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
             Parameter("model", "str", "a Python file with the function that says what the system answers"),

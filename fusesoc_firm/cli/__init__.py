@@ -13,6 +13,7 @@ from fusesoc_firm.cli.common import command
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
 from fusesoc_firm.cli.scheduler import add_scheduler
+from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
@@ -52,6 +53,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add_message(commands)
     add_system(commands)
+    add_simulator(commands)
     add_scheduler(commands)
     add_project(commands)
     add_why(commands)

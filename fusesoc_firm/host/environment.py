@@ -20,7 +20,12 @@ def environment_files(
     The last one is called after the entity that the test bench instantiates. Raises `InputError` for a file that cannot
     be one of them.
     """
-    taken = {system.entity, f"{system.entity}_tb", *(item.entity for item in system.accelerator_types)}
+    taken = {
+        system.entity,
+        f"{system.entity}_tb",
+        f"{system.entity}_live",
+        *(item.entity for item in system.accelerator_types),
+    }
     files: dict[PurePosixPath, GeneratedFile] = {}
     for path, source in paths.items():
         if not any(block.type.accelerator.pins for block in system.accelerators):

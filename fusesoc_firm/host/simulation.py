@@ -1,8 +1,12 @@
-"""The simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels."""
+"""The simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels.
+
+A live one has a test bench that does what another program requests over a pipe (docs/transport.md), and no frames.
+"""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.converter.generator import VHDL
 from fusesoc_firm.diagnostics import SourceRef, fail
@@ -47,18 +51,14 @@ def generate(request: Request) -> GeneratedCore:
     stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
     answers = responses(_path(request, "model"), stimuli, answered(system))
     found = traffic(system, loaded.folder, stimuli, answers)
-    files: dict[str, GeneratedFile] = {}
-    for kernel in system.kernels:
-        files |= kernel_files(kernel, loaded.folder)
     seed, stall_percent = request.parameters["seed"], request.parameters["stall_percent"]
     assert isinstance(seed, int)
     assert isinstance(stall_percent, int)
     environment = environment_files(_environment(request), system)
-    entity = [*environment][-1].stem if environment else None
-    configuration = test_bench_configuration(system, seed, stall_percent, entity)
-    files |= {str(path): file for path, file in environment.items()}
+    configuration = test_bench_configuration(system, seed, stall_percent, _entity(environment), is_live=False)
+    files = _surroundings(loaded, environment)
     if request.parameters["simulator"] == GHDL:
-        files |= _vhdl_bench(configuration, system)
+        files |= _vhdl_bench(configuration)
     else:
         frames = max(len(found.stimuli), len(found.responses))
         files |= _verilog_bench(configuration, system, frames, _beats(found.responses, system.width))
@@ -67,6 +67,41 @@ def generate(request: Request) -> GeneratedCore:
         "expected.txt": GeneratedFile(expected_text(found.responses, system.publishers), "user", copyto="expected.txt"),
     }
     return GeneratedCore(f"Simulation of system {system.name}", files)
+
+
+def live_inputs(request: Request) -> list[Path]:
+    """What the system depends on, and the environment."""
+    return [*generator.inputs(request), *_environment(request)]
+
+
+def generate_live(request: Request) -> GeneratedCore:
+    """The core of a live simulation. Seed and rate of stalls are given where it is started. Raises `InputError`."""
+    loaded = generator.load_requested(request)
+    system = loaded.system
+    _check_simulator(system, str(request.parameters["simulator"]))
+    environment = environment_files(_environment(request), system)
+    configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
+    files = _surroundings(loaded, environment)
+    if request.parameters["simulator"] == GHDL:
+        files |= _vhdl_bench(configuration)
+    else:
+        files |= _verilog_bench(configuration, system)
+    return GeneratedCore(f"Live simulation of system {system.name}", files)
+
+
+def _surroundings(
+    loaded: generator.LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile]
+) -> dict[str, GeneratedFile]:
+    """What every test bench of a system needs: kernels that can be simulated, and the environment."""
+    files: dict[str, GeneratedFile] = {}
+    for kernel in loaded.system.kernels:
+        files |= kernel_files(kernel, loaded.folder)
+    return files | {str(path): file for path, file in environment.items()}
+
+
+def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
+    """The entity of the environment's files."""
+    return [*environment][-1].stem if environment else None
 
 
 def _check_simulator(system: DerivedSystem, simulator: str) -> None:
@@ -91,19 +126,19 @@ def _check_simulator(system: DerivedSystem, simulator: str) -> None:
             fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
 
 
-def _vhdl_bench(configuration: Configuration, system: DerivedSystem) -> dict[str, GeneratedFile]:
+def _vhdl_bench(configuration: Configuration) -> dict[str, GeneratedFile]:
     text = render(TEST_BENCH_TEMPLATE, configuration)
-    return {f"{system.entity}_tb.vhd": GeneratedFile(text, VHDL, tags=_BENCH_TAGS)}
+    return {f"{configuration['bench']}.vhd": GeneratedFile(text, VHDL, tags=_BENCH_TAGS)}
 
 
 def _verilog_bench(
-    configuration: Configuration, system: DerivedSystem, frames: int, beats: int
+    configuration: Configuration, system: DerivedSystem, frames: int = 0, beats: int = 0
 ) -> dict[str, GeneratedFile]:
     """The bench, and the entity that holds system and environment if there is one."""
     has_environment = configuration["environment"] is not None
     bench = verilog_bench_configuration(configuration, system, frames, beats, has_environment=has_environment)
     files = {
-        f"{system.entity}_tb.v": GeneratedFile(
+        f"{configuration['bench']}.v": GeneratedFile(
             render(VERILOG_BENCH_TEMPLATE, bench), "verilogSource-2005", tags=_BENCH_TAGS
         )
     }

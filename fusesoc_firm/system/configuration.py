@@ -60,12 +60,18 @@ def system_configuration(system: DerivedSystem) -> Configuration:
     }
 
 
+def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
+    """The test bench that compares with files, or the one that does what a pipe says."""
+    return f"{system.entity}_live" if is_live else f"{system.entity}_tb"
+
+
 def test_bench_configuration(
-    system: DerivedSystem, seed: int, stall_percent: int, environment: str | None
+    system: DerivedSystem, seed: int, stall_percent: int, environment: str | None, *, is_live: bool
 ) -> Configuration:
     """The configuration of the test bench: the simulated host beside the system, and at its pins the `environment`.
 
-    That is an entity with `clk`, `rst_n` and the pins, each in the other direction.
+    That is an entity with `clk`, `rst_n` and the pins, each in the other direction. If it `is_live`, the host is at the
+    end of a pipe, and joins no bursts.
     """
     pins = pin_groups(Names(system), system)
     formals = [
@@ -76,7 +82,10 @@ def test_bench_configuration(
     ]
     # A link carries bytes.
     host_width = 8 if system.link else system.width
+    has_join = system.scheduling.is_preemptive and not is_live
     return {
+        "bench": test_bench_entity(system, is_live=is_live),
+        "is_live": is_live,
         "pins": pins,
         "clocks": [
             {**clock, "period": max(2, round(_HOST_PERIOD / item.ratio)), "number": number}
@@ -92,8 +101,8 @@ def test_bench_configuration(
         "host_keep_high": host_width // 8 - 1,
         "seed": seed,
         "stall_percent": stall_percent,
-        "is_preemptive": system.scheduling.is_preemptive,
-        "from": "burst" if system.scheduling.is_preemptive else "from",
+        "has_join": has_join,
+        "from": "burst" if has_join else "from",
     }
 
 

@@ -21,6 +21,7 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     owners = {
         system.entity: "the system",
         f"{system.entity}_tb": "the system's test bench",
+        f"{system.entity}_live": "the system's test bench at the end of a pipe",
         f"{system.entity}_in_environment": "the system's test bench",
     }
     frames: dict[str, Frame] = {}

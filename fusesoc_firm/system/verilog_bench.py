@@ -21,7 +21,7 @@ def translated_unit(system: DerivedSystem, *, has_environment: bool) -> str:
 
 
 def verilog_bench_configuration(
-    bench: Configuration, system: DerivedSystem, frames: int, beats: int, *, has_environment: bool
+    bench: Configuration, system: DerivedSystem, frames: int = 0, beats: int = 0, *, has_environment: bool
 ) -> Configuration:
     """The configuration of the test bench; that of the one in VHDL, `bench`, is part of it.
 

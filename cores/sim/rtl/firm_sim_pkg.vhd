@@ -42,11 +42,17 @@ package firm_sim_pkg is
   procedure read_expected_file(path : in string; content : inout frame_file_t);
 
   function to_byte(char : character) return byte_t;
+  -- Of a byte that is defined.
+  function to_character(value : byte_t) return character;
   -- Two digits; an undefined bit makes its digit an `X`.
   function to_hex(value : byte_t) return string;
   function is_defined(value : std_logic_vector) return boolean;
 
   procedure print(text : in string);
+
+  -- Text of which so many characters are used, for so many as are wanted: it grows by doubling, so that a long frame is
+  -- not copied once a line.
+  procedure make_room(text : inout line; used : in natural; wanted : in positive);
 
 end package firm_sim_pkg;
 
@@ -80,6 +86,18 @@ package body firm_sim_pkg is
   begin
     return BYTE_OF(char);
   end function to_byte;
+
+  function to_character(value : byte_t) return character is
+    variable code : natural := 0;
+  begin
+    for place in value'range loop
+      code := 2 * code;
+      if value(place) = '1' then
+        code := code + 1;
+      end if;
+    end loop;
+    return character'val(code);
+  end function to_character;
 
   function to_hex(value : byte_t) return string is
     variable text  : string(1 to 2);
@@ -135,7 +153,6 @@ package body firm_sim_pkg is
     end case;
   end function digit_value;
 
-  -- Text that grows by doubling, so that a long frame is not copied once a line.
   procedure make_room(text : inout line; used : in natural; wanted : in positive) is
     variable wider : line;
     variable size  : positive := 64;

@@ -18,7 +18,7 @@ from tests.unit.system.systems import accelerator, converter, derived, instance,
 SPECS = Path(__file__).resolve().parents[3] / "specs"
 CORES = sorted(SPECS.glob("*/*.core"))
 SYNTHESIS = {*(f"synth_{family}" for family in ("xilinx", "ecp5", "ice40", "gowin")), *boards()}
-SIMULATION = {"sim", "sim_icarus", "sim_verilator"}
+SIMULATION = {"sim", "sim_icarus", "sim_verilator", "live", "live_verilator"}
 
 
 def blocks() -> str:

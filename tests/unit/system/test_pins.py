@@ -78,11 +78,11 @@ def test_the_derived_system_shows_pins(tmp_path: Path) -> None:
 
 
 def test_the_bench_connects_every_pin_to_the_environment(tmp_path: Path) -> None:
-    found = bench_configuration(system(tmp_path, "a"), 1, 0, "switches")
+    found = bench_configuration(system(tmp_path, "a"), 1, 0, "switches", is_live=False)
     assert found["environment"]["entity"] == "switches"
     mapped = [(port["formal"].strip(), port["actual"]) for port in found["environment"]["ports"]]
     assert mapped == [(name, name) for name in ("clk", "rst_n", "a_led", "a_tid")]
-    assert bench_configuration(system(tmp_path, "a"), 1, 0, None)["environment"] is None
+    assert bench_configuration(system(tmp_path, "a"), 1, 0, None, is_live=False)["environment"] is None
 
 
 @pytest.mark.parametrize(

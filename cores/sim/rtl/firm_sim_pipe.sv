@@ -1,0 +1,513 @@
+// SPDX-License-Identifier: Apache-2.0
+// The host of firm_sim_pipe.vhd for simulators of Verilog: the same requests, reports and stalls, cycle by cycle. SEED and
+// STALL_PERCENT can be set anew where the simulator is started, as in +SEED=7. It is SystemVerilog for its queues alone,
+// since frames have any size.
+//
+// Inputs are read before the rising edge; what the host drives changes with the falling edge, so no order of events
+// matters. Where a stream carries nothing, it drives 'x'.
+
+`timescale 1ns / 1ps
+
+module firm_sim_pipe #(
+  parameter WIDTH = 8,
+  // Bits of `frame_error`, one a converter.
+  parameter ERRORS = 1,
+  // All randomness follows from it.
+  parameter SEED = 1,
+  // The chance, each cycle and direction, that the host offers no beat or takes none.
+  parameter STALL_PERCENT = 0
+) (
+  output reg                clk,
+  output reg                rst_n,
+
+  // To the system.
+  output reg  [WIDTH-1:0]   m_axis_tdata,
+  output reg  [WIDTH/8-1:0] m_axis_tkeep,
+  output reg                m_axis_tvalid,
+  output reg                m_axis_tlast,
+  input  wire               m_axis_tready,
+
+  // From the system.
+  input  wire [WIDTH-1:0]   s_axis_tdata,
+  input  wire [WIDTH/8-1:0] s_axis_tkeep,
+  input  wire [7:0]         s_axis_tid,
+  input  wire               s_axis_tvalid,
+  input  wire               s_axis_tlast,
+  output reg                s_axis_tready,
+
+  input  wire               id_error,
+  input  wire [ERRORS-1:0]  frame_error
+);
+
+  localparam LANES        = WIDTH / 8;
+  localparam HALF_PERIOD  = 5;
+  localparam RESET_CYCLES = 8;
+  localparam HIGHEST_SEED = 2147483562;  // of math_real.uniform
+  localparam NO_CONVERTER = 65535;
+  localparam MOST_QUIET   = 2147483647;
+
+  integer requests, reports;             // files
+  integer seed, stall_percent;
+  integer random_1, random_2;
+
+  reg [63:0] cycle;
+  integer    quiet;                      // cycles since the last beat, or MOST_QUIET
+  reg        is_reported;                // something that ends a run
+  integer    request, cycles_left;
+
+  // The stream to the system: the frames that are still to be offered.
+  reg [7:0]  bytes [$];
+  integer    sizes [$];
+  integer    sending;                    // the size of the frame that is on its way; 0 for none
+  integer    bytes_sent;                 // of it, without the beat on offer
+  reg        is_offered;
+  reg [63:0] first_in;
+
+  // The stream from the system: the burst that comes in.
+  reg [7:0]  burst [$];
+  reg [7:0]  burst_tid;
+  reg [63:0] first_out;
+  reg        is_accepting;
+
+  // The inputs as they are before the rising edge.
+  reg               tready, tvalid, tlast;
+  reg [WIDTH-1:0]   tdata;
+  reg [LANES-1:0]   tkeep;
+  reg [7:0]         tid;
+  reg               id_pulse;
+  reg [ERRORS-1:0]  frame_pulses;
+
+  // What the stream from the system must still show, as it waited for `tready`.
+  reg               is_held, held_tlast;
+  reg [WIDTH-1:0]   held_tdata;
+  reg [LANES-1:0]   held_tkeep;
+  reg [7:0]         held_tid;
+
+  // ------------------------------------------------------------------ faults
+
+  // What has been reported shall be read before the simulation ends.
+  task fail;
+    begin
+      $fflush(reports);
+      $fatal(1, "firm_sim_pipe: the simulation cannot go on");
+    end
+  endtask
+
+  task fail_in_cycle;
+    begin
+      $display(" in cycle %0d", cycle);
+      fail;
+    end
+  endtask
+
+  function [7:0] level(input bit_level);
+    level = bit_level === 1'b1 ? "1" : bit_level === 1'b0 ? "0" : bit_level === 1'bz ? "Z" : "X";
+  endfunction
+
+  // math_real.uniform of VHDL, by L'Ecuyer, so that all simulators stall in the same cycles.
+  task draw_stall(output reg is_stalled);
+    integer step;
+    if (stall_percent == 0)
+      is_stalled = 0;
+    else begin
+      step     = random_1 / 53668;
+      random_1 = 40014 * (random_1 - step * 53668) - step * 12211;
+      if (random_1 < 0)
+        random_1 = random_1 + 2147483563;
+      step     = random_2 / 52774;
+      random_2 = 40692 * (random_2 - step * 52774) - step * 3791;
+      if (random_2 < 0)
+        random_2 = random_2 + 2147483399;
+      step = random_1 - random_2;
+      if (step < 1)
+        step = step + 2147483562;
+      is_stalled = 100.0 * (step * 4.656613e-10) < stall_percent;
+    end
+  endtask
+
+  // ------------------------------------------------------------------ requests and reports
+
+  task read_byte(output reg [7:0] value);
+    integer char;
+    begin
+      char = $fgetc(requests);
+      if (char < 0) begin
+        $display("firm_sim_pipe: the requests end within one");
+        fail;
+      end
+      value = char[7:0];
+    end
+  endtask
+
+  task read_number(output integer number);
+    reg [31:0] sum;
+    integer    place;
+    begin
+      for (place = 0; place < 4; place = place + 1)
+        read_byte(sum[8*place +: 8]);
+      if (sum[31]) begin
+        $display("firm_sim_pipe: a request's number is greater than 2147483647");
+        fail;
+      end
+      number = sum;
+    end
+  endtask
+
+  task read_frame;
+    integer   size, place;
+    reg [7:0] value;
+    begin
+      read_number(size);
+      if (size == 0) begin
+        $display("firm_sim_pipe: a frame without a byte is requested");
+        fail;
+      end
+      for (place = 0; place < size; place = place + 1) begin
+        read_byte(value);
+        bytes.push_back(value);
+      end
+      sizes.push_back(size);
+    end
+  endtask
+
+  task write_number(input reg [63:0] number, input integer size);
+    integer place;
+    for (place = 0; place < size; place = place + 1)
+      $fwrite(reports, "%c", number[8*place +: 8]);
+  endtask
+
+  task report_taken;
+    begin
+      is_reported = 1;
+      $fwrite(reports, "T");
+      write_number(first_in, 8);
+      write_number(cycle, 8);
+    end
+  endtask
+
+  task report_burst;
+    begin
+      is_reported = 1;
+      $fwrite(reports, "B%c", burst_tid);
+      write_number(first_out, 8);
+      write_number(cycle, 8);
+      write_number({32'b0, burst.size()}, 4);
+      while (burst.size() != 0)
+        $fwrite(reports, "%c", burst.pop_front());
+    end
+  endtask
+
+  task report_error(input integer converter);
+    begin
+      is_reported = 1;
+      $fwrite(reports, "E");
+      write_number({32'b0, converter}, 2);
+      write_number(cycle, 8);
+    end
+  endtask
+
+  task report_stand;
+    begin
+      $fwrite(reports, "S");
+      write_number(cycle, 8);
+      write_number({32'b0, quiet}, 4);
+      $fflush(reports);
+    end
+  endtask
+
+  // ------------------------------------------------------------------ to the system
+
+  task offer_beat;
+    integer lane;
+    begin
+      m_axis_tdata = {WIDTH{1'bx}};
+      m_axis_tkeep = 0;
+      for (lane = 0; lane < LANES && bytes_sent + lane < sending; lane = lane + 1) begin
+        m_axis_tdata[8*lane +: 8] = bytes.pop_front();
+        m_axis_tkeep[lane]        = 1;
+      end
+      m_axis_tvalid = 1;
+      m_axis_tlast  = sending - bytes_sent <= LANES;
+      is_offered    = 1;
+    end
+  endtask
+
+  task offer_nothing;
+    begin
+      m_axis_tdata  = {WIDTH{1'bx}};
+      m_axis_tkeep  = {LANES{1'bx}};
+      m_axis_tlast  = 1'bx;
+      m_axis_tvalid = 0;
+    end
+  endtask
+
+  task note_sent_beat;
+    begin
+      quiet      = 0;
+      is_offered = 0;
+      if (bytes_sent == 0)
+        first_in = cycle;
+      bytes_sent = bytes_sent + LANES;
+      if (bytes_sent >= sending) begin
+        report_taken;
+        sending    = 0;
+        bytes_sent = 0;
+      end
+    end
+  endtask
+
+  task send;
+    reg is_stalled, was_offered;
+    begin
+      was_offered = is_offered;
+      if (is_offered) begin
+        if (tready === 1'b1)
+          note_sent_beat;
+        else if (tready !== 1'b0) begin
+          $write("firm_sim_pipe: m_axis_tready is '%c'", level(tready));
+          fail_in_cycle;
+        end
+      end
+      if (!is_offered) begin
+        if (sending == 0 && sizes.size() != 0)
+          sending = sizes.pop_front();
+        draw_stall(is_stalled);
+        if (sending != 0 && !is_stalled)
+          offer_beat;
+        else if (was_offered)
+          offer_nothing;
+      end
+    end
+  endtask
+
+  // ------------------------------------------------------------------ from the system
+
+  // The bytes of the beat: the lanes from the lowest up to the first that is not kept.
+  task count_kept(output integer kept);
+    integer lane;
+    begin
+      kept = 0;
+      for (lane = 0; lane < LANES; lane = lane + 1)
+        if (kept == lane && tkeep[lane] === 1'b1)
+          kept = kept + 1;
+        else if (tkeep[lane] !== 1'b0) begin
+          $write("firm_sim_pipe: s_axis_tkeep is undefined or not contiguous from the lowest lane");
+          fail_in_cycle;
+        end
+      if (kept == 0) begin
+        $write("firm_sim_pipe: a beat without a byte");
+        fail_in_cycle;
+      end else if (kept < LANES && tlast !== 1'b1) begin
+        $write("firm_sim_pipe: a beat that is neither full nor the last");
+        fail_in_cycle;
+      end
+    end
+  endtask
+
+  task begin_burst;
+    begin
+      first_out = cycle;
+      burst_tid = tid;
+      if ((^tid) === 1'bx) begin
+        $write("firm_sim_pipe: s_axis_tid is undefined");
+        fail_in_cycle;
+      end
+    end
+  endtask
+
+  task take_beat;
+    integer   kept, lane;
+    reg [7:0] value;
+    begin
+      quiet = 0;
+      if (burst.size() == 0)
+        begin_burst;
+      else if (tid !== burst_tid) begin
+        $write("firm_sim_pipe: s_axis_tid changes within a burst");
+        fail_in_cycle;
+      end
+      count_kept(kept);
+      for (lane = 0; lane < kept; lane = lane + 1) begin
+        value = tdata[8*lane +: 8];
+        if ((^value) === 1'bx) begin
+          $write("firm_sim_pipe: byte %0d of a burst is undefined", burst.size());
+          fail_in_cycle;
+        end
+        burst.push_back(value);
+      end
+      if (tlast === 1'b1)
+        report_burst;
+      else if (tlast !== 1'b0) begin
+        $write("firm_sim_pipe: s_axis_tlast is '%c'", level(tlast));
+        fail_in_cycle;
+      end
+    end
+  endtask
+
+  task check_held;
+    if (tvalid !== 1'b1) begin
+      $write("firm_sim_pipe: s_axis_tvalid falls before s_axis_tready came");
+      fail_in_cycle;
+    end else if (tdata !== held_tdata || tkeep !== held_tkeep || tid !== held_tid || tlast !== held_tlast) begin
+      $write("firm_sim_pipe: the stream from the system changes before s_axis_tready came");
+      fail_in_cycle;
+    end
+  endtask
+
+  task receive;
+    reg is_stalled;
+    begin
+      if (is_held)
+        check_held;
+      if (tvalid === 1'b1 && is_accepting)
+        take_beat;
+      else if (tvalid !== 1'b0 && tvalid !== 1'b1) begin
+        $write("firm_sim_pipe: s_axis_tvalid is '%c'", level(tvalid));
+        fail_in_cycle;
+      end
+      is_held = tvalid === 1'b1 && !is_accepting;
+      if (is_held) begin
+        held_tdata = tdata;
+        held_tkeep = tkeep;
+        held_tid   = tid;
+        held_tlast = tlast;
+      end
+      draw_stall(is_stalled);
+      is_accepting  = !is_stalled;
+      s_axis_tready = is_accepting;
+    end
+  endtask
+
+  // ------------------------------------------------------------------ errors
+
+  task watch_errors;
+    integer converter;
+    begin
+      if (id_pulse === 1'b1)
+        report_error(NO_CONVERTER);
+      else if (id_pulse !== 1'b0) begin
+        $write("firm_sim_pipe: id_error is '%c'", level(id_pulse));
+        fail_in_cycle;
+      end
+      if (frame_pulses !== {ERRORS{1'b0}})
+        for (converter = 0; converter < ERRORS; converter = converter + 1)
+          if (frame_pulses[converter] === 1'b1)
+            report_error(converter);
+          else if (frame_pulses[converter] !== 1'b0) begin
+            $write("firm_sim_pipe: frame_error(%0d) is '%c'", converter, level(frame_pulses[converter]));
+            fail_in_cycle;
+          end
+    end
+  endtask
+
+  // ------------------------------------------------------------------ cycles
+
+  task sample;
+    begin
+      tready       = m_axis_tready;
+      tdata        = s_axis_tdata;
+      tkeep        = s_axis_tkeep;
+      tid          = s_axis_tid;
+      tvalid       = s_axis_tvalid;
+      tlast        = s_axis_tlast;
+      id_pulse     = id_error;
+      frame_pulses = frame_error;
+    end
+  endtask
+
+  task run;
+    begin
+      read_number(cycles_left);
+      is_reported = 0;
+      while (cycles_left > 0 && !is_reported) begin
+        #HALF_PERIOD sample;
+        clk = 1;
+        #HALF_PERIOD clk = 0;
+        rst_n = 1;
+        if (quiet < MOST_QUIET)
+          quiet = quiet + 1;
+        send;
+        receive;
+        watch_errors;
+        cycle       = cycle + 1;
+        cycles_left = cycles_left - 1;
+      end
+      report_stand;
+    end
+  endtask
+
+  task check_options;
+    begin
+      seed          = SEED;
+      stall_percent = STALL_PERCENT;
+      if (!$value$plusargs("SEED=%d", seed))
+        seed = SEED;
+      if (!$value$plusargs("STALL_PERCENT=%d", stall_percent))
+        stall_percent = STALL_PERCENT;
+      if (WIDTH != 8 && WIDTH != 16 && WIDTH != 32 && WIDTH != 64 && WIDTH != 128 && WIDTH != 256 && WIDTH != 512)
+        $fatal(1, "firm_sim_pipe: WIDTH is %0d; legal: 8, 16, 32, 64, 128, 256, 512", WIDTH);
+      if (ERRORS < 1 || ERRORS >= NO_CONVERTER)
+        $fatal(1, "firm_sim_pipe: ERRORS is %0d; legal: 1 to 65534", ERRORS);
+      if (seed < 1 || seed > HIGHEST_SEED)
+        $fatal(1, "firm_sim_pipe: SEED is %0d; legal: 1 to 2147483562", seed);
+      if (stall_percent < 0 || stall_percent > 99)
+        $fatal(1, "firm_sim_pipe: STALL_PERCENT is %0d; legal: 0 to 99", stall_percent);
+    end
+  endtask
+
+  task open_pipes;
+    begin
+      requests = $fopen("/dev/fd/3", "rb");
+      if (requests == 0)
+        $fatal(1, "firm_sim_pipe: file descriptor 3 cannot be read; a program that sends frames starts this simulator");
+      reports = $fopen("/dev/fd/4", "wb");
+      if (reports == 0)
+        $fatal(1, "firm_sim_pipe: file descriptor 4 cannot be written; a program that sends frames starts this simulator");
+    end
+  endtask
+
+  task reset_state;
+    begin
+      cycle        = 0;
+      quiet        = 0;
+      random_1     = seed;
+      random_2     = 1;
+      sending      = 0;
+      bytes_sent   = 0;
+      is_offered   = 0;
+      is_accepting = 0;
+      is_held      = 0;
+    end
+  endtask
+
+  initial begin : host
+    check_options;
+    open_pipes;
+    reset_state;
+    clk           = 0;
+    rst_n         = 0;
+    s_axis_tready = 0;
+    offer_nothing;
+    repeat (RESET_CYCLES) begin
+      #HALF_PERIOD clk = 1;
+      #HALF_PERIOD clk = 0;
+    end
+    request = $fgetc(requests);
+    // The end of the requests is as good as Q.
+    while (request >= 0) begin
+      if (request == "F")
+        read_frame;
+      else if (request == "R")
+        run;
+      else if (request == "Q")
+        report_stand;
+      else begin
+        $display("firm_sim_pipe: there is no request %0d; legal: F, R, Q", request);
+        fail;
+      end
+      request = request == "Q" ? -1 : $fgetc(requests);
+    end
+    $finish;
+  end
+
+endmodule

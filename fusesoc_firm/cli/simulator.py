@@ -1,0 +1,77 @@
+"""`firm simulator`: the simulator of a system, built for another program that starts it."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.cli.common import add_sources, command
+
+
+def add_simulator(commands: Any) -> None:
+    """Declare the command."""
+    simulator = command(
+        commands,
+        "simulator",
+        "build the simulator of a system, and print the command that starts it (docs/transport.md)",
+        'robot_node --transport "pipe:$(firm simulator robot.yaml)"',
+        _build_simulator,
+    )
+    add_simulator_options(simulator)
+    simulator.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+
+
+def add_simulator_options(parser: argparse.ArgumentParser) -> None:
+    """The arguments of commands that simulate a system live; `built_simulator` reads them, with `spec`."""
+    parser.add_argument("--tool", choices=("ghdl", "verilator"), default="ghdl", help="default: %(default)s")
+    parser.add_argument("--build-root", type=Path, metavar="DIR", help="where to build (default: in the user's cache)")
+    parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="of all randomness (default: %(default)s)")
+    parser.add_argument(
+        "--stall-percent",
+        type=_percent,
+        default=0,
+        metavar="N",
+        help="cycles in which the host stalls a stream, 0 to 99 (default: %(default)s)",
+    )
+    add_sources(parser)
+    core = parser.add_argument_group("where no core beside the specification names it")
+    core.add_argument(
+        "--depend", metavar="VLNV", action="append", default=[], help="a core that accelerators need; may be repeated"
+    )
+    core.add_argument(
+        "--environment",
+        metavar="F",
+        type=Path,
+        action="append",
+        default=[],
+        help="VHDL of what is at the pins; may be repeated",
+    )
+
+
+def built_simulator(arguments: argparse.Namespace) -> Any:
+    """The `BuiltSimulator` that the arguments ask for."""
+    from fusesoc_firm.host.simulator import CoreSources, build_simulator
+
+    sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment)
+    return build_simulator(arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources)
+
+
+def _build_simulator(arguments: argparse.Namespace) -> None:
+    script = built_simulator(arguments).script(seed=arguments.seed, stall_percent=arguments.stall_percent)
+    print(shlex.quote(str(script)))
+
+
+def _seed(text: str) -> int:
+    return _within(1, 2147483562, text)
+
+
+def _percent(text: str) -> int:
+    return _within(0, 99, text)
+
+
+def _within(least: int, greatest: int, text: str) -> int:
+    if not text.isdecimal() or not least <= int(text) <= greatest:
+        raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} to {greatest}")
+    return int(text)
