@@ -22,9 +22,7 @@ def add_live(commands: Any) -> None:
         _live,
     )
     live.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
-    live.add_argument(
-        "--ros", type=int, choices=(1, 2), help="only topics of this version (default: all)"
-    )
+    live.add_argument("--ros", type=int, choices=(1, 2), help="only topics of this version (default: all)")
     live.add_argument(
         "--transport", metavar="ADDRESS", help="the way to the hardware (default: build a simulator, and start it)"
     )

@@ -27,7 +27,7 @@ from fusesoc_firm.host.node.software import NodeSoftware
 from fusesoc_firm.host.node.statistics import Statistics
 from fusesoc_firm.host.node.trace import Entry, Trace, converter_names
 from fusesoc_firm.host.queues import ClosedError, Overflow, SubscriberQueues
-from fusesoc_firm.host.transport.transport import Burst, Transport, TransportError
+from fusesoc_firm.host.transport.transport import Burst, Transport, TransportError, TransportResetError
 
 # How long one waits before it looks whether it is to end.
 _POLL_SECONDS = 0.1
@@ -261,6 +261,9 @@ class Node:
             hardware = self._hardware
             try:
                 burst = hardware.transport.receive(_POLL_SECONDS)
+            except TransportResetError as reset:
+                self._forget(hardware.transport, str(reset))
+                continue
             except TransportError as error:
                 if not self._begin_anew(hardware, error):
                     return
@@ -352,16 +355,20 @@ class Node:
             if not self._settings.restarts or self._failed_restarts > _MOST_RESTARTS:
                 self._fail(error)
                 return False
-            self._report(f"{error}; it is started anew, and what was in it is lost")
-            self.statistics.restarts += 1
-            if self._trace:
-                self._trace.forget()
             try:
-                self._hardware = _Hardware(self._open_transport(self), self._description)
+                self._forget(self._open_transport(self), str(error))
             except TransportError as failed:
                 self._fail(failed)
                 return False
             return True
+
+    def _forget(self, transport: Transport, why: str) -> None:
+        """Go on with hardware that begins at this moment."""
+        self._report(f"{why}; it is started anew, and what was in it is lost")
+        self.statistics.restarts += 1
+        if self._trace:
+            self._trace.forget()
+        self._hardware = _Hardware(transport, self._description)
 
 
 class _Reporter:

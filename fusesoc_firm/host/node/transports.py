@@ -8,11 +8,13 @@ from functools import partial
 
 from fusesoc_firm.host.node.node import HardwareListener, OpenTransport
 from fusesoc_firm.host.simulator import BuiltSimulator
-from fusesoc_firm.host.transport.simulator import ErrorPulse, Event, Simulator, SimulatorTransport, Taken
+from fusesoc_firm.host.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
 from fusesoc_firm.host.transport.transport import Transport, TransportError
 
 # A simulation at rest goes on now and then, for accelerators that send without being asked.
 _IDLE_SECONDS = 0.05
+# So long a system without a beat still works at something, as far as a simulation knows.
+_REST_CYCLES = 20_000
 
 
 def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -> OpenTransport:
@@ -38,7 +40,9 @@ def at_address(address: str) -> OpenTransport:
 
 
 def _simulator(start: Callable[[], Simulator], listener: HardwareListener) -> Transport:
-    return SimulatorTransport(start, idle_seconds=_IDLE_SECONDS, observe=partial(_tell, listener))
+    return SimulatorTransport(
+        start, Pace(rest_cycles=_REST_CYCLES, idle_seconds=_IDLE_SECONDS), partial(_tell, listener)
+    )
 
 
 def _tell(listener: HardwareListener, event: Event) -> None:
