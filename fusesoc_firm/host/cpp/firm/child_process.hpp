@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// A command in a child process, with a pipe to it and one from it at the file descriptors that it expects.
+//
+// Writing to a child that has died must be an error and not SIGPIPE, which ends the whole node: pipes have no flag for
+// that, so the signal is held back in the thread that writes.
+#pragma once
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <firm/transport.hpp>
+
+extern "C" char** environ;
+
+namespace firm {
+
+// An open file descriptor; negative is none.
+class Descriptor {
+ public:
+  explicit Descriptor(int number = -1) : number_(number) {}
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  Descriptor& operator=(Descriptor&& other) noexcept {
+    std::swap(number_, other.number_);
+    return *this;
+  }
+  ~Descriptor() { reset(); }
+  int get() const { return number_; }
+  void reset() {
+    if (number_ >= 0) ::close(std::exchange(number_, -1));
+  }
+
+ private:
+  int number_;
+};
+
+[[noreturn]] inline void fail_with_errno(const std::string& what) {
+  throw TransportError(what + ": " + std::strerror(errno));
+}
+
+// Keeps SIGPIPE from the thread for as long as it lives; write() gives EPIPE.
+class SigpipeHeld {
+ public:
+  SigpipeHeld() {
+    sigemptyset(&sigpipe_);
+    sigaddset(&sigpipe_, SIGPIPE);
+    ::pthread_sigmask(SIG_BLOCK, &sigpipe_, &before_);
+  }
+  ~SigpipeHeld() {
+    // One that waits was ours: it would be delivered now.
+    const timespec at_once{};
+    if (!sigismember(&before_, SIGPIPE)) {
+      while (::sigtimedwait(&sigpipe_, nullptr, &at_once) == SIGPIPE) {
+      }
+    }
+    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+  SigpipeHeld(const SigpipeHeld&) = delete;
+  SigpipeHeld& operator=(const SigpipeHeld&) = delete;
+
+ private:
+  sigset_t sigpipe_;
+  sigset_t before_;
+};
+
+class ChildProcess {
+ public:
+  // Run `command` by the shell, with what is written to it at descriptor `input` and what it writes at `output`. Throws
+  // TransportError.
+  ChildProcess(const std::string& command, int input, int output) {
+    auto [child_reads, we_write] = make_pipe();
+    auto [we_read, child_writes] = make_pipe();
+    posix_spawn_file_actions_t actions;
+    posix_spawnattr_t attributes;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawnattr_init(&attributes);
+    if (input != STDIN_FILENO) {
+      posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    }
+    posix_spawn_file_actions_adddup2(&actions, child_reads.get(), input);
+    posix_spawn_file_actions_adddup2(&actions, child_writes.get(), output);
+    // A group of its own: what the shell has started ends with it, and Ctrl-C is for us to handle.
+    posix_spawnattr_setpgroup(&attributes, 0);
+    sigset_t none;
+    sigemptyset(&none);
+    posix_spawnattr_setsigmask(&attributes, &none);
+    sigset_t usual;
+    sigemptyset(&usual);
+    sigaddset(&usual, SIGPIPE);
+    posix_spawnattr_setsigdefault(&attributes, &usual);
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    std::string shell = "sh", option = "-c", text = command;
+    char* arguments[] = {shell.data(), option.data(), text.data(), nullptr};
+    const int error = posix_spawn(&pid_, "/bin/sh", &actions, &attributes, arguments, environ);
+    posix_spawnattr_destroy(&attributes);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) throw TransportError("'" + command + "' cannot be started: " + std::strerror(error));
+    to_child_ = std::move(we_write);
+    from_child_ = std::move(we_read);
+  }
+
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+
+  ~ChildProcess() {
+    kill();
+    wait();
+  }
+
+  // Write all; false if the child reads no more. The caller holds SIGPIPE.
+  bool write(const std::uint8_t* bytes, std::size_t size) {
+    while (size > 0) {
+      const ssize_t written = ::write(to_child_.get(), bytes, size);
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0 && errno == EPIPE) return false;
+      if (written < 0) fail_with_errno("writing to the child process");
+      bytes += written;
+      size -= static_cast<std::size_t>(written);
+    }
+    return true;
+  }
+
+  // Read what is there, at least one byte; 0 at the end.
+  std::size_t read(std::uint8_t* bytes, std::size_t size) {
+    for (;;) {
+      const ssize_t found = ::read(from_child_.get(), bytes, size);
+      if (found >= 0) return static_cast<std::size_t>(found);
+      if (errno != EINTR) fail_with_errno("reading from the child process");
+    }
+  }
+
+  // What it reads is over.
+  void end_input() { to_child_.reset(); }
+
+  // End it and all that it has started; any thread.
+  void kill() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!has_ended_) ::kill(-pid_, SIGKILL);
+  }
+
+  // Wait until it has ended: how it did, such as "ended with status 3". One thread only.
+  std::string wait() {
+    siginfo_t information;
+    // It stays a zombie until nobody can kill it any more: its number may be another process' then.
+    while (!has_ended_ && ::waitid(P_PID, static_cast<id_t>(pid_), &information, WEXITED | WNOWAIT) < 0 &&
+           errno == EINTR) {
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!has_ended_) {
+      ::kill(-pid_, SIGKILL);  // what it has left behind
+      ::waitpid(pid_, &status_, 0);
+      has_ended_ = true;
+    }
+    if (WIFSIGNALED(status_)) return "was ended by signal " + std::to_string(WTERMSIG(status_));
+    // The shell's way to say that what it had started was ended by a signal.
+    constexpr int kSignals = 128;
+    const int status = WEXITSTATUS(status_);
+    const std::string signal = status > kSignals ? " (signal " + std::to_string(status - kSignals) + ")" : "";
+    return "ended with status " + std::to_string(status) + signal;
+  }
+
+  // The same, but after `patience` the child is killed.
+  std::string wait(std::chrono::nanoseconds patience) {
+    const auto end = std::chrono::steady_clock::now() + patience;
+    siginfo_t information{};
+    while (!has_ended_ && information.si_pid == 0) {
+      ::waitid(P_PID, static_cast<id_t>(pid_), &information, WEXITED | WNOWAIT | WNOHANG);
+      if (information.si_pid == 0 && std::chrono::steady_clock::now() >= end) {
+        kill();
+        wait();
+        return "was killed, as it did not end";
+      }
+      if (information.si_pid == 0) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return wait();
+  }
+
+ private:
+  // Numbers above those that a child expects, so that no dup2 closes what another one needs; closed on exec.
+  static Descriptor above(const Descriptor& low) {
+    constexpr int kLowest = 10;
+    const int high = ::fcntl(low.get(), F_DUPFD_CLOEXEC, kLowest);
+    if (high < 0) fail_with_errno("a pipe");
+    return Descriptor(high);
+  }
+
+  static std::pair<Descriptor, Descriptor> make_pipe() {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) fail_with_errno("a pipe");
+    const Descriptor reads(ends[0]), writes(ends[1]);
+    return {above(reads), above(writes)};
+  }
+
+  pid_t pid_ = 0;
+  int status_ = 0;
+  std::mutex mutex_;  // of what follows
+  bool has_ended_ = false;
+  Descriptor to_child_;
+  Descriptor from_child_;
+};
+
+}  // namespace firm
