@@ -18,6 +18,10 @@ class TransportError(Exception):
     """The hardware, or the way to it, is gone or does what it must not; the transport is of no more use."""
 
 
+class TransportResetError(TransportError):
+    """The hardware began anew, and the transport goes on: what was under way in either direction is lost."""
+
+
 @dataclass(frozen=True)
 class Burst:
     """The bytes of the system's stream up to a `tlast`, those that `tkeep` marks: a frame, or a part of one.
@@ -41,8 +45,11 @@ class Transport(Protocol):
     def receive(self, timeout: float | None = None) -> Burst | None:
         """The next burst; None if none came in `timeout` seconds (None: wait for ever), or when it is closed.
 
-        Raises `TransportError`.
+        Raises `TransportError`, and of that `TransportResetError` where frames that have begun are to be forgotten.
         """
+
+    def is_at_rest(self) -> bool | None:
+        """Whether all that was sent has had its effect, and all of that was received; None where no one can know."""
 
     def close(self) -> None:
         """Stop; what has been sent may be lost. A second call does nothing."""
