@@ -29,8 +29,8 @@ APPLICATIONS = ["quat2euler", "image_pipeline", "multi_type", "mobile_robot", "r
 SEED = 20240721
 
 # Two topics through which messages of any size go, with no accelerator between.
-LOOP = """\
-project: {name: loop, width: 64}
+ECHO = """\
+project: {name: echo, width: 64}
 blocks:
   - {name: empty_in, middleware: ROS, mode: subscriber, message: std_msgs/Empty, outgoing: [{name: empty_out}]}
   - {name: empty_out, middleware: ROS, mode: publisher, message: std_msgs/Empty}
@@ -50,18 +50,25 @@ class Workshop:
 
     def specification(self, name: str) -> Path:
         """That of an application, in this version of ROS, with all that lies beside it."""
-        copy = self.folder / "specs" / name
-        if not copy.exists():
-            if name == "loop":
-                copy.mkdir(parents=True)
-                (copy / "loop.yaml").write_text(LOOP, encoding="utf-8")
-            else:
-                shutil.copytree(SPECS / name, copy)
-            spec = copy / f"{name}.yaml"
-            if self.ros.version == 2:
-                text = spec.read_text(encoding="utf-8")
-                spec.write_text(re.sub(r"\bmiddleware: ROS\b", "middleware: ROS2", text), encoding="utf-8")
-        return copy / f"{name}.yaml"
+        if name == "echo":
+            return self._echo()
+        spec = self.folder / "specs" / name / f"{name}.yaml"
+        if not spec.parent.exists():
+            shutil.copytree(SPECS / name, spec.parent)
+            self._adapt(spec)
+        return spec
+
+    def _echo(self) -> Path:
+        spec = self.folder / "specs/echo/echo.yaml"
+        spec.parent.mkdir(parents=True, exist_ok=True)
+        spec.write_text(ECHO, encoding="utf-8")
+        self._adapt(spec)
+        return spec
+
+    def _adapt(self, spec: Path) -> None:
+        if self.ros.version == 2:
+            text = spec.read_text(encoding="utf-8")
+            spec.write_text(re.sub(r"\bmiddleware: ROS\b", "middleware: ROS2", text), encoding="utf-8")
 
     def package(self, name: str) -> Path:
         """The generated package."""
@@ -90,8 +97,8 @@ class Workshop:
         """A type as this version of ROS writes it."""
         return name if self.ros.version == 1 else name.replace("/", "/msg/")
 
-    def loop_peer(self) -> Peer:
-        """A peer that sends to both of the loop's topics and hears both."""
+    def echo_peer(self) -> Peer:
+        """A peer that sends to both of the echo's topics and hears both."""
         empty, image = self.message("std_msgs/Empty"), self.message("sensor_msgs/Image")
         return Peer(
             self.ros, {"/empty_out": empty, "/image_out": image}, {"/empty_in": empty, "/image_in": image}
@@ -185,7 +192,14 @@ def test_quaternions_come_back_as_angles(workshop: Workshop) -> None:
 
 
 def test_a_message_of_any_size_goes_through(workshop: Workshop) -> None:
-    with Node(workshop.ros, workshop.program("loop"), simulator()) as node, workshop.loop_peer() as peer:
+    """Through multi_type, with a topic of no bytes beside its three, and an image that is passed on as it comes."""
+    spec = workshop.specification("multi_type")
+    text = spec.read_text(encoding="utf-8").replace("width: 64", "width: 512")
+    text = re.sub(r",\s*buffer: 230500}", "}", text)
+    ros = "ROS" if workshop.ros.version == 1 else "ROS2"
+    spec.write_text(text + ECHO.partition("blocks:\n")[2].partition("  - {name: image")[0].replace("ROS", ros), "utf-8")
+    transport = live_simulator(workshop, spec)
+    with Node(workshop.ros, workshop.program("multi_type"), transport) as node, workshop.echo_peer() as peer:
         peer.wait_until_connected()
         empty = b"" if workshop.ros.version == 1 else b"\0\1\0\0\0"
         peer.publish("/empty_in", empty)
@@ -194,7 +208,7 @@ def test_a_message_of_any_size_goes_through(workshop: Workshop) -> None:
         for size in (0, 1, 2, 3, 255, 65_536, 6_220_800):
             image = workshop.image(size)
             peer.publish("/image_in", image)
-            topic, payload = peer.take()
+            topic, payload = peer.take(120)
             assert topic == "/image_out" and same(workshop, image, payload), size
         assert node.stop(signal.SIGTERM) == 0
 
@@ -203,8 +217,8 @@ def test_what_was_taken_is_published_before_the_end(workshop: Workshop) -> None:
     """The simulator needs a while for each frame, so most of them are under way when the signal comes."""
     transport = simulator("--latency", 4000)
     with (
-        Node(workshop.ros, workshop.program("loop"), transport, "--queue", "100") as node,
-        workshop.loop_peer() as peer,
+        Node(workshop.ros, workshop.program("echo"), transport, "--queue", "100") as node,
+        workshop.echo_peer() as peer,
     ):
         peer.wait_until_connected()
         for number in range(60):
@@ -224,9 +238,9 @@ def test_what_was_taken_is_published_before_the_end(workshop: Workshop) -> None:
 
 
 def test_a_peer_that_dies_and_comes_back_is_served_again(workshop: Workshop) -> None:
-    with Node(workshop.ros, workshop.program("loop"), simulator()) as node:
+    with Node(workshop.ros, workshop.program("echo"), simulator()) as node:
         for number in range(2):
-            with workshop.loop_peer() as peer:
+            with workshop.echo_peer() as peer:
                 peer.wait_until_connected()
                 image = workshop.image(1000, number)
                 peer.publish("/image_in", image)
@@ -239,18 +253,18 @@ def test_a_peer_that_dies_and_comes_back_is_served_again(workshop: Workshop) -> 
 
 def test_a_simulator_that_is_killed_in_mid_frame_ends_the_node(workshop: Workshop) -> None:
     transport = simulator("--fault", "cut", "--at", 1)
-    with Node(workshop.ros, workshop.program("loop"), transport) as node, workshop.loop_peer() as peer:
+    with Node(workshop.ros, workshop.program("echo"), transport) as node, workshop.echo_peer() as peer:
         peer.wait_until_connected()
         for number in range(2):
             peer.publish("/image_in", workshop.image(1000, number))
         assert node.wait() == 1
-        assert "loop_node: the simulator ended with status 4" in node.said()
+        assert "the simulator ended with status 4" in node.said()
 
 
 def test_a_simulator_that_is_killed_is_started_again_if_asked(workshop: Workshop) -> None:
     """Each one dies when it has taken its third frame, and every third answer is lost with it."""
     transport = simulator("--fault", "kill", "--at", 2)
-    with Node(workshop.ros, workshop.program("loop"), transport, "--restart") as node, workshop.loop_peer() as peer:
+    with Node(workshop.ros, workshop.program("echo"), transport, "--restart") as node, workshop.echo_peer() as peer:
         peer.wait_until_connected()
         for number in (0, 1, 3, 4, 6, 7):
             if number % 3 == 0 and number:
@@ -268,7 +282,7 @@ def test_topics_are_remapped_and_moved_by_ros(workshop: Workshop) -> None:
         arguments = ["--ros-args", *(word for argument in arguments for word in ("-r", argument))]
     image = workshop.message("sensor_msgs/Image")
     with (
-        Node(workshop.ros, workshop.program("loop"), simulator(), *arguments) as node,
+        Node(workshop.ros, workshop.program("echo"), simulator(), *arguments) as node,
         Peer(workshop.ros, {"/robot/image_out": image}, {"/camera": image}) as peer,
     ):
         peer.wait_until_connected()
@@ -285,7 +299,7 @@ def run(workshop: Workshop, program: Path, *arguments: str) -> subprocess.Comple
 
 
 def test_help_names_every_option_and_topic(workshop: Workshop) -> None:
-    done = run(workshop, workshop.program("loop"), "--help")
+    done = run(workshop, workshop.program("echo"), "--help")
     assert done.returncode == 0 and not done.stderr
     for word in ("--transport", "--queue", "--restart", "--trace", "empty_in", "image_out", "exit status"):
         assert word in done.stdout
@@ -304,15 +318,15 @@ def test_help_names_every_option_and_topic(workshop: Workshop) -> None:
     ],
 )
 def test_a_wrong_command_line_is_told(workshop: Workshop, arguments: list[str], message: str) -> None:
-    done = run(workshop, workshop.program("loop"), *arguments)
+    done = run(workshop, workshop.program("echo"), *arguments)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == f"loop_node: {message}; --help says more\n"
+    assert done.stderr == f"echo_node: {message}; --help says more\n"
 
 
 def test_an_address_that_is_none_ends_the_node(workshop: Workshop) -> None:
-    done = run(workshop, workshop.program("loop"), "--transport", "carrier:pigeon")
+    done = run(workshop, workshop.program("echo"), "--transport", "carrier:pigeon")
     assert done.returncode == 1
-    assert "loop_node: the transport is 'carrier:pigeon'; legal: pipe:COMMAND" in done.stderr
+    assert "the transport is 'carrier:pigeon'; legal: pipe:COMMAND" in done.stderr
 
 
 def test_a_node_waits_for_its_master(workshop: Workshop) -> None:
@@ -320,7 +334,7 @@ def test_a_node_waits_for_its_master(workshop: Workshop) -> None:
         pytest.skip("ROS 2 has no master")
     environment = {**workshop.ros.environment, "ROS_MASTER_URI": "http://127.0.0.1:9"}
     lonely = Ros(1, workshop.ros.python, (), (), environment)
-    with Node(lonely, workshop.program("loop"), simulator()) as node:
+    with Node(lonely, workshop.program("echo"), simulator()) as node:
         deadline = time.monotonic() + 20
         while "waiting for a master at http://127.0.0.1:9" not in node.said():
             assert time.monotonic() < deadline
@@ -333,19 +347,19 @@ def test_a_message_that_is_not_installed_is_named(workshop: Workshop) -> None:
         pytest.skip("ROS 1 needs no installed message")
     done = run(workshop, workshop.program("robotic_arm"), "--transport", simulator())
     assert done.returncode == 1
-    assert "the message robotic_arm/msg/ArmState of state is not installed" in done.stderr
+    assert "the message robotic_arm/msg/ArmPoses of poses is not installed" in done.stderr
 
 
 def test_a_message_that_is_installed_with_another_definition_is_refused(workshop: Workshop) -> None:
     if workshop.ros.version == 1:
         pytest.skip("in ROS 1 the peers compare the MD5 sums")
     package = workshop.folder / "other"
-    shutil.copytree(workshop.package("loop"), package)
-    source = package / "src/loop_node.cpp"
+    shutil.copytree(workshop.package("echo"), package)
+    source = package / "src/echo_node.cpp"
     text = source.read_text(encoding="utf-8")
     source.write_text(re.sub(r"RIHS01_\w{4}", "RIHS01_beef", text), encoding="utf-8")
     program = workshop.folder / "other_node"
-    workshop.program("loop")
+    workshop.program("echo")
     workshop.ros.compile(package, program, workshop.header)
     done = run(workshop, program, "--transport", simulator())
     assert done.returncode == 1

@@ -189,7 +189,6 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   ros.unsubscribe();
   const int status = running.stop();
   ros.flush();
-  if (status != 0) std::cerr << system.name << "_node: " << node.error() << std::endl;
   const NodeStatistics counted = node.statistics();
   std::cerr << system.name << "_node: " << counted.received << " received, " << counted.dropped << " dropped, "
             << counted.sent << " sent, " << counted.published << " published, " << counted.errors << " errors, "
