@@ -16,14 +16,21 @@ if TYPE_CHECKING:
     from fusesoc_firm.system.generator import LoadedSystem
 
 
-def _cpp_package(loaded: LoadedSystem, ros: RosVersion | None) -> Mapping[str, str]:
+def _cpp_package(loaded: LoadedSystem, ros: RosVersion | None, _: argparse.Namespace) -> Mapping[str, str]:
     from fusesoc_firm.host.node_package import cpp_package
 
     return cpp_package(loaded, ros)
 
 
+def _python_node(loaded: LoadedSystem, ros: RosVersion | None, arguments: argparse.Namespace) -> Mapping[str, str]:
+    from fusesoc_firm.host.node.source import python_node
+
+    return python_node(loaded, ros, arguments.spec, arguments.output, arguments.path)
+
+
+_Writer = Callable[["LoadedSystem", "RosVersion | None", argparse.Namespace], Mapping[str, str]]
 # What nodes are written in: the files of one, by path within its folder.
-_NODE_LANGUAGES: Mapping[str, Callable[[LoadedSystem, RosVersion | None], Mapping[str, str]]] = {"cpp": _cpp_package}
+_NODE_LANGUAGES: Mapping[str, _Writer] = {"cpp": _cpp_package, "python": _python_node}
 
 
 def add_system(commands: Any) -> None:
@@ -193,8 +200,9 @@ def _write_node(arguments: argparse.Namespace) -> None:
 
     loaded = load(arguments, needs_sources=False)
     ros = RosVersion(arguments.ros) if arguments.ros else None
-    files = _NODE_LANGUAGES[arguments.language](loaded, ros)
     folder: Path = arguments.output or Path(f"{loaded.system.name}_node")
+    arguments.output = folder
+    files = _NODE_LANGUAGES[arguments.language](loaded, ros, arguments)
     for path, text in files.items():
         write(folder / path, text)
     print(folder)

@@ -339,9 +339,9 @@ _VERSIONS = {1: Ros1, 2: Ros2}
 def _message_class(name: str) -> Any:
     import importlib
 
-    package, _, message = name.partition("/msg/")
+    package, kind, message = name.split("/")
     try:
-        return getattr(importlib.import_module(package + ".msg"), message)
+        return getattr(importlib.import_module(f"{package}.{kind}"), message)
     except (ImportError, AttributeError):
         raise BridgeError(
             f"the message '{name}' is not installed for {sys.executable}; ROS 2 needs its package built, and sourced"

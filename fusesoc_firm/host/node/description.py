@@ -10,16 +10,13 @@ from dataclasses import dataclass
 
 from fusesoc_firm.diagnostics import Diagnostics, fail
 from fusesoc_firm.host.software import sent_elsewhere, taken_elsewhere, way_to
-from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.message.printer import to_text
-from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.printer import closure_text
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import Converter, Topic
 from fusesoc_firm.system.generator import LoadedSystem
 from fusesoc_firm.system.timing import clock_frequency
-
-# Between a definition and those of the messages within it, as ROS 1 announces them.
-_SEPARATOR = "=" * 80
 
 
 @dataclass(frozen=True)
@@ -140,15 +137,9 @@ def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
     return NodeTopic(
         topic.block,
         topic.given_name or identifier(topic.block),
-        str(name) if is_first else f"{name.package}/msg/{name.name}",
+        str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
         int(frame.ros),
         signature(name, definitions),
         topic.id if isinstance(topic, Converter) else None,
-        announced(name, definitions) if is_first else "",
+        closure_text(name, definitions) if is_first else "",
     )
-
-
-def announced(name: MessageName, definitions: Definitions) -> str:
-    """A definition with those of all messages within it, in one text: what ROS 1 calls its full text."""
-    others = [f"{_SEPARATOR}\nMSG: {other}\n{to_text(definitions[other])}" for other in definitions if other != name]
-    return "\n".join([to_text(definitions[name]), *others])
