@@ -9,7 +9,7 @@ def number(value: int, size: int) -> bytes:
 
 def main() -> None:
     cycle = 0
-    with open(3, "rb") as requests, open(4, "wb") as reports:  # noqa: PTH123 - descriptors have no path
+    with open(3, "rb") as requests, open(4, "wb") as reports:
         while (letter := requests.read(1)) not in (b"", b"Q"):
             size = int.from_bytes(requests.read(4), "little")
             if letter == b"R":

@@ -101,9 +101,7 @@ class Workshop:
     def echo_peer(self) -> Peer:
         """A peer that sends to both of the echo's topics and hears both."""
         empty, image = self.message("std_msgs/Empty"), self.message("sensor_msgs/Image")
-        return Peer(
-            self.ros, {"/empty_out": empty, "/image_out": image}, {"/empty_in": empty, "/image_in": image}
-        )
+        return Peer(self.ros, {"/empty_out": empty, "/image_out": image}, {"/empty_in": empty, "/image_in": image})
 
     def image(self, size: int, number: int = 0) -> bytes:
         """The payload of an image with so many bytes of noise, whose height is a number to know it by."""
@@ -141,11 +139,15 @@ def live_simulator(workshop: Workshop, spec: Path, tool: str = "ghdl") -> str:
     return f"pipe:exec {built.script()}"
 
 
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"cpp_nodes_{version}")) for version in (1, 2)],
-    ids=["ros1", "ros2"],
+ROS1, ROS2 = (
+    pytest.param(version, marks=pytest.mark.xdist_group(f"cpp_nodes_{version}"), id=f"ros{version}")
+    for version in (1, 2)
 )
+only_ros1 = pytest.mark.parametrize("workshop", [ROS1], indirect=True)
+only_ros2 = pytest.mark.parametrize("workshop", [ROS2], indirect=True)
+
+
+@pytest.fixture(scope="module", params=[ROS1, ROS2])
 def workshop(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
     folder = tmp_path_factory.mktemp(f"ros{request.param}")
     if reason := missing_ros1() if request.param == 1 else missing_ros2():
@@ -202,10 +204,9 @@ def test_a_message_of_any_size_goes_through(workshop: Workshop) -> None:
         assert node.stop(signal.SIGTERM) == 0
 
 
+@only_ros1
 def test_an_image_of_six_megabytes_goes_through_hardware(workshop: Workshop) -> None:
     """Through multi_type, where it is passed on as it comes, beside a topic of no bytes that goes straight through."""
-    if workshop.ros.version == 2:
-        pytest.skip("the same hardware and engine, and the test above for this ROS")
     spec = workshop.specification("multi_type")
     text = re.sub(r",\s*buffer: 230500}", "}", spec.read_text(encoding="utf-8"))
     spec.write_text(text + ECHO.partition("blocks:\n")[2].partition("  - {name: image")[0], encoding="utf-8")
@@ -317,7 +318,7 @@ def run(workshop: Workshop, program: Path, *arguments: str) -> subprocess.Comple
 def test_help_names_every_option_and_topic(workshop: Workshop) -> None:
     done = run(workshop, workshop.program("echo"), "--help")
     assert done.returncode == 0 and not done.stderr
-    for word in ("--transport", "--depth", "--overflow", "--drain", "--restart", "--trace", "empty_in", "image_out", "exit status"):
+    for word in "--transport --depth --overflow --drain --restart --trace empty_in image_out status".split():
         assert word in done.stdout
     assert ("--qos" in done.stdout) == (workshop.ros.version == 2)
 
@@ -346,9 +347,8 @@ def test_an_address_that_is_none_ends_the_node(workshop: Workshop) -> None:
     assert "the transport is 'carrier:pigeon'; legal: pipe:COMMAND, uart:" in done.stderr
 
 
+@only_ros1
 def test_a_node_waits_for_its_master(workshop: Workshop) -> None:
-    if workshop.ros.version == 2:
-        pytest.skip("ROS 2 has no master")
     environment = {**workshop.ros.environment, "ROS_MASTER_URI": "http://127.0.0.1:9"}
     lonely = Ros(1, workshop.ros.python, (), (), environment)
     with Node(lonely, workshop.program("echo"), simulator()) as node:
@@ -359,17 +359,15 @@ def test_a_node_waits_for_its_master(workshop: Workshop) -> None:
         assert node.stop() == 0
 
 
+@only_ros2
 def test_a_message_that_is_not_installed_is_named(workshop: Workshop) -> None:
-    if workshop.ros.version == 1:
-        pytest.skip("ROS 1 needs no installed message")
     done = run(workshop, workshop.program("robotic_arm"), "--transport", simulator())
     assert done.returncode == 1
     assert "the message robotic_arm/msg/ArmPoses of poses is not installed" in done.stderr
 
 
+@only_ros2
 def test_a_message_that_is_installed_with_another_definition_is_refused(workshop: Workshop) -> None:
-    if workshop.ros.version == 1:
-        pytest.skip("in ROS 1 the peers compare the MD5 sums")
     package = workshop.folder / "other"
     shutil.copytree(workshop.package("echo"), package)
     source = package / "src/echo_node.cpp"
