@@ -119,5 +119,6 @@ class Ros2Peer:
 
 
 if __name__ == "__main__":
-    peer: type[Ros1Peer] | type[Ros2Peer] = {"1": Ros1Peer, "2": Ros2Peer}[sys.argv[1]]
-    peer(json.loads(sys.argv[2]), json.loads(sys.argv[3])).run()
+    topics = json.loads(sys.argv[2]), json.loads(sys.argv[3])
+    peer: Ros1Peer | Ros2Peer = Ros1Peer(*topics) if sys.argv[1] == "1" else Ros2Peer(*topics)
+    peer.run()
