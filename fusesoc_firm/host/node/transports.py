@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
 from functools import partial
 
@@ -34,7 +33,7 @@ def at_address(address: str) -> OpenTransport:
         kind, _, rest = address.partition(":")
         if kind != "pipe" or not rest:
             raise TransportError(f"the transport is '{address}'; legal: pipe:COMMAND")
-        return _simulator(lambda: Simulator(shlex.split(rest)), listener)
+        return _simulator(lambda: Simulator(["/bin/sh", "-c", rest]), listener)
 
     return opened
 
