@@ -62,7 +62,7 @@ class LiveNode:
         """All that it has printed."""
         return self._path.read_text(encoding="utf-8", errors="replace")
 
-    def wait_until_ready(self, seconds: float = 120.0) -> None:
+    def wait_until_ready(self, seconds: float = 300.0) -> None:
         """Wait until it is a node of ROS, its simulator being built."""
         self.wait_until_said(" is a node of ROS ", seconds)
 
