@@ -1,25 +1,23 @@
-"""The software node of a system: a package of its middleware that carries messages between topics and the hardware.
+"""The software node of a system in C++: a package of ROS that carries messages between topics and the hardware.
 
-It is a table of the system's topics in C++, beside the headers that do the work (`host/cpp`), so that it is built where
-nothing but the middleware is installed, on the robot's own computer as here.
+It is a table of the system's topics beside the headers that do the work (`host/cpp`), so that it is built where nothing
+but ROS is installed: on the robot's own computer as here.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.generation import GeneratedFile
-from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.message.printer import closure_text
+from fusesoc_firm.host.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
-from fusesoc_firm.system.derived import Converter, DerivedSystem, Topic
 from fusesoc_firm.system.generator import LoadedSystem
 
 HEADERS = Path(__file__).resolve().parent / "cpp"
@@ -33,8 +31,8 @@ _PACKAGE_TEMPLATE = "node/package.xml"
 class _Dialect:
     """How the package of a version of ROS is written.
 
-    `header` and `middleware` are the carrier of bytes in C++; `build_tool`, `library` and `cmake` build it. Only ROS 1
-    tells who connects the text of a message's definition; only ROS 2 asks an installed package for a message's type.
+    `header` and `middleware` are the carrier of bytes in C++; `build_tool`, `library` and `cmake` build it. Only ROS 2
+    asks an installed package for a message's type.
     """
 
     header: str
@@ -43,12 +41,12 @@ class _Dialect:
     build_tool: str
     library: str
     cmake: str
-    has_definitions: bool
+    needs_messages: bool
 
 
 _DIALECTS = {
-    RosVersion.ROS1: _Dialect("ros1.hpp", "Ros1", "MD5 sum", "catkin", "roscpp", "node/catkin.cmake", True),
-    RosVersion.ROS2: _Dialect("ros2.hpp", "Ros2", "hash", "ament_cmake", "rcl", "node/ament.cmake", False),
+    1: _Dialect("ros1.hpp", "Ros1", "MD5 sum", "catkin", "roscpp", "node/catkin.cmake", needs_messages=False),
+    2: _Dialect("ros2.hpp", "Ros2", "hash", "ament_cmake", "rcl", "node/ament.cmake", needs_messages=True),
 }
 
 
@@ -57,56 +55,62 @@ def headers() -> list[Path]:
     return sorted(HEADERS.rglob("*.hpp"))
 
 
-def spoken(system: DerivedSystem) -> set[RosVersion]:
-    """The middlewares of a system's topics."""
-    return {topic.frame.ros for topic in _topics(system)}
-
-
 def cpp_package(loaded: LoadedSystem, ros: RosVersion | None = None) -> dict[str, str]:
     """The files of the node in C++, by path within the package.
 
-    Raises `InputError` if the system's topics are not those of one version of ROS, or not of `ros` where it is given.
+    Raises `InputError` if the system's topics are not those of one version of ROS, or not of `ros` where it is given,
+    and for software of the system on the host.
     """
-    system = loaded.system
-    dialect = _DIALECTS[_only(system, ros)]
-    package = f"{system.name}_node"
-    messages = {topic.frame.message: topic.frame.ros for topic in _topics(system)}
+    description = describe(loaded)
+    version = _only_version(description, ros)
+    _check_hardware(description)
+    dialect = _DIALECTS[version]
+    package = f"{description.name}_node"
+    packages = {topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)}
     build = {
         "package": package,
-        "name": system.name,
+        "name": description.name,
         "build_tool": dialect.build_tool,
         "library": dialect.library,
-        "message_packages": [] if dialect.has_definitions else sorted({message.package for message in messages}),
-        "has_build_type": not dialect.has_definitions,
+        "message_packages": sorted(packages) if dialect.needs_messages else [],
+        "has_build_type": dialect.needs_messages,
     }
     return {
         "package.xml": render(_PACKAGE_TEMPLATE, build),
         "CMakeLists.txt": render(dialect.cmake, {"package": package}),
-        f"src/{package}.cpp": render(_SOURCE_TEMPLATE, _source(loaded, dialect)),
+        f"src/{package}.cpp": render(_SOURCE_TEMPLATE, _source(description, RosVersion(version), dialect)),
         **_headers(dialect),
     }
 
 
 def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
-    """The node as a part of the generated system; nothing for a system that no one node can serve."""
-    if len(spoken(loaded.system)) != 1 or not spoken(loaded.system) <= {*_DIALECTS}:
+    """The node as a part of the generated system; nothing for a system that no one node in C++ can serve."""
+    spoken = {item.frame.ros for item in (*loaded.system.subscribers, *loaded.system.publishers)}
+    if len(spoken) != 1 or not spoken <= {*_DIALECTS} or loaded.system.software.blocks:
         return {}
     return {f"node/{path}": GeneratedFile(text, "user") for path, text in cpp_package(loaded).items()}
 
 
-def _only(system: DerivedSystem, ros: RosVersion | None) -> RosVersion:
+def _only_version(description: NodeDescription, ros: RosVersion | None) -> int:
     """The version of ROS that all topics have. Raises `InputError`."""
-    found = sorted(spoken(system))
+    found = description.versions
     if len(found) > 1:
-        titles = " and ".join(item.title for item in found)
-        fail(f"the topics of {system.name} are of {titles}, but a node speaks one of them")
-    if found[0] not in _DIALECTS:
-        fail(f"the topics of {system.name} are of {found[0].title}; nodes are for ROS 1 and ROS 2")
-    if ros not in (None, found[0]):
-        assert ros is not None
-        hint = "the hardware is made for one wire format; 'middleware' in the specification says which"
-        fail(f"the topics of {system.name} are of {found[0].title}, not of {ros.title}", hint=hint)
+        titles = " and ".join(RosVersion(version).title for version in found)
+        fail(f"the topics of '{description.name}' are of {titles}, but a node in C++ speaks one of them")
+    if ros is not None and ros != found[0]:
+        hint = "the hardware is made for the bytes of one version: 'middleware' of blocks and interfaces says which"
+        fail(f"the topics of '{description.name}' are of {RosVersion(found[0]).title}, not of {ros.title}", hint=hint)
     return found[0]
+
+
+def _check_hardware(description: NodeDescription) -> None:
+    """Raise `InputError` for software of the system on the host."""
+    topics = (*description.subscribers, *description.publishers)
+    if description.entering or description.leaving or any(topic.id is None for topic in topics):
+        fail(
+            f"'{description.name}' has accelerators in software, which a node in C++ does not run",
+            hint="a node in Python does",
+        )
 
 
 def _headers(dialect: _Dialect) -> dict[str, str]:
@@ -119,49 +123,33 @@ def _headers(dialect: _Dialect) -> dict[str, str]:
     }
 
 
-def _source(loaded: LoadedSystem, dialect: _Dialect) -> dict[str, Any]:
+def _source(description: NodeDescription, ros: RosVersion, dialect: _Dialect) -> dict[str, Any]:
     """The table."""
-    system = loaded.system
     return {
-        "name": system.name,
-        "ros": next(iter(spoken(system))).title,
+        "name": description.name,
+        "ros": ros.title,
         "header": dialect.header,
         "middleware": dialect.middleware,
         "signature": dialect.signature,
-        "width": system.width,
+        "width": description.width,
         "queue_depth": _QUEUE_DEPTH,
-        "subscriber_count": len(system.subscribers),
-        "publisher_count": len(system.publishers),
-        "definitions": [*_definitions(loaded)] if dialect.has_definitions else [],
-        "subscribers": [_topic(item, loaded, dialect) for item in _in_hardware(system.subscribers)],
-        "publishers": [_topic(item, loaded, dialect) for item in _in_hardware(system.publishers)],
+        "definitions": [*_definitions(description)],
+        "subscribers": [_row(topic) for topic in description.subscribers],
+        "publishers": [_row(topic) for topic in description.publishers],
     }
 
 
-def _topics(system: DerivedSystem) -> list[Topic]:
-    """All topics between the hardware and others."""
-    return [*_in_hardware(system.subscribers), *_in_hardware(system.publishers)]
+def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
+    """The text of each message's definition once; ROS 2 needs none."""
+    texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
+    for name, text in texts.items():
+        if text:
+            yield {"message": name, "constant": _constant(name), "text": text, "delimiter": _delimiter(text)}
 
 
-def _in_hardware(converters: tuple[Converter, ...]) -> list[Converter]:
-    """Those whose messages have a topic: not those between the hardware and its own software."""
-    return [item for item in converters if item.software is None]
-
-
-def _definitions(loaded: LoadedSystem) -> Iterator[dict[str, Any]]:
-    for message, ros in dict.fromkeys((item.frame.message, item.frame.ros) for item in _topics(loaded.system)):
-        text = closure_text(message, loaded.libraries[ros].closure(message))
-        yield {
-            "message": str(message),
-            "constant": _constant(message),
-            "text": text,
-            "delimiter": _delimiter(text),
-        }
-
-
-def _constant(message: MessageName) -> str:
+def _constant(message: str) -> str:
     """The name of a definition's text: `kGeometryMsgsQuaternion`."""
-    words = re.split("_+", identifier(message.package, message.name))
+    words = re.split("_+", identifier(message))
     return "k" + "".join(f"{word[0].upper()}{word[1:]}" for word in words)
 
 
@@ -173,16 +161,11 @@ def _delimiter(text: str) -> str:
     return delimiter
 
 
-def _topic(converter: Converter, loaded: LoadedSystem, dialect: _Dialect) -> Mapping[str, Any]:
-    frame = converter.frame
-    definitions = loaded.libraries[frame.ros].closure(frame.message)
-    kind = definitions[frame.message].kind
-    message = frame.message
+def _row(topic: NodeTopic) -> dict[str, Any]:
     return {
-        "id": converter.id,
-        # A relative name moves with the node's namespace.
-        "topic": converter.given_name or identifier(converter.block),
-        "type": str(message) if dialect.has_definitions else f"{message.package}/{kind}/{message.name}",
-        "signature": middleware_of(frame.ros).signature(message, definitions),
-        "definition": {"constant": _constant(message)} if dialect.has_definitions else None,
+        "id": topic.id,
+        "topic": topic.name,
+        "type": topic.type,
+        "signature": topic.signature,
+        "definition": {"constant": _constant(topic.type)} if topic.definition else None,
     }

@@ -195,7 +195,8 @@ class Peer:
     """A node of rospy or rclpy that publishes payloads and takes some (payload_peer.py)."""
 
     def __init__(self, ros: Ros, subscribed: Mapping[str, str], published: Mapping[str, str]) -> None:
-        command = [ros.python, str(HERE / "payload_peer.py"), str(ros.version), *map(json.dumps, (subscribed, published))]
+        topics = map(json.dumps, (subscribed, published))
+        command = [ros.python, str(HERE / "payload_peer.py"), str(ros.version), *topics]
         self._process = subprocess.Popen(
             command, env=ros.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )

@@ -3,8 +3,8 @@
     python payload_peer.py 1|2 '{"topic": "package/Type", ...}' '{"topic": "package/Type", ...}'
 
 The first topics are subscribed to, the others published. A line `{"topic": ..., "payload": base64}` on its input is
-parsed by the message's own class and published; a line like it on its output is what a message that came is serialised to
-by that class. Between are lines `{"connected": true}`, when every topic has found somebody. It needs nothing but ROS.
+parsed by the message's own class and published; one like it on its output is a message that came, as that class
+serialises it. The first line on its output says that every topic has found somebody. It needs nothing but ROS.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import json
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
 _output = threading.Lock()
@@ -30,7 +31,7 @@ def say_message(topic: str, payload: bytes) -> None:
     say({"topic": topic, "payload": base64.b64encode(payload).decode()})
 
 
-def commands() -> Any:
+def commands() -> Iterator[tuple[str, bytes]]:
     """The messages to publish, until the input ends."""
     for line in sys.stdin:
         command = json.loads(line)
@@ -87,12 +88,12 @@ class Ros2Peer:
         self.subscribed = list(subscribed)
         self.publishers = {topic: self.node.create_publisher(self.types[topic], topic, 1000) for topic in published}
         for topic in subscribed:
-            self.node.create_subscription(self.types[topic], topic, lambda message, t=topic: self.take(message, t), 1000)
+            self.node.create_subscription(self.types[topic], topic, self.taker(topic), 1000)
 
-    def take(self, message: Any, topic: str) -> None:
+    def taker(self, topic: str) -> Callable[[Any], None]:
         from rclpy.serialization import serialize_message
 
-        say_message(topic, serialize_message(message))
+        return lambda message: say_message(topic, serialize_message(message))
 
     def is_connected(self) -> bool:
         return all(publisher.get_subscription_count() for publisher in self.publishers.values()) and all(
@@ -118,5 +119,6 @@ class Ros2Peer:
 
 
 if __name__ == "__main__":
-    peer = {"1": Ros1Peer, "2": Ros2Peer}[sys.argv[1]]
-    peer(json.loads(sys.argv[2]), json.loads(sys.argv[3])).run()
+    topics = json.loads(sys.argv[2]), json.loads(sys.argv[3])
+    peer: Ros1Peer | Ros2Peer = Ros1Peer(*topics) if sys.argv[1] == "1" else Ros2Peer(*topics)
+    peer.run()

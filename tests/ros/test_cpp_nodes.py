@@ -24,6 +24,7 @@ from tests.ros.cpp_nodes import Node, Peer, Ros, missing_ros1, missing_ros2, ros
 
 REPOSITORY = Path(__file__).parents[2]
 SPECS = REPOSITORY / "specs"
+ECHO_SIMULATOR = f"pipe:exec {sys.executable} {Path(__file__).with_name('echo_simulator.py')}"
 MODEL_SIMULATOR = REPOSITORY / "tests/unit/host/model_simulator.py"
 APPLICATIONS = ["quat2euler", "image_pipeline", "multi_type", "mobile_robot", "robotic_arm", "sobel"]
 SEED = 20240721
@@ -100,9 +101,7 @@ class Workshop:
     def echo_peer(self) -> Peer:
         """A peer that sends to both of the echo's topics and hears both."""
         empty, image = self.message("std_msgs/Empty"), self.message("sensor_msgs/Image")
-        return Peer(
-            self.ros, {"/empty_out": empty, "/image_out": image}, {"/empty_in": empty, "/image_in": image}
-        )
+        return Peer(self.ros, {"/empty_out": empty, "/image_out": image}, {"/empty_in": empty, "/image_in": image})
 
     def image(self, size: int, number: int = 0) -> bytes:
         """The payload of an image with so many bytes of noise, whose height is a number to know it by."""
@@ -134,17 +133,21 @@ def simulator(*arguments: object) -> str:
     )
 
 
-def live_simulator(workshop: Workshop, spec: Path) -> str:
-    """The transport to a system that GHDL simulates."""
-    built = build_simulator(spec, build_root=workshop.folder / "simulators")
+def live_simulator(workshop: Workshop, spec: Path, tool: str = "ghdl") -> str:
+    """The transport to a simulated system."""
+    built = build_simulator(spec, tool, build_root=workshop.folder / "simulators")
     return f"pipe:exec {built.script()}"
 
 
-@pytest.fixture(
-    scope="module",
-    params=[pytest.param(version, marks=pytest.mark.xdist_group(f"cpp_nodes_{version}")) for version in (1, 2)],
-    ids=["ros1", "ros2"],
+ROS1, ROS2 = (
+    pytest.param(version, marks=pytest.mark.xdist_group(f"cpp_nodes_{version}"), id=f"ros{version}")
+    for version in (1, 2)
 )
+only_ros1 = pytest.mark.parametrize("workshop", [ROS1], indirect=True)
+only_ros2 = pytest.mark.parametrize("workshop", [ROS2], indirect=True)
+
+
+@pytest.fixture(scope="module", params=[ROS1, ROS2])
 def workshop(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
     folder = tmp_path_factory.mktemp(f"ros{request.param}")
     if reason := missing_ros1() if request.param == 1 else missing_ros2():
@@ -191,33 +194,47 @@ def test_quaternions_come_back_as_angles(workshop: Workshop) -> None:
     assert {steps.count(step) for step in ("received", "queued", "sent", "taken", "burst", "published")} == {20}
 
 
+SIZES = (0, 1, 2, 3, 255, 65_536, 6_220_800)
+
+
 def test_a_message_of_any_size_goes_through(workshop: Workshop) -> None:
-    """Through multi_type, with a topic of no bytes beside its three, and an image that is passed on as it comes."""
+    with Node(workshop.ros, workshop.program("echo"), ECHO_SIMULATOR) as node, workshop.echo_peer() as peer:
+        peer.wait_until_connected()
+        send_all_sizes(workshop, peer)
+        assert node.stop(signal.SIGTERM) == 0
+
+
+@only_ros1
+def test_an_image_of_six_megabytes_goes_through_hardware(workshop: Workshop) -> None:
+    """Through multi_type, where it is passed on as it comes, beside a topic of no bytes that goes straight through."""
     spec = workshop.specification("multi_type")
-    text = spec.read_text(encoding="utf-8").replace("width: 64", "width: 512")
-    text = re.sub(r",\s*buffer: 230500}", "}", text)
-    ros = "ROS" if workshop.ros.version == 1 else "ROS2"
-    spec.write_text(text + ECHO.partition("blocks:\n")[2].partition("  - {name: image")[0].replace("ROS", ros), "utf-8")
-    transport = live_simulator(workshop, spec)
+    text = re.sub(r",\s*buffer: 230500}", "}", spec.read_text(encoding="utf-8"))
+    spec.write_text(text + ECHO.partition("blocks:\n")[2].partition("  - {name: image")[0], encoding="utf-8")
+    transport = live_simulator(workshop, spec, "verilator")
     with Node(workshop.ros, workshop.program("multi_type"), transport) as node, workshop.echo_peer() as peer:
         peer.wait_until_connected()
-        empty = b"" if workshop.ros.version == 1 else b"\0\1\0\0\0"
-        peer.publish("/empty_in", empty)
-        topic, payload = peer.take()
-        assert topic == "/empty_out" and payload[: len(empty)] == empty
-        for size in (0, 1, 2, 3, 255, 65_536, 6_220_800):
-            image = workshop.image(size)
-            peer.publish("/image_in", image)
-            topic, payload = peer.take(120)
-            assert topic == "/image_out" and same(workshop, image, payload), size
-        assert node.stop(signal.SIGTERM) == 0
+        send_all_sizes(workshop, peer)
+        assert node.stop() == 0
+
+
+def send_all_sizes(workshop: Workshop, peer: Peer) -> None:
+    """A message without a byte, and images of growing size, each of which comes back."""
+    empty = b"" if workshop.ros.version == 1 else b"\0\1\0\0\0"
+    peer.publish("/empty_in", empty)
+    topic, payload = peer.take()
+    assert topic == "/empty_out" and payload[: len(empty)] == empty
+    for size in SIZES:
+        image = workshop.image(size)
+        peer.publish("/image_in", image)
+        topic, payload = peer.take(120)
+        assert topic == "/image_out" and same(workshop, image, payload), size
 
 
 def test_what_was_taken_is_published_before_the_end(workshop: Workshop) -> None:
     """The simulator needs a while for each frame, so most of them are under way when the signal comes."""
     transport = simulator("--latency", 4000)
     with (
-        Node(workshop.ros, workshop.program("echo"), transport, "--queue", "100") as node,
+        Node(workshop.ros, workshop.program("echo"), transport, "--depth", "100") as node,
         workshop.echo_peer() as peer,
     ):
         peer.wait_until_connected()
@@ -301,9 +318,9 @@ def run(workshop: Workshop, program: Path, *arguments: str) -> subprocess.Comple
 def test_help_names_every_option_and_topic(workshop: Workshop) -> None:
     done = run(workshop, workshop.program("echo"), "--help")
     assert done.returncode == 0 and not done.stderr
-    for word in ("--transport", "--queue", "--restart", "--trace", "empty_in", "image_out", "exit status"):
+    for word in "--transport --depth --overflow --drain --restart --trace empty_in image_out status".split():
         assert word in done.stdout
-    assert ("--best-effort" in done.stdout) == (workshop.ros.version == 2)
+    assert ("--qos" in done.stdout) == (workshop.ros.version == 2)
 
 
 @pytest.mark.parametrize(
@@ -311,9 +328,10 @@ def test_help_names_every_option_and_topic(workshop: Workshop) -> None:
     [
         ([], "--transport is missing"),
         (["--transport"], "--transport needs a value"),
-        (["--transport", "pipe:true", "--queue", "0"], "--queue is '0'; legal: 1 to 999999999"),
-        (["--transport", "pipe:true", "--queue", "ten"], "--queue is 'ten'; legal: 1 to 999999999"),
+        (["--transport", "pipe:true", "--depth", "0"], "--depth is '0'; legal: 1 to 999999999"),
+        (["--transport", "pipe:true", "--depth", "ten"], "--depth is 'ten'; legal: 1 to 999999999"),
         (["--transport", "pipe:true", "--trace", "/no/such"], "cannot write '/no/such'"),
+        (["--transport", "pipe:true", "--overflow", "x"], "--overflow is 'x'; legal: block, drop_newest, drop_oldest"),
         (["--bogus"], "'--bogus' is no option"),
     ],
 )
@@ -326,12 +344,11 @@ def test_a_wrong_command_line_is_told(workshop: Workshop, arguments: list[str], 
 def test_an_address_that_is_none_ends_the_node(workshop: Workshop) -> None:
     done = run(workshop, workshop.program("echo"), "--transport", "carrier:pigeon")
     assert done.returncode == 1
-    assert "the transport is 'carrier:pigeon'; legal: pipe:COMMAND" in done.stderr
+    assert "the transport is 'carrier:pigeon'; legal: pipe:COMMAND, uart:" in done.stderr
 
 
+@only_ros1
 def test_a_node_waits_for_its_master(workshop: Workshop) -> None:
-    if workshop.ros.version == 2:
-        pytest.skip("ROS 2 has no master")
     environment = {**workshop.ros.environment, "ROS_MASTER_URI": "http://127.0.0.1:9"}
     lonely = Ros(1, workshop.ros.python, (), (), environment)
     with Node(lonely, workshop.program("echo"), simulator()) as node:
@@ -342,17 +359,15 @@ def test_a_node_waits_for_its_master(workshop: Workshop) -> None:
         assert node.stop() == 0
 
 
+@only_ros2
 def test_a_message_that_is_not_installed_is_named(workshop: Workshop) -> None:
-    if workshop.ros.version == 1:
-        pytest.skip("ROS 1 needs no installed message")
     done = run(workshop, workshop.program("robotic_arm"), "--transport", simulator())
     assert done.returncode == 1
     assert "the message robotic_arm/msg/ArmPoses of poses is not installed" in done.stderr
 
 
+@only_ros2
 def test_a_message_that_is_installed_with_another_definition_is_refused(workshop: Workshop) -> None:
-    if workshop.ros.version == 1:
-        pytest.skip("in ROS 1 the peers compare the MD5 sums")
     package = workshop.folder / "other"
     shutil.copytree(workshop.package("echo"), package)
     source = package / "src/echo_node.cpp"

@@ -11,7 +11,8 @@ import fusesoc_firm.host
 
 HERE = Path(__file__).resolve().parent
 HEADERS = Path(fusesoc_firm.host.__file__).resolve().parent / "cpp"
-_OPTIONS = ["-std=c++17", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-pthread"]
+_OPTIONS = ["-std=c++17", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow"]
+_OPTIONS += ["-Wconversion", "-Wsign-conversion", "-Werror", "-pthread"]
 
 
 @dataclass(frozen=True)
@@ -20,9 +21,9 @@ class Driver:
 
     program: Path
 
-    def answers(self, lines: Sequence[str]) -> list[str]:
+    def answers(self, lines: Sequence[str], *arguments: str) -> list[str]:
         """What it says to `lines`; fails if it, or a sanitizer, ends with a fault."""
-        return self._run([], "".join(f"{line}\n" for line in lines)).splitlines()
+        return self._run(list(arguments), "".join(f"{line}\n" for line in lines)).splitlines()
 
     def run(self, *arguments: str) -> None:
         """Run it on its own."""

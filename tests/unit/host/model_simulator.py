@@ -31,6 +31,7 @@ class Simulator:
     cycle: int = 0
     moved: int = 0
     taken: int = 0
+    begun: int = 0
     waiting: deque[bytes] = field(default_factory=deque)
     events: list[tuple[int, int, bytes]] = field(default_factory=list)
     out_free: int = 0
@@ -38,10 +39,16 @@ class Simulator:
     def beats(self, data: bytes) -> int:
         return -(-len(data) * 8 // self.width)
 
+    def put(self, frame: bytes) -> None:
+        """A frame that is to be sent."""
+        if not self.waiting:
+            self.begun = self.cycle
+        self.waiting.append(frame)
+
     def run(self, cycles: int) -> bytes:
         """The reports of a run."""
         end = self.cycle + cycles
-        taking = max(self.cycle, self.moved) + self.beats(self.waiting[0]) if self.waiting else end + 1
+        taking = self.begun + self.beats(self.waiting[0]) if self.waiting else end + 1
         leaving = self.events[0][0] if self.events else end + 1
         first = min(taking, leaving)
         if first > end:
@@ -53,6 +60,7 @@ class Simulator:
 
     def take(self, now: int) -> bytes:
         frame = self.waiting.popleft()
+        self.begun = now
         runs = [self.run_beats] * ((self.beats(frame) - 1) // self.run_beats) if self.run_beats else []
         out = max(now + self.latency, self.out_free)
         for number, burst in enumerate(split_frame(frame, self.width, runs)):
@@ -90,7 +98,8 @@ class Simulator:
         }.get(self.fault, b"")
 
     def standing(self) -> bytes:
-        quiet = min(self.cycle - self.moved, 2**32 - 1)
+        leaves = any(last - self.beats(burst) <= self.cycle for last, _, burst in self.events)
+        quiet = 0 if self.waiting or leaves else min(self.cycle - self.moved, 2**32 - 1)
         return b"S" + self.cycle.to_bytes(8, "little") + quiet.to_bytes(4, "little")
 
 
@@ -107,7 +116,7 @@ def main() -> None:
         while (letter := requests.read(1)) not in (b"", b"Q"):
             number = int.from_bytes(requests.read(4), "little")
             if letter == b"F":
-                simulator.waiting.append(requests.read(number))
+                simulator.put(requests.read(number))
             elif letter == b"R":
                 reports.write(simulator.run(number) + simulator.standing())
                 reports.flush()

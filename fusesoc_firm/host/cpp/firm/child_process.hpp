@@ -21,34 +21,12 @@
 #include <thread>
 #include <utility>
 
+#include <firm/descriptor.hpp>
 #include <firm/transport.hpp>
 
 extern "C" char** environ;
 
 namespace firm {
-
-// An open file descriptor; negative is none.
-class Descriptor {
- public:
-  explicit Descriptor(int number = -1) : number_(number) {}
-  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(number_, other.number_);
-    return *this;
-  }
-  ~Descriptor() { reset(); }
-  int get() const { return number_; }
-  void reset() {
-    if (number_ >= 0) ::close(std::exchange(number_, -1));
-  }
-
- private:
-  int number_;
-};
-
-[[noreturn]] inline void fail_with_errno(const std::string& what) {
-  throw TransportError(what + ": " + std::strerror(errno));
-}
 
 // Keeps SIGPIPE from the thread for as long as it lives; write() gives EPIPE.
 class SigpipeHeld {
@@ -140,6 +118,9 @@ class ChildProcess {
       if (errno != EINTR) fail_with_errno("reading from the child process");
     }
   }
+
+  // To wait for what it writes.
+  int output() const { return from_child_.get(); }
 
   // What it reads is over.
   void end_input() { to_child_.reset(); }

@@ -13,7 +13,6 @@
 // Payloads are what the middleware has serialised; nothing here parses them. C++17, no dependencies but POSIX.
 #pragma once
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -191,6 +190,7 @@ class Node {
       std::thread receiver([&] { receive_all(*transport); });
       try {
         send_all(*transport);
+        transport->finish();
         settle(*transport);
       } catch (const std::exception& error) {
         fault = error.what();

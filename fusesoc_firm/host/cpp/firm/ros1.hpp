@@ -64,7 +64,7 @@ class RawCallback : public ros::SubscriptionCallbackHelper {
 // A node of ROS 1.
 class Ros1 {
  public:
-  static constexpr bool kHasBestEffort = false;
+  static constexpr bool kHasQuality = false;
   static constexpr const char* kArguments = "ROS' own arguments: NAME:=VALUE remaps a topic, __name:=, __ns:=, __log:=";
 
   // Takes ROS' own arguments out of `argv`. `name` is that of the node unless `__name:=` gives another.

@@ -88,7 +88,7 @@ inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
 // A node of ROS 2.
 class Ros2 {
  public:
-  static constexpr bool kHasBestEffort = true;
+  static constexpr bool kHasQuality = true;
   static constexpr const char* kArguments =
       "ROS' own arguments stand behind --ros-args: -r NAME:=VALUE remaps a topic, -r __node:=, -r __ns:=, --log-level";
 

@@ -14,7 +14,7 @@
 #include <fstream>
 #include <iostream>
 #include <limits>
-#include <optional>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -26,14 +26,12 @@
 
 namespace firm {
 
-// What a node must know of a system: the bits of its streams, how many messages each queue holds unless the command line
-// says so, how many converters there are of either kind, and the topics of those that have one.
+// What a node must know of a system: the bits of its streams, how many messages a queue holds unless the command line says
+// so, and the topics of its converters, each kind in the order of the ids.
 struct System {
   std::string name;
   unsigned width;
   std::size_t queue_depth;
-  unsigned subscriber_count;
-  unsigned publisher_count;
   std::vector<Topic> subscribers;
   std::vector<Topic> publishers;
 };
@@ -46,17 +44,39 @@ class UsageError : public std::runtime_error {
 
 struct NodeArguments {
   std::string transport;
-  std::size_t queue;
+  std::size_t depth;
+  Overflow overflow = Overflow::kDropOldest;
+  std::chrono::seconds drain{10};
   bool restarts = false;
   bool is_best_effort = false;
   std::string trace;
   bool wants_help = false;
 };
 
-// The arguments that ROS has left. Throws UsageError.
-inline NodeArguments parse_arguments(const System& system, bool has_best_effort, int argc, char** argv) {
+// A whole number from 1 on. Throws UsageError.
+inline std::size_t positive_number(const std::string& option, const std::string& text) {
+  constexpr std::size_t kMostDigits = 9;
+  if (text.empty() || text.size() > kMostDigits || text.find_first_not_of("0123456789") != std::string::npos ||
+      std::stoul(text) == 0) {
+    throw UsageError(option + " is '" + text + "'; legal: 1 to 999999999");
+  }
+  return std::stoul(text);
+}
+
+// One of several words: what it stands for. Throws UsageError.
+template <typename Value>
+Value word_of(const std::string& option, const std::string& text, const std::map<std::string, Value>& words) {
+  if (const auto found = words.find(text); found != words.end()) return found->second;
+  std::string legal;
+  for (const auto& word : words) legal += (legal.empty() ? "" : ", ") + word.first;
+  throw UsageError(option + " is '" + text + "'; legal: " + legal);
+}
+
+// The arguments that ROS has left; `has_quality` says whether topics of this ROS have a quality of service. Throws
+// UsageError.
+inline NodeArguments parse_arguments(const System& system, bool has_quality, int argc, char** argv) {
   NodeArguments arguments;
-  arguments.queue = system.queue_depth;
+  arguments.depth = system.queue_depth;
   for (int index = 1; index < argc; ++index) {
     const std::string option = argv[index];
     const auto value = [&] {
@@ -66,20 +86,24 @@ inline NodeArguments parse_arguments(const System& system, bool has_best_effort,
     if (option == "--help" || option == "-h") {
       arguments.wants_help = true;
       return arguments;
-    } else if (option == "--transport") {
+    }
+    if (option == "--transport") {
       arguments.transport = value();
-    } else if (option == "--queue") {
-      const std::string text = value();
-      if (text.empty() || text.size() > 9 || text.find_first_not_of("0123456789") != std::string::npos ||
-          (arguments.queue = std::stoul(text)) == 0) {
-        throw UsageError("--queue is '" + text + "'; legal: 1 to 999999999");
-      }
+    } else if (option == "--depth") {
+      arguments.depth = positive_number(option, value());
+    } else if (option == "--overflow") {
+      arguments.overflow = word_of<Overflow>(option, value(),
+                                             {{"drop_oldest", Overflow::kDropOldest},
+                                              {"drop_newest", Overflow::kDropNewest},
+                                              {"block", Overflow::kBlock}});
+    } else if (option == "--drain") {
+      arguments.drain = std::chrono::seconds(positive_number(option, value()));
     } else if (option == "--restart") {
       arguments.restarts = true;
     } else if (option == "--trace") {
       arguments.trace = value();
-    } else if (option == "--best-effort" && has_best_effort) {
-      arguments.is_best_effort = true;
+    } else if (option == "--qos" && has_quality) {
+      arguments.is_best_effort = word_of<bool>(option, value(), {{"best_effort", true}, {"reliable", false}});
     } else {
       throw UsageError("'" + option + "' is no option");
     }
@@ -88,15 +112,18 @@ inline NodeArguments parse_arguments(const System& system, bool has_best_effort,
   return arguments;
 }
 
-inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool has_best_effort) {
+inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool has_quality) {
   out << "The node of the system " << system.name << ": messages of its topics to the hardware, and back.\n\n"
       << "usage: " << system.name << "_node --transport ADDRESS [OPTION ...] [ROS' own arguments]\n\n"
-      << "  --transport ADDRESS  the way to the hardware: pipe:COMMAND (a simulator), uart:..., dma:...\n"
-      << "  --queue N            messages that wait for the hardware at most, for each subscriber ("
-      << system.queue_depth << ")\n"
+      << "  --transport ADDRESS  the way to the hardware: pipe:COMMAND (a simulator), uart:DEVICE:BAUD[:rtscts],\n"
+      << "                       dma:UIO:BUFFER[:poll]\n"
+      << "  --depth N            messages that each queue holds, those of ROS too (" << system.queue_depth << ")\n"
+      << "  --overflow WORD      what a full queue does with a message: drop_oldest (the default), drop_newest, or\n"
+      << "                       block, which stops all topics\n"
+      << "  --drain SECONDS      how long the node works on what it has when it is to end (10)\n"
       << "  --restart            open the transport again when it fails, as often as that happens\n"
       << "  --trace FILE         write each step of each message to FILE, as CSV\n";
-  if (has_best_effort) out << "  --best-effort        match peers that do not promise to deliver, such as sensors\n";
+  if (has_quality) out << "  --qos WORD           of all topics: reliable (the default) or best_effort\n";
   out << "  --help               print this\n\n" << ros_arguments << "\n\ntopics to the hardware:\n";
   for (const auto& topic : system.subscribers) out << "  " << topic.name << "  " << topic.type << "\n";
   out << "topics from the hardware:\n";
@@ -120,7 +147,7 @@ inline void handle_signals() {
 // An engine that runs in a thread of its own for as long as this lives.
 class RunningNode {
  public:
-  explicit RunningNode(Node& node) : node_(node), thread_([this] { run(); }) {}
+  RunningNode(Node& node, std::chrono::seconds drain) : node_(node), drain_(drain), thread_([this] { run(); }) {}
   ~RunningNode() { stop(); }
   RunningNode(const RunningNode&) = delete;
   RunningNode& operator=(const RunningNode&) = delete;
@@ -129,20 +156,19 @@ class RunningNode {
 
   // Let it finish what it has; the exit status.
   int stop() {
-    node_.stop(kDrain);
+    node_.stop(drain_);
     if (thread_.joinable()) thread_.join();
     return status_;
   }
 
  private:
-  static constexpr std::chrono::seconds kDrain{10};
-
   void run() {
     status_ = node_.run();
     has_ended_ = true;
   }
 
   Node& node_;
+  const std::chrono::seconds drain_;
   int status_ = 0;
   std::atomic<bool> has_ended_{false};
   std::thread thread_;
@@ -160,19 +186,20 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
 
   NodeConfiguration configuration;
   configuration.width = system.width;
-  configuration.subscribers = system.subscriber_count;
-  configuration.publishers = system.publisher_count;
-  configuration.queue_depth = arguments.queue;
+  configuration.subscribers = static_cast<unsigned>(system.subscribers.size());
+  configuration.publishers = static_cast<unsigned>(system.publishers.size());
+  configuration.queue_depth = arguments.depth;
+  configuration.overflow = arguments.overflow;
   configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
   configuration.log = &std::cerr;
   configuration.trace = arguments.trace.empty() ? nullptr : &trace;
 
-  std::vector<MessageHandler> publish(system.publisher_count);
-  for (const auto& topic : system.publishers) publish.at(topic.id) = ros.advertise(topic, arguments.queue);
+  std::vector<MessageHandler> publish;
+  for (const auto& topic : system.publishers) publish.push_back(ros.advertise(topic, arguments.depth));
   Node node(configuration, arguments.transport,
             [&](unsigned publisher, const std::uint8_t* payload, std::size_t size) { publish[publisher](payload, size); });
   for (const auto& topic : system.subscribers) {
-    ros.subscribe(topic, arguments.queue, [&node, &topic](const std::uint8_t* payload, std::size_t size) {
+    ros.subscribe(topic, arguments.depth, [&node, &topic](const std::uint8_t* payload, std::size_t size) {
       try {
         node.put(topic.id, payload, size);
       } catch (const std::length_error& fault) {
@@ -181,7 +208,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
     });
   }
 
-  RunningNode running(node);
+  RunningNode running(node, arguments.drain);
   while (!is_interrupted && !running.has_ended() && ros.spin(std::chrono::milliseconds(50))) {
   }
   // What ROS has for us already.
@@ -201,12 +228,12 @@ int run(const System& system, int argc, char** argv) {
   try {
     handle_signals();
     Ros ros(argc, argv, system.name + "_node");
-    const NodeArguments arguments = parse_arguments(system, Ros::kHasBestEffort, argc, argv);
+    const NodeArguments arguments = parse_arguments(system, Ros::kHasQuality, argc, argv);
     if (arguments.wants_help) {
-      print_help(std::cout, system, Ros::kArguments, Ros::kHasBestEffort);
+      print_help(std::cout, system, Ros::kArguments, Ros::kHasQuality);
       return 0;
     }
-    if constexpr (Ros::kHasBestEffort) {
+    if constexpr (Ros::kHasQuality) {
       if (arguments.is_best_effort) ros.be_best_effort();
     }
     return serve(ros, system, arguments);

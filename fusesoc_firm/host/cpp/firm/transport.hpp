@@ -73,6 +73,9 @@ class Transport {
   // The next burst; none if none came in the time given, or when the transport is closed. Throws TransportError.
   virtual std::optional<Burst> receive(Timeout timeout = std::nullopt) = 0;
 
+  // Nothing more is sent. By the thread that sends; most hardware need not know.
+  virtual void finish() {}
+
   // Whether all that was sent has had its effect, and all of that was received; nothing where no one can know.
   virtual std::optional<bool> is_at_rest() const { return std::nullopt; }
 

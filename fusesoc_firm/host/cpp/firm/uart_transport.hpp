@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// A board's serial link (cores/board/README.md): frames as they are, byte after byte, 8 bits, no parity.
+//
+// A row of bytes has no marks. To the board a break is one: what follows begins a frame. From the board only silence is,
+// so behind an error all is dropped until the line is silent. The transport does both when it is opened, and whenever
+// what comes cannot be a frame: an id or a length that there is not, or a pause within a frame.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include <firm/descriptor.hpp>
+#include <firm/frame_stream.hpp>
+#include <firm/transport.hpp>
+
+namespace firm {
+
+struct UartOptions {
+  unsigned baud = 1000000;
+  bool has_flow_control = false;  // RTS and CTS
+  std::chrono::nanoseconds silence = std::chrono::milliseconds(50);        // that parts what comes from what came
+  std::chrono::nanoseconds longest_pause = std::chrono::milliseconds(200);  // within a frame from the board
+  std::function<int(int descriptor)> send_break = [](int descriptor) { return ::tcsendbreak(descriptor, 0); };
+};
+
+class UartTransport : public Transport {
+ public:
+  // Opens the device and makes a cut. Throws TransportError.
+  explicit UartTransport(const std::string& device, TransportOptions options = {}, UartOptions uart = {})
+      : options_(std::move(options)),
+        uart_(std::move(uart)),
+        device_(device),
+        line_(::open(device.c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK)),
+        stream_(options_.publishers, options_.longest_payload) {
+    if (line_.get() < 0) fail_with_errno(device_);
+    configure();
+    cut();
+    ::tcflush(line_.get(), TCIFLUSH);
+  }
+
+  void send(const std::uint8_t* frame, std::size_t size) override {
+    const std::lock_guard<std::mutex> lock(sending_);
+    make_wanted_break();
+    while (size > 0) {
+      throw_if_closed();
+      const ssize_t written = ::write(line_.get(), frame, size);
+      if (written > 0) {
+        frame += written;
+        size -= static_cast<std::size_t>(written);
+      } else if (written < 0 && errno != EAGAIN && errno != EINTR) {
+        fail_with_errno(device_);
+      } else {
+        waiter_.wait(line_.get(), POLLOUT, Deadline(std::nullopt));
+      }
+    }
+  }
+
+  std::optional<Burst> receive(Timeout timeout = std::nullopt) override {
+    const Deadline deadline(timeout);
+    while (!is_closed_) {
+      if (read_ < filled_ && take()) return Burst{stream_.pop()};
+      if (read_ < filled_) continue;
+      const auto event_by = is_dropping_            ? deadline.or_in(uart_.silence)
+                            : stream_.has_begun() ? deadline.or_in(uart_.longest_pause)
+                                                  : deadline;
+      if (waiter_.wait(line_.get(), POLLIN, event_by)) {
+        fill();
+      } else if (!is_closed_ && !be_silent(event_by, deadline)) {
+        return std::nullopt;
+      }
+    }
+    return std::nullopt;
+  }
+
+  void close() override {
+    is_closed_ = true;
+    waiter_.end();
+  }
+
+ private:
+  static speed_t speed(unsigned baud) {
+    struct Rate {
+      unsigned baud;
+      speed_t speed;
+    };
+    static constexpr Rate kRates[] = {
+        {9600, B9600},       {19200, B19200},     {38400, B38400},     {57600, B57600},     {115200, B115200},
+        {230400, B230400},   {460800, B460800},   {500000, B500000},   {576000, B576000},   {921600, B921600},
+        {1000000, B1000000}, {1152000, B1152000}, {1500000, B1500000}, {2000000, B2000000}, {2500000, B2500000},
+        {3000000, B3000000}, {3500000, B3500000}, {4000000, B4000000}};
+    std::string legal;
+    for (const auto& rate : kRates) {
+      if (rate.baud == baud) return rate.speed;
+      legal += (legal.empty() ? "" : ", ") + std::to_string(rate.baud);
+    }
+    throw TransportError("the baud rate is " + std::to_string(baud) + "; legal: " + legal);
+  }
+
+  void configure() {
+    termios settings;
+    if (::tcgetattr(line_.get(), &settings) != 0) fail_with_errno(device_);
+    ::cfmakeraw(&settings);
+    settings.c_cflag |= CLOCAL | CREAD | CS8;
+    settings.c_cflag &= ~(PARENB | CSTOPB | HUPCL | (uart_.has_flow_control ? 0U : CRTSCTS));
+    if (uart_.has_flow_control) settings.c_cflag |= CRTSCTS;
+    const speed_t speed = UartTransport::speed(uart_.baud);
+    if (::cfsetispeed(&settings, speed) != 0 || ::cfsetospeed(&settings, speed) != 0 ||
+        ::tcsetattr(line_.get(), TCSANOW, &settings) != 0) {
+      fail_with_errno(device_ + " at " + std::to_string(uart_.baud) + " baud");
+    }
+    // Two programs that read one line both get nonsense.
+    if (::ioctl(line_.get(), TIOCEXCL) != 0) fail_with_errno(device_);
+  }
+
+  // Bring both sides together. A frame of ours that is on its way comes first: who receives must not wait for it, as the
+  // board may take no more before we have received.
+  void cut() {
+    is_dropping_ = true;
+    stream_.pop();
+    is_break_wanted_ = true;
+    const std::unique_lock<std::mutex> lock(sending_, std::try_to_lock);
+    if (lock) make_wanted_break();
+  }
+
+  void make_wanted_break() {
+    if (!is_break_wanted_.exchange(false)) return;
+    if (uart_.send_break(line_.get()) != 0) fail_with_errno("a break at " + device_);
+  }
+
+  void lose() {
+    if (options_.on_error) options_.on_error({});
+    cut();
+  }
+
+  // Move bytes that were read to the frame; whether it is whole.
+  bool take() {
+    const std::uint8_t* bytes = buffer_.data() + read_;
+    const std::size_t count = filled_ - read_;
+    if (is_dropping_) {
+      read_ = filled_;
+      return false;
+    }
+    try {
+      read_ += stream_.push(bytes, count);
+    } catch (const FrameError&) {
+      read_ = filled_;
+      lose();
+      return false;
+    }
+    return stream_.is_whole();
+  }
+
+  void fill() {
+    const ssize_t found = ::read(line_.get(), buffer_.data(), buffer_.size());
+    if (found < 0 && (errno == EAGAIN || errno == EINTR)) return;
+    if (found < 0) fail_with_errno(device_);
+    if (found == 0) throw TransportError(device_ + ": the device is gone");
+    read_ = 0;
+    filled_ = static_cast<std::size_t>(found);
+  }
+
+  // Nothing came: what that means. False if it is the time of the one who receives that is over.
+  bool be_silent(const Deadline& event_by, const Deadline& deadline) {
+    if (event_by.is_over() && !deadline.is_over()) {
+      if (is_dropping_) {
+        is_dropping_ = false;
+      } else {
+        lose();
+      }
+      return true;
+    }
+    return !deadline.is_over();
+  }
+
+  void throw_if_closed() const {
+    if (is_closed_) throw TransportError("the transport is closed");
+  }
+
+  const TransportOptions options_;
+  const UartOptions uart_;
+  const std::string device_;
+  Descriptor line_;
+  Waiter waiter_;
+  std::atomic<bool> is_closed_{false};
+  std::mutex sending_;  // a frame, or a break
+  std::atomic<bool> is_break_wanted_{false};
+
+  // The receiver's own.
+  FrameStream stream_;
+  bool is_dropping_ = false;
+  std::array<std::uint8_t, 4096> buffer_;
+  std::size_t read_ = 0;
+  std::size_t filled_ = 0;
+};
+
+}  // namespace firm

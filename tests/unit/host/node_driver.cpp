@@ -1,0 +1,94 @@
+// Speaks for firm/node.hpp, with a transport by its address: ADDRESS WIDTH SUBSCRIBERS PUBLISHERS DEPTH OVERFLOW RESTARTS
+// DRAIN_MS [TRACE]. A line for each `put SUBSCRIBER HEX`, and for `await COUNT`, which waits until so many payloads were
+// published; the end of the input stops the node. It writes a line for each payload that comes back, then what the node
+// has to say in the end.
+#include <firm/node.hpp>
+
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+static constexpr char kDigits[] = "0123456789abcdef";
+
+static firm::Bytes from_hex(const std::string& text) {
+  firm::Bytes bytes(text.size() / 2);
+  const auto value = [](char digit) { return digit <= '9' ? digit - '0' : digit - 'a' + 10; };
+  for (std::size_t place = 0; place < bytes.size(); ++place) {
+    bytes[place] = static_cast<std::uint8_t>(value(text[2 * place]) << 4 | value(text[2 * place + 1]));
+  }
+  return bytes;
+}
+
+static std::string to_hex(const std::uint8_t* bytes, std::size_t size) {
+  std::string text;
+  text.reserve(2 * size);
+  for (std::size_t place = 0; place < size; ++place) {
+    text += kDigits[bytes[place] >> 4];
+    text += kDigits[bytes[place] & 15];
+  }
+  return text;
+}
+
+static void feed(firm::Node& node) {
+  std::string line, command;
+  while (std::getline(std::cin, line)) {
+    std::istringstream words(line);
+    words >> command;
+    if (command == "put") {
+      unsigned subscriber;
+      std::string text;
+      words >> subscriber >> text;
+      const firm::Bytes payload = from_hex(text);
+      try {
+        node.put(subscriber, payload.data(), payload.size());
+      } catch (const std::logic_error& error) {
+        std::cout << "refused " << error.what() << "\n";
+      }
+    } else {
+      std::uint64_t count;
+      words >> count;
+      const firm::Deadline deadline(std::chrono::seconds(20));
+      while (node.statistics().published < count && !deadline.is_over()) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }
+  }
+}
+
+int main(int, char** arguments) {
+  firm::NodeConfiguration configuration;
+  configuration.width = static_cast<unsigned>(std::stoul(arguments[2]));
+  configuration.subscribers = static_cast<unsigned>(std::stoul(arguments[3]));
+  configuration.publishers = static_cast<unsigned>(std::stoul(arguments[4]));
+  configuration.queue_depth = std::stoul(arguments[5]);
+  const std::string overflow = arguments[6];
+  configuration.overflow = overflow == "block"         ? firm::Overflow::kBlock
+                           : overflow == "drop_newest" ? firm::Overflow::kDropNewest
+                                                       : firm::Overflow::kDropOldest;
+  configuration.restarts = static_cast<unsigned>(std::stoul(arguments[7]));
+  configuration.restart_delay = std::chrono::milliseconds(10);
+  configuration.longest_payload = 10'000'000;
+  const std::chrono::milliseconds drain(std::stoul(arguments[8]));
+  std::ofstream trace;
+  if (arguments[9]) {
+    trace.open(arguments[9]);
+    configuration.trace = &trace;
+  }
+  std::ostringstream log;
+  configuration.log = &log;
+  std::ostringstream published;
+  firm::Node node(configuration, arguments[1], [&](unsigned publisher, const std::uint8_t* payload, std::size_t size) {
+    published << "published " << publisher << " " << to_hex(payload, size) << "\n";
+  });
+  int status = -1;
+  std::thread engine([&] { status = node.run(); });
+  feed(node);
+  node.stop(drain);
+  engine.join();
+  const auto counts = node.statistics();
+  std::cout << published.str() << "received " << counts.received << "\ndropped " << counts.dropped << "\nsent "
+            << counts.sent << "\nerrors " << counts.errors << "\nrestarts " << counts.restarts << "\nstatus " << status
+            << "\nerror " << node.error() << "\n";
+  std::istringstream lines(log.str());
+  for (std::string line; std::getline(lines, line);) std::cout << "log " << line << "\n";
+}
