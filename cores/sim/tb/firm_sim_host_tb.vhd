@@ -1,10 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The simulation host against a system that is a wire: what it sends comes straight back. FAULT makes the wire break
--- the stream in one way, so that a test can see that the host finds it.
+-- The simulation host against a system that is a wire, and may break the stream.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
-use firm.firm_sim_pkg.all;
 
 entity firm_sim_host_tb is
   generic (
@@ -17,8 +15,7 @@ entity firm_sim_host_tb is
     SHOWN         : integer := 10;
     WATCHDOG      : integer := 200;
     QUIET         : integer := 50;
-    -- The way to break the stream; "none" for none. The process `spoil` shows them all.
-    FAULT : string := "none");
+    FAULT         : string  := "none");
 end entity firm_sim_host_tb;
 
 architecture simulation of firm_sim_host_tb is
@@ -39,14 +36,8 @@ architecture simulation of firm_sim_host_tb is
   signal in_tlast  : std_logic;
   signal in_tready : std_logic;
 
-  signal id_error    : std_logic := '0';
-  signal frame_error : std_logic_vector(0 downto 0) := "0";
-
-  signal first_r : std_logic := '1';
-  signal id_r    : std_logic_vector(7 downto 0);
-  signal beats_r : natural := 0;
-  signal idle_r  : natural := 0;  -- cycles since the last beat
-  signal held_r  : boolean := false;  -- a beat has waited for a cycle
+  signal id_error    : std_logic;
+  signal frame_error : std_logic_vector(0 downto 0);
 
 begin
 
@@ -79,90 +70,24 @@ begin
       id_error      => id_error,
       frame_error   => frame_error);
 
-  watch_frames : process (clk)
-  begin
-    if rising_edge(clk) then
-      held_r <= out_tvalid = '1' and out_tready = '0';
-      idle_r <= idle_r + 1;
-      if out_tvalid = '1' and out_tready = '1' then
-        idle_r  <= 0;
-        beats_r <= beats_r + 1;
-        first_r <= out_tlast;
-        if first_r = '1' then
-          id_r <= out_tdata(7 downto 0);
-        end if;
-      end if;
-    end if;
-  end process watch_frames;
-
-  spoil : process (out_tdata, out_tkeep, out_tvalid, out_tlast, in_tready, first_r, id_r, beats_r, idle_r, held_r)
-    variable is_third  : boolean;
-    variable is_fourth : boolean;
-  begin
-    is_third  := beats_r = 2 and out_tvalid = '1';
-    is_fourth := beats_r = 3 and out_tvalid = '1';
-
-    out_tready <= in_tready;
-    in_tdata   <= out_tdata;
-    in_tkeep   <= out_tkeep;
-    in_tvalid  <= out_tvalid;
-    in_tlast   <= out_tlast;
-    in_tid     <= id_r;
-    if first_r = '1' then
-      in_tid <= out_tdata(7 downto 0);
-    end if;
-    id_error       <= '0';
-    frame_error(0) <= '0';
-
-    if FAULT = "unstable" and held_r then
-      in_tdata <= not out_tdata;
-    elsif FAULT = "withdrawn" and held_r then
-      in_tvalid  <= '0';
-      out_tready <= '0';
-    elsif FAULT = "undefined" and is_third then
-      in_tdata(3) <= 'U';
-    elsif FAULT = "unknown_valid" and is_third then
-      in_tvalid <= 'X';
-    elsif FAULT = "sparse" and is_third then
-      in_tkeep(0) <= '0';
-    elsif FAULT = "partial" and is_third then
-      in_tkeep(WIDTH/8-1) <= '0';
-    elsif FAULT = "empty" and is_third then
-      in_tkeep <= (in_tkeep'range => '0');
-    elsif FAULT = "wrong_tid" and is_third then
-      in_tid <= x"a5";
-    elsif FAULT = "unknown_last" and is_third then
-      in_tlast <= 'X';
-    elsif FAULT = "early_last" and is_third then
-      in_tlast <= '1';
-    elsif FAULT = "late_last" and is_fourth then
-      in_tlast <= '0';
-    elsif FAULT = "unknown_ready" and is_third then
-      out_tready <= 'X';
-    elsif FAULT = "stuck" and beats_r >= 2 then
-      out_tready <= '0';
-      in_tvalid  <= '0';
-    elsif FAULT = "mute" then
-      out_tready <= '1';
-      in_tvalid  <= '0';
-    elsif FAULT = "late_surplus" and beats_r > 0 and idle_r = 30 then
-      in_tvalid <= '1';
-      in_tdata  <= (in_tdata'range => '0');
-      in_tkeep  <= (in_tkeep'range => '1');
-      in_tid    <= x"00";
-      in_tlast  <= '1';
-    elsif FAULT = "endless" and beats_r >= 2 then
-      in_tvalid <= '1';
-      in_tdata  <= (in_tdata'range => '0');
-      in_tkeep  <= (in_tkeep'range => '1');
-      in_tlast  <= '0';
-    elsif FAULT = "id_pulse" and is_third then
-      id_error <= '1';
-    elsif FAULT = "frame_pulse" and is_third then
-      frame_error(0) <= '1';
-    elsif FAULT = "unknown_pulse" and is_third then
-      id_error <= 'U';
-    end if;
-  end process spoil;
+  u_system : entity firm.firm_sim_wire
+    generic map (
+      WIDTH => WIDTH,
+      FAULT => FAULT)
+    port map (
+      clk           => clk,
+      s_axis_tdata  => out_tdata,
+      s_axis_tkeep  => out_tkeep,
+      s_axis_tvalid => out_tvalid,
+      s_axis_tlast  => out_tlast,
+      s_axis_tready => out_tready,
+      m_axis_tdata  => in_tdata,
+      m_axis_tkeep  => in_tkeep,
+      m_axis_tid    => in_tid,
+      m_axis_tvalid => in_tvalid,
+      m_axis_tlast  => in_tlast,
+      m_axis_tready => in_tready,
+      id_error      => id_error,
+      frame_error   => frame_error);
 
 end architecture simulation;

@@ -94,6 +94,11 @@ class Simulator:
             os.close(from_us)
             os.close(to_us)
 
+    @property
+    def pid(self) -> int:
+        """The simulator's process."""
+        return self._process.pid
+
     def request(self, frame: bytes) -> None:
         """Put a frame behind those that are to be sent to the system. Raises `TransportError`."""
         if not 1 <= len(frame) <= MOST_CYCLES:
@@ -254,8 +259,10 @@ class SimulatorTransport:
         """Send a whole frame; waits while the system takes none. Raises `TransportError`."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_over or self._frames < self._pace.most_frames)
-            if self._is_over:
-                raise self._error or TransportError("the transport is closed")
+            if self._is_closed:
+                raise TransportError("the transport is closed")
+            if self._error:
+                raise self._error
             self._frames += 1
             self._sent.append(frame)
             self._changed.notify_all()
@@ -296,6 +303,11 @@ class SimulatorTransport:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    @property
+    def waiting_bytes(self) -> int:
+        """The bytes of the bursts that have come and that nobody has received."""
+        return self._bytes
 
     @property
     def _is_over(self) -> bool:

@@ -1,0 +1,177 @@
+"""A live simulator of a system answers frames as the bench that reads them from files does, byte for byte."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.cli import main
+from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.host.bursts import BurstJoiner
+from fusesoc_firm.host.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator, core_of
+from fusesoc_firm.host.transport.simulator import Simulator
+from fusesoc_firm.host.transport.transport import Burst
+from tests.house.test_main_job import ROOT, run
+
+SPECS = ROOT / "specs"
+# The publishers and the width of each: one message; bursts of three types and rates; images.
+SYSTEMS = {"quat2euler": (1, 8), "multi_type": (3, 64), "image_pipeline": (1, 128)}
+STALL_PERCENT = 25  # the default of the bench that reads files
+
+
+@pytest.fixture(scope="module")
+def build_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("live") / "build"
+
+
+@pytest.fixture(scope="module", params=SYSTEMS)
+def recorded(request: pytest.FixtureRequest, build_root: Path) -> tuple[str, Path]:
+    """A system, and the folder with the files of a run of its bench."""
+    done = run(request.param, build_root)
+    assert done.returncode == 0, done.stdout
+    return request.param, build_root / f"robot_sys_{request.param}_0.1.0" / "sim"
+
+
+def frames_of(file: Path) -> list[bytes]:
+    """The frames of a stimulus file, or of what the bench received."""
+    frames: list[bytearray] = []
+    for line in file.read_text().splitlines():
+        if line.startswith((">", "<")):
+            frames.append(bytearray())
+        elif line and not line.startswith(("#", "!")):
+            frames[-1] += bytes.fromhex(line)
+    return list(map(bytes, frames))
+
+
+def by_id(frames: Iterable[bytes]) -> dict[int, list[bytes]]:
+    found: dict[int, list[bytes]] = {}
+    for frame in frames:
+        found.setdefault(frame[0], []).append(frame)
+    return found
+
+
+def answers(built: BuiltSimulator, frames: list[bytes], shape: tuple[int, int]) -> tuple[list[bytes], int]:
+    """The frames that a system answers with, in order, and the cycle of the last beat."""
+    joiner, joined, last = BurstJoiner(*shape), [], 0
+    with Simulator(built.command(seed=1, stall_percent=STALL_PERCENT), built.folder) as simulator:
+        for frame in frames:
+            simulator.request(frame)
+        simulator.run(1)
+        while simulator.quiet < 20_000:
+            for event in simulator.run(20_000):
+                if isinstance(event, Burst):
+                    last = event.last_cycle or 0
+                    if frame_ := joiner.push(event.data, event.tid):
+                        joined.append(bytes([frame_.id]) + len(frame_.payload).to_bytes(4, "little") + frame_.payload)
+        simulator.quit()
+    joiner.close()
+    return joined, last
+
+
+def test_the_same_frames_give_the_same_bytes(recorded: tuple[str, Path], build_root: Path) -> None:
+    system, folder = recorded
+    stimuli, received = frames_of(folder / "stimulus.txt"), frames_of(folder / "received.txt")
+    ends = []
+    for tool in TOOLS:
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+        built = build_simulator(SPECS / system / f"{system}.yaml", tool, build_root=build_root.parent / "simulators")
+        found, last = answers(built, stimuli, SYSTEMS[system])
+        assert by_id(found) == by_id(received)
+        ends.append(last)
+    assert len(received) >= 7
+    # Both simulators stall in the same cycles.
+    assert len(set(ends)) == 1
+
+
+@pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
+def test_a_second_build_builds_nothing(build_root: Path) -> None:
+    spec, root = SPECS / "quat2euler" / "quat2euler.yaml", build_root.parent / "simulators"
+    first = build_simulator(spec, "verilator", build_root=root)
+    time = Path(*first.words).stat().st_mtime_ns
+    assert build_simulator(spec, "verilator", build_root=root) == first
+    assert Path(*first.words).stat().st_mtime_ns == time
+
+
+def copy_of(application: str, folder: Path, *, has_core: bool) -> Path:
+    """A specification in a folder that nobody knows."""
+    copy = folder / "some place" / application
+    shutil.copytree(SPECS / application, copy)
+    if not has_core:
+        for core in copy.glob("*.core"):
+            core.unlink()
+    return copy / f"{application}.yaml"
+
+
+def test_a_specification_without_a_core(tmp_path: Path) -> None:
+    spec = copy_of("quat2euler", tmp_path, has_core=False)
+    sources = CoreSources(depend=["robot:acc:cordic", "robot:acc:float64"])
+    built = build_simulator(spec, build_root=tmp_path / "build", sources=sources)
+    frame = frames_of_quaternion()
+    assert len(answers(built, [frame], (1, 8))[0]) == 1
+    # It leaves nothing beside the specification.
+    assert not [*spec.parent.glob("*.core")]
+
+
+def frames_of_quaternion() -> bytes:
+    return b"\x00\x20\x00\x00\x00" + bytes(24) + b"\x00\x00\x00\x00\x00\x00\xf0\x3f"
+
+
+def test_a_changed_source_is_built_and_its_fault_shown(tmp_path: Path) -> None:
+    spec = copy_of("quat2euler", tmp_path, has_core=True)
+    build_simulator(spec, build_root=tmp_path / "build")
+    source = next(spec.parent.glob("rtl/*.vhd"))
+    right = source.read_text()
+    source.write_text(right.replace("begin", "begin nonsense", 1))
+    with pytest.raises(InputError, match=r"cannot be built(.|\n)*quat2euler\.vhd:\d+:\d+"):
+        build_simulator(spec, build_root=tmp_path / "build")
+    source.write_text(right)
+    assert build_simulator(spec, build_root=tmp_path / "build").folder.is_dir()
+
+
+def test_the_core_beside_it_is_the_one_that_names_it() -> None:
+    assert core_of(SPECS / "quat2euler" / "quat2euler_hls.yaml") == SPECS / "quat2euler" / "quat2euler_hls.core"
+    assert core_of(SPECS / "quat2euler" / "stimuli.yaml") is None
+
+
+def test_what_cannot_be_built_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InputError, match="there is no specification"):
+        build_simulator(tmp_path / "none.yaml")
+    with pytest.raises(InputError, match="there is no simulator 'questa' of live systems"):
+        build_simulator(SPECS / "quat2euler" / "quat2euler.yaml", "questa")
+    with pytest.raises(InputError, match="is for verilator"):
+        build_simulator(SPECS / "multi_type" / "multi_type_verilog.yaml", build_root=tmp_path / "build")
+    old = copy_of("quat2euler", tmp_path, has_core=True)
+    core = old.with_suffix(".core")
+    core.write_text(core.read_text().replace("\n  live:", "\n  alive:"))
+    with pytest.raises(InputError, match=r"has no target 'live'(.|\n)*firm system core"):
+        build_simulator(old, build_root=tmp_path / "build")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
+    with pytest.raises(InputError, match=r"'ghdl' is not installed(.|\n)*apt install ghdl"):
+        build_simulator(SPECS / "quat2euler" / "quat2euler.yaml")
+
+
+def test_the_command_prints_a_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    spec = copy_of("quat2euler", tmp_path, has_core=True)
+    options = ["--build-root", str(tmp_path / "a b"), "--seed", "7", "--stall-percent", "30"]
+    assert main(["simulator", str(spec), *options]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count("\n") == 1
+    # As a shell and another program take it.
+    echoed = subprocess.run(["/bin/sh", "-c", f"echo {printed}"], capture_output=True, text=True, check=True)
+    assert shlex.split(printed) == [echoed.stdout.rstrip("\n")]
+    with Simulator(shlex.split(printed)) as simulator:
+        simulator.request(frames_of_quaternion())
+        while not any(isinstance(event, Burst) for event in simulator.run(1000)):
+            assert simulator.quiet < 1000
+        simulator.quit()
+    with pytest.raises(SystemExit):
+        main(["simulator", str(spec), "--seed", "0"])
+    assert "0 is no whole number from 1 to 2147483562" in capsys.readouterr().err
