@@ -24,7 +24,7 @@ MODEL_SIMULATOR = REPOSITORY / "tests/unit/host/model_simulator.py"
 
 def model_address(*arguments: str) -> str:
     """The address of a model of hardware that sends back what it gets, at the end of a pipe."""
-    return f"pipe:PYTHONPATH={REPOSITORY} exec {sys.executable} {MODEL_SIMULATOR} {' '.join(arguments)}"
+    return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {MODEL_SIMULATOR} {' '.join(arguments)}"
 
 
 def specification(name: str, version: int, folder: Path) -> Path:
