@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from tests.bench import area, cycles, figures, fuzz, images, manager, simulators, systems, timing, use
+from tests.bench import area, cycles, figures, fuzz, images, live, manager, simulators, systems, timing, use
 from tests.bench.areas import write_areas
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import Table
@@ -49,6 +49,8 @@ def main() -> int:
 def _measure(part: str, seed: int, broken: int) -> list[Table]:
     if part == "systems":
         return systems.measure(seed, _tell)
+    if part == "live":
+        return live.measure(_tell)
     yosys = Yosys()
     if part == "area":
         return area.measure(yosys, _tell)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 
 from tests import yowasp
-from tests.bench import area, cycles, fuzz, images, manager, nextpnr, simulators, systems, timing, use, yosys
+from tests.bench import area, cycles, fuzz, images, live, manager, nextpnr, simulators, systems, timing, use, yosys
 from tests.bench.tables import Table, filled
 from tests.sim.ghdl import REPOSITORY
 
@@ -25,6 +25,7 @@ _HEADINGS = {
     "images": "Images",
     "systems": "Systems",
     "simulators": "Simulators",
+    "live": "Live nodes",
 }
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
@@ -42,12 +43,13 @@ _METHODS = {
     "systems": "Time that a user waits for a large system.",
     "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
         same frames and stalls in every simulator, and the same bytes back.""",
+    "live": "`firm live` in a running ROS, as docs/live.md has it.",
 }
 _INTRODUCTION = """
     Written by `make bench`; `make bench BENCH='area'` measures a part anew (`area`, `manager`, `timing`, `use`,
-    `cycles`, `fuzz`, `images`, `systems`, `simulators`). 'not converted' is a message that no converter is made of yet,
-    or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of `ros1/<package>/msg/*.msg`.
-    'met' and 'MISSED' tell how a row stands to its bar.
+    `cycles`, `fuzz`, `images`, `systems`, `simulators`, `live`). 'not converted' is a message that no converter is made
+    of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of
+    `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 
@@ -58,7 +60,7 @@ def parts() -> tuple[str, ...]:
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
     """The first cells of every row that docs/figures.md must hold, by the title of the table."""
-    modules = (area, manager, timing, use, cycles, fuzz, images, systems, simulators)
+    modules = (area, manager, timing, use, cycles, fuzz, images, systems, simulators, live)
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
 
@@ -89,6 +91,8 @@ def _versions(part: str) -> str:
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
+    elif part == "live":
+        tools += [_first_line("verilator"), *live.versions()]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]
     elif part in ("area", "manager", "timing"):

@@ -23,7 +23,7 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
         help="of all topics in ROS 2 (default: reliable)",
     )
     parser.add_argument(
-        "--depth",
+        "--queue",
         type=_positive,
         default=10,
         metavar="N",

@@ -50,12 +50,12 @@ def run_options(
         RosOptions(
             arguments.name or description.name,
             tuple(passed),
-            arguments.depth,
+            arguments.queue,
             arguments.qos == "reliable",
             arguments.trace is not None,
             arguments.ros_python,
         ),
-        NodeSettings(arguments.depth, Overflow(arguments.overflow), drain=arguments.drain, restarts=arguments.restart),
+        NodeSettings(arguments.queue, Overflow(arguments.overflow), drain=arguments.drain, restarts=arguments.restart),
         arguments.trace,
     )
 

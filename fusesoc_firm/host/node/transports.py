@@ -2,47 +2,30 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Callable
 from functools import partial
 
 from fusesoc_firm.host.node.node import HardwareListener, OpenTransport
 from fusesoc_firm.host.simulator import BuiltSimulator
+from fusesoc_firm.host.transport.open_transport import open_transport
 from fusesoc_firm.host.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
-from fusesoc_firm.host.transport.transport import Transport, TransportError
 
-# A simulation at rest goes on now and then, for accelerators that send without being asked.
-_IDLE_SECONDS = 0.05
-# So long a system without a beat still works at something, as far as a simulation knows.
-_REST_CYCLES = 20_000
+# A simulation at rest goes on now and then, for accelerators that send without being asked. One that computes for
+# longer than so many cycles without a beat still works, but is not waited for at the end.
+_PACE = Pace(rest_cycles=20_000, idle_seconds=0.05)
 
 
 def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -> OpenTransport:
     """Start the simulator of a system."""
     command = built.command(seed=seed, stall_percent=stall_percent)
 
-    def opened(listener: HardwareListener) -> Transport:
-        return _simulator(lambda: Simulator(command, built.folder), listener)
-
-    return opened
+    return lambda listener: SimulatorTransport(
+        lambda: Simulator(command, built.folder), _PACE, partial(_tell, listener)
+    )
 
 
 def at_address(address: str) -> OpenTransport:
-    """Open what a transport's address says, such as `pipe:COMMAND` (docs/transport.md)."""
-
-    def opened(listener: HardwareListener) -> Transport:
-        kind, _, rest = address.partition(":")
-        if kind != "pipe" or not rest:
-            raise TransportError(f"the transport is '{address}'; legal: pipe:COMMAND")
-        return _simulator(lambda: Simulator(shlex.split(rest)), listener)
-
-    return opened
-
-
-def _simulator(start: Callable[[], Simulator], listener: HardwareListener) -> Transport:
-    return SimulatorTransport(
-        start, Pace(rest_cycles=_REST_CYCLES, idle_seconds=_IDLE_SECONDS), partial(_tell, listener)
-    )
+    """Open what a transport's address says, such as `uart:DEVICE:BAUD` (docs/transport.md)."""
+    return lambda listener: open_transport(address, _PACE, partial(_tell, listener))
 
 
 def _tell(listener: HardwareListener, event: Event) -> None:
