@@ -35,7 +35,7 @@ def written(folder: Path, text: str, *paths: Path) -> LoadedSystem:
 
 def rows(source: str) -> list[tuple[str, ...]]:
     """Id, name, type and signature of each topic in a table."""
-    return re.findall(r'^ +(\d+), "(.*)", "(.*)",\n +"(.*)",', source, re.MULTILINE)
+    return re.findall(r'^ +(\d+|\{\}), "(.*)", "(.*)",\n +"(.*)",', source, re.MULTILINE)
 
 
 def loop(name: str, message: str, ros: str) -> str:
@@ -127,17 +127,6 @@ def test_nested_messages_are_part_of_a_definition() -> None:
         ),
         (specification(loop("one", "Point", "ROS")), 2, "the topics of 'robot' are of ROS 1, not of ROS 2"),
         (specification(loop("one", "Point", "ROS2")), 1, "the topics of 'robot' are of ROS 2, not of ROS 1"),
-        (
-            specification(
-                converter("sub", "subscriber", "Point", "soft")
-                + instance("soft", "think", "hard")
-                + instance("hard", "act", "pub")
-                + converter("pub", "publisher", "Point"),
-                accelerator("think", "Point", "Point", "ROS-SW", "think.py") + accelerator("act", "Point", "Point"),
-            ),
-            None,
-            "'robot' has accelerators in software, which a node in C++ does not run",
-        ),
     ],
 )
 def test_what_no_node_can_serve_is_refused(tmp_path: Path, text: str, ros: int | None, message: str) -> None:
@@ -145,6 +134,26 @@ def test_what_no_node_can_serve_is_refused(tmp_path: Path, text: str, ros: int |
     with pytest.raises(InputError) as caught:
         cpp_package(loaded, RosVersion(ros) if ros else None)
     assert messages(caught.value) == [message]
+
+
+def test_blocks_in_software_have_ids_of_their_own(tmp_path: Path) -> None:
+    """A topic goes to hardware and software, software to a topic and to hardware, which goes to software."""
+    blocks = (
+        converter("sub", "subscriber", "Point", "hard", "think")
+        + instance("think", "thinker", "late", "pub")
+        + instance("hard", "actor", "idle")
+        + instance("idle", "idler", "rest")
+        + instance("late", "actor", "last")
+        + "".join(converter(name, "publisher", "Point") for name in ("pub", "rest", "last"))
+    )
+    types = accelerator("actor", "Point", "Point")
+    types += "".join(accelerator(name, "Point", "Point", "ROS-SW", f"{name}.py") for name in ("thinker", "idler"))
+    loaded = written(tmp_path, specification(blocks, types))
+    source = cpp_package(loaded)["src/robot_node.cpp"]
+    assert [(row[0], row[1]) for row in rows(source)] == [("0", "sub"), ("0", "last"), ("{}", "pub"), ("{}", "rest")]
+    assert "    2,  // converters that take messages\n    2,  // converters that send them\n" in source
+    ports = re.findall(r'^ +\{"(.*)", (.*)\},$', source, re.MULTILINE)
+    assert ports == [("sub", "{}"), ("", "1"), ("", "1"), ("pub", "{}"), ("rest", "{}")]
 
 
 def test_a_generated_system_has_its_node_beside_it(tmp_path: Path) -> None:
