@@ -158,7 +158,14 @@ def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
     texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
     for name, text in texts.items():
         if text:
-            yield {"message": name, "constant": _constant(name), "text": text, "delimiter": _delimiter(text)}
+            first, *lines = text.splitlines()
+            yield {
+                "message": name,
+                "constant": _constant(name),
+                "delimiter": _delimiter(text),
+                "first_line": first,
+                "lines": lines,
+            }
 
 
 def _constant(message: str) -> str:
