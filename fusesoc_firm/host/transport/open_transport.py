@@ -10,11 +10,13 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 
+from fusesoc_firm.host.transport.dma import DmaTransport
+from fusesoc_firm.host.transport.dma_device import LinuxDmaDevice
 from fusesoc_firm.host.transport.simulator import Event, Pace, Simulator, SimulatorTransport
 from fusesoc_firm.host.transport.transport import Transport, TransportError
 from fusesoc_firm.host.transport.uart import UartTransport
 
-LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts]"
+LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts], dma:UIO:BUFFER[:poll]"
 
 
 def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Event], None] | None = None) -> Transport:
@@ -30,6 +32,10 @@ def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Ev
         device, second, has_flow_control = _device(rest, ":rtscts")
         if device and second:
             return UartTransport(device, _baud(second), has_flow_control=has_flow_control)
+    if kind == "dma":
+        uio, buffer, is_polled = _device(rest, ":poll")
+        if uio and buffer:
+            return DmaTransport(LinuxDmaDevice(uio, buffer, has_interrupt=not is_polled))
     raise TransportError(f"the transport is '{address}'; legal: {LEGAL}")
 
 

@@ -187,7 +187,8 @@ def test_bursts_that_nobody_takes_hold_the_simulator(model: list[str]) -> None:
     with SimulatorTransport(lambda: Simulator(model), Pace(most_bytes=1000, most_frames=100)) as transport:
         for number in range(20):
             transport.send(bytes([number]) * 300)
-        time.sleep(0.3)
+        wait_until(lambda: transport.waiting_bytes == 1200)
+        time.sleep(0.1)
         assert transport.waiting_bytes == 1200
         assert [(burst := transport.receive(5.0)) and burst.data[0] for _ in range(20)] == list(range(20))
 
@@ -205,9 +206,10 @@ def test_closing_wakes_who_waits(transport: Transport) -> None:
         transport.send(b"late")
 
 
-def test_the_end_of_the_simulator_is_told_to_both_sides(transport: Transport) -> None:
+def test_the_end_of_the_simulator_is_told_to_both_sides(model: list[str]) -> None:
+    transport = SimulatorTransport(lambda: Simulator(model))
     transport.send(b"right")
-    time.sleep(0.2)
+    wait_until(lambda: transport.waiting_bytes == len(b"right"))
     transport.send(b"die")
     # What came before is there before it.
     assert (burst := transport.receive(5.0)) and burst.data == b"right"
@@ -217,6 +219,7 @@ def test_the_end_of_the_simulator_is_told_to_both_sides(transport: Transport) ->
         transport.send(b"more")
     with pytest.raises(TransportError, match="status 3"):
         transport.receive(1.0)
+    transport.close()
 
 
 def test_another_simulator_takes_its_place_on_request(model: list[str]) -> None:
