@@ -7,7 +7,7 @@ but ROS is installed: on the robot's own computer as here.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.host.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.host.software_process import software_ports
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.render import render
@@ -58,12 +59,10 @@ def headers() -> list[Path]:
 def cpp_package(loaded: LoadedSystem, ros: RosVersion | None = None) -> dict[str, str]:
     """The files of the node in C++, by path within the package.
 
-    Raises `InputError` if the system's topics are not those of one version of ROS, or not of `ros` where it is given,
-    and for software of the system on the host.
+    Raises `InputError` if the system's topics are not those of one version of ROS, or not of `ros` where it is given.
     """
     description = describe(loaded)
     version = _only_version(description, ros)
-    _check_hardware(description)
     dialect = _DIALECTS[version]
     package = f"{description.name}_node"
     packages = {topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)}
@@ -78,15 +77,17 @@ def cpp_package(loaded: LoadedSystem, ros: RosVersion | None = None) -> dict[str
     return {
         "package.xml": render(_PACKAGE_TEMPLATE, build),
         "CMakeLists.txt": render(dialect.cmake, {"package": package}),
-        f"src/{package}.cpp": render(_SOURCE_TEMPLATE, _source(description, RosVersion(version), dialect)),
+        f"src/{package}.cpp": render(_SOURCE_TEMPLATE, _source(loaded, description, dialect)),
         **_headers(dialect),
     }
 
 
 def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
     """The node as a part of the generated system; nothing for a system that no one node in C++ can serve."""
-    spoken = {item.frame.ros for item in (*loaded.system.subscribers, *loaded.system.publishers)}
-    if len(spoken) != 1 or not spoken <= {*_DIALECTS} or loaded.system.software.blocks:
+    system = loaded.system
+    topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
+    spoken = {item.frame.ros for item in topics}
+    if len(spoken) != 1 or not spoken <= {*_DIALECTS}:
         return {}
     return {f"node/{path}": GeneratedFile(text, "user") for path, text in cpp_package(loaded).items()}
 
@@ -103,16 +104,6 @@ def _only_version(description: NodeDescription, ros: RosVersion | None) -> int:
     return found[0]
 
 
-def _check_hardware(description: NodeDescription) -> None:
-    """Raise `InputError` for software of the system on the host."""
-    topics = (*description.subscribers, *description.publishers)
-    if description.entering or description.leaving or any(topic.id is None for topic in topics):
-        fail(
-            f"'{description.name}' has accelerators in software, which a node in C++ does not run",
-            hint="a node in Python does",
-        )
-
-
 def _headers(dialect: _Dialect) -> dict[str, str]:
     """All but those for other versions of ROS."""
     others = {item.header for item in _DIALECTS.values()} - {dialect.header}
@@ -123,20 +114,43 @@ def _headers(dialect: _Dialect) -> dict[str, str]:
     }
 
 
-def _source(description: NodeDescription, ros: RosVersion, dialect: _Dialect) -> dict[str, Any]:
+def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialect) -> dict[str, Any]:
     """The table."""
     return {
         "name": description.name,
-        "ros": ros.title,
+        "ros": RosVersion(description.versions[0]).title,
         "header": dialect.header,
         "middleware": dialect.middleware,
         "signature": dialect.signature,
         "width": description.width,
+        "subscriber_count": len(loaded.system.subscribers),
+        "publisher_count": len(loaded.system.publishers),
         "queue_depth": _QUEUE_DEPTH,
         "definitions": [*_definitions(description)],
         "subscribers": [_row(topic) for topic in description.subscribers],
         "publishers": [_row(topic) for topic in description.publishers],
+        "software": _software(loaded, description),
     }
+
+
+def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, Any] | None:
+    """Where the messages of the blocks in software come from and go to; None if there are no such blocks here."""
+    ports = software_ports(loaded.system)
+    if not ports.inputs:
+        return None
+    topics = {topic.block: topic.name for topic in (*description.subscribers, *description.publishers)}
+    leaving = {crossing.block: crossing.id for crossing in description.leaving}
+    entering = {crossing.block: crossing.id for crossing in description.entering}
+    return {
+        "inputs": [_port(topic.block, leaving, topics) for topic in ports.inputs],
+        "outputs": [_port(topic.block, entering, topics) for topic in ports.outputs],
+    }
+
+
+def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) -> dict[str, str]:
+    if block in converters:
+        return {"topic": "", "converter": str(converters[block])}
+    return {"topic": topics[block], "converter": "{}"}
 
 
 def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
@@ -144,7 +158,14 @@ def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
     texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
     for name, text in texts.items():
         if text:
-            yield {"message": name, "constant": _constant(name), "text": text, "delimiter": _delimiter(text)}
+            first, *lines = text.splitlines()
+            yield {
+                "message": name,
+                "constant": _constant(name),
+                "delimiter": _delimiter(text),
+                "first_line": first,
+                "lines": lines,
+            }
 
 
 def _constant(message: str) -> str:
@@ -163,7 +184,7 @@ def _delimiter(text: str) -> str:
 
 def _row(topic: NodeTopic) -> dict[str, Any]:
     return {
-        "id": topic.id,
+        "id": "{}" if topic.id is None else str(topic.id),
         "topic": topic.name,
         "type": topic.type,
         "signature": topic.signature,

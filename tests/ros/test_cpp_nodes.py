@@ -19,8 +19,13 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.frame.codec import encode
+from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.host.simulator import build_simulator
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MessageName, RosVersion
 from tests.ros.cpp_nodes import Node, Peer, Ros, missing_ros1, missing_ros2, ros1, ros2
+from tests.sim.images import filtered, image, load_model
 
 REPOSITORY = Path(__file__).parents[2]
 SPECS = REPOSITORY / "specs"
@@ -53,9 +58,10 @@ class Workshop:
         """That of an application, in this version of ROS, with all that lies beside it."""
         if name == "echo":
             return self._echo()
-        spec = self.folder / "specs" / name / f"{name}.yaml"
-        if not spec.parent.exists():
-            shutil.copytree(SPECS / name, spec.parent)
+        folder = self.folder / "specs" / name
+        spec = folder / f"{name}.yaml"
+        if not folder.exists():
+            shutil.copytree(SPECS / name.removesuffix("_software"), folder)
             self._adapt(spec)
         return spec
 
@@ -192,6 +198,31 @@ def test_quaternions_come_back_as_angles(workshop: Workshop) -> None:
         assert "20 received, 0 dropped, 20 sent, 20 published, 0 errors, 0 restarts" in node.said()
     steps = [line.split(",")[1] for line in trace.read_text(encoding="utf-8").splitlines()[1:]]
     assert {steps.count(step) for step in ("received", "queued", "sent", "taken", "burst", "published")} == {20}
+
+
+@only_ros1
+def test_blocks_in_software_run_beside_the_hardware(workshop: Workshop) -> None:
+    """Gray and integral image in hardware, the scaling between them in Python; the topics know nothing of it."""
+    spec = workshop.specification("image_pipeline_software")
+    model, source = load_model("image_pipeline"), random.Random(SEED)
+    name = MessageName("sensor_msgs", "Image")
+    frame = frame_of(name, MessageLibrary(RosVersion.ROS1).closure(name))
+    software = f"PYTHONPATH={REPOSITORY} exec {sys.executable} -m fusesoc_firm.host.software_process {spec}"
+    program, transport = workshop.program("image_pipeline_software"), live_simulator(workshop, spec)
+    with (
+        Node(workshop.ros, program, transport, "--software", software) as node,
+        Peer(workshop.ros, {"/sums": "sensor_msgs/Image"}, {"/camera": "sensor_msgs/Image"}) as peer,
+    ):
+        peer.wait_until_connected()
+        sent = [image("ROS", source, height, width, 3) for height, width in ((8, 8), (12, 16), (2, 6))]
+        for message in sent:
+            peer.publish("/camera", encode(frame, message))
+        for message in sent:
+            gray = filtered(model, "rgb_to_gray", message)
+            expected = encode(frame, filtered(model, "integral_image", filtered(model, "scale_down", gray)))
+            assert same(workshop, expected, peer.take(60)[1])
+        assert node.stop() == 0
+        assert "its software: 3 received, 0 dropped, 3 sent, 3 published" in node.said()
 
 
 SIZES = (0, 1, 2, 3, 255, 65_536, 6_220_800)

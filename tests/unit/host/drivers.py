@@ -1,9 +1,9 @@
-"""Programs that speak for the C++ headers of `fusesoc_firm/host/cpp`: lines in, lines out."""
+"""Programs that speak for the C++ headers of `fusesoc_firm/host/cpp` and for `fusesoc_firm/host/c`: lines in, lines out."""
 
 from __future__ import annotations
 
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import fusesoc_firm.host
 
 HERE = Path(__file__).resolve().parent
 HEADERS = Path(fusesoc_firm.host.__file__).resolve().parent / "cpp"
+C_FOLDER = HEADERS.parent / "c"
 _OPTIONS = ["-std=c++17", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow"]
 _OPTIONS += ["-Wconversion", "-Wsign-conversion", "-Werror", "-pthread"]
 
@@ -43,4 +44,18 @@ def compile_driver(name: str, directory: Path, sanitizers: str = "address,undefi
     sanitize = [f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all"]
     command = ["g++", *_OPTIONS, *sanitize, "-I", str(HEADERS), str(HERE / f"{name}_driver.cpp"), "-o", str(program)]
     subprocess.run(command, check=True)
+    return Driver(program)
+
+
+def compile_c_driver(
+    name: str, directory: Path, sources: Sequence[str], folders: Sequence[Path], sizes: Mapping[str, int]
+) -> Driver:
+    """Compile `<name>_driver.c` as C99 with `sources` of the node in C, which have these `sizes`, and sanitizers."""
+    program = directory / name
+    options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror"]
+    sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    include = [word for folder in (C_FOLDER / "firm", *folders) for word in ("-I", str(folder))]
+    define = [f"-D{key}={value}" for key, value in sizes.items()]
+    files = [str(HERE / f"{name}_driver.c"), *(str(C_FOLDER / source) for source in sources)]
+    subprocess.run(["gcc", *options, *sanitize, *include, *define, *files, "-o", str(program)], check=True)
     return Driver(program)

@@ -29,6 +29,19 @@ static std::string to_hex(const std::uint8_t* bytes, std::size_t size) {
   return text;
 }
 
+static std::atomic<int> breaks{0};
+
+// As the node does it, but breaks are counted: a pseudo-terminal has none.
+static std::unique_ptr<firm::Transport> open(const std::string& address, const firm::TransportOptions& options) {
+  if (address.rfind("uart:/dev/pts/", 0) != 0) return firm::open_transport(address, options);
+  const auto parts = firm::TransportAddress::of(address);
+  firm::UartOptions uart;
+  uart.baud = parts.number();
+  uart.has_flow_control = parts.has_option;
+  uart.send_break = [](int) { return ++breaks, 0; };
+  return std::make_unique<firm::UartTransport>(parts.first, options, uart);
+}
+
 static void feed(firm::Node& node) {
   std::string line, command;
   while (std::getline(std::cin, line)) {
@@ -48,7 +61,7 @@ static void feed(firm::Node& node) {
       std::uint64_t count;
       words >> count;
       const firm::Deadline deadline(std::chrono::seconds(20));
-      while (node.statistics().published < count && !deadline.is_over()) {
+      while (node.statistics().published < count && node.error().empty() && !deadline.is_over()) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }
     }
@@ -77,9 +90,12 @@ int main(int, char** arguments) {
   std::ostringstream log;
   configuration.log = &log;
   std::ostringstream published;
-  firm::Node node(configuration, arguments[1], [&](unsigned publisher, const std::uint8_t* payload, std::size_t size) {
+  const auto publish = [&](unsigned publisher, const std::uint8_t* payload, std::size_t size) {
     published << "published " << publisher << " " << to_hex(payload, size) << "\n";
-  });
+  };
+  const std::string address = arguments[1];
+  firm::Node node(
+      configuration, [&](const firm::TransportOptions& options) { return open(address, options); }, publish);
   int status = -1;
   std::thread engine([&] { status = node.run(); });
   feed(node);
@@ -87,7 +103,7 @@ int main(int, char** arguments) {
   engine.join();
   const auto counts = node.statistics();
   std::cout << published.str() << "received " << counts.received << "\ndropped " << counts.dropped << "\nsent "
-            << counts.sent << "\nerrors " << counts.errors << "\nrestarts " << counts.restarts << "\nstatus " << status
+            << counts.sent << "\nerrors " << counts.errors << "\nrestarts " << counts.restarts << "\nbreaks " << breaks << "\nstatus " << status
             << "\nerror " << node.error() << "\n";
   std::istringstream lines(log.str());
   for (std::string line; std::getline(lines, line);) std::cout << "log " << line << "\n";

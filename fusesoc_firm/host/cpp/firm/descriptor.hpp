@@ -45,6 +45,12 @@ class Descriptor {
 // When a time that has been given is over.
 class Deadline {
  public:
+  using Time = std::chrono::steady_clock::time_point;
+  static Deadline at(Time end) {
+    Deadline deadline(std::nullopt);
+    deadline.end_ = end;
+    return deadline;
+  }
   explicit Deadline(Timeout timeout) {
     if (timeout) end_ = std::chrono::steady_clock::now() + *timeout;
   }
@@ -55,15 +61,13 @@ class Deadline {
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(*end_ - std::chrono::steady_clock::now()).count();
     return static_cast<int>(std::clamp<std::int64_t>(left, 0, kLongest));
   }
-  // The earlier one of two.
-  Deadline or_in(std::chrono::nanoseconds time) const {
-    const Deadline other(time);
-    return end_ && *end_ <= *other.end_ ? *this : other;
+  Deadline or_earlier(const Deadline& other) const {
+    return !other.end_ || (end_ && *end_ <= *other.end_) ? *this : other;
   }
 
  private:
   static constexpr std::int64_t kLongest = 1 << 30;
-  std::optional<std::chrono::steady_clock::time_point> end_;
+  std::optional<Time> end_;
 };
 
 // Waits for a descriptor until a time, or until a thread says that nobody shall wait any more.

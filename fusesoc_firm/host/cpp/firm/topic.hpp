@@ -5,15 +5,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
 namespace firm {
 
-// A converter of the hardware and the topic of its messages. `signature` is that of the message's definition, ROS 1's MD5
+// A topic, and the id of its converter in the hardware; none where only software has to do with it. `signature` is that of the message's definition, ROS 1's MD5
 // sum or ROS 2's hash (RIHS01), and `definition` its text with those of all messages within it, as ROS 1 announces it.
 struct Topic {
-  std::uint8_t id;
+  std::optional<unsigned> id;
   std::string name;
   std::string type;
   std::string signature;

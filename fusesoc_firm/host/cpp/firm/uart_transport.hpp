@@ -2,8 +2,9 @@
 // A board's serial link (cores/board/README.md): frames as they are, byte after byte, 8 bits, no parity.
 //
 // A row of bytes has no marks. To the board a break is one: what follows begins a frame. From the board only silence is,
-// so behind an error all is dropped until the line is silent. The transport does both when it is opened, and whenever
-// what comes cannot be a frame: an id or a length that there is not, or a pause within a frame.
+// so all is dropped until the line is silent, and in the meantime nothing is sent that would be answered. The transport
+// does both when it is opened, and whenever what comes cannot be a frame: an id or a length that there is not, or a pause
+// within a frame.
 #pragma once
 
 #include <fcntl.h>
@@ -13,6 +14,7 @@
 
 #include <array>
 #include <atomic>
+#include <condition_variable>
 #include <functional>
 #include <mutex>
 #include <string>
@@ -29,6 +31,7 @@ struct UartOptions {
   bool has_flow_control = false;  // RTS and CTS
   std::chrono::nanoseconds silence = std::chrono::milliseconds(50);        // that parts what comes from what came
   std::chrono::nanoseconds longest_pause = std::chrono::milliseconds(200);  // within a frame from the board
+  std::chrono::nanoseconds patience = std::chrono::seconds(2);               // with a board that is not silent
   std::function<int(int descriptor)> send_break = [](int descriptor) { return ::tcsendbreak(descriptor, 0); };
 };
 
@@ -44,10 +47,13 @@ class UartTransport : public Transport {
     if (line_.get() < 0) fail_with_errno(device_);
     configure();
     cut();
-    ::tcflush(line_.get(), TCIFLUSH);
+    const Deadline deadline(uart_.patience);
+    while (is_dropping_ && !deadline.is_over()) receive_within(deadline);
+    if (is_dropping_) throw TransportError(device_ + ": the board is never silent, so nobody knows where frames begin");
   }
 
   void send(const std::uint8_t* frame, std::size_t size) override {
+    wait_for_silence();
     const std::lock_guard<std::mutex> lock(sending_);
     make_wanted_break();
     while (size > 0) {
@@ -66,24 +72,16 @@ class UartTransport : public Transport {
 
   std::optional<Burst> receive(Timeout timeout = std::nullopt) override {
     const Deadline deadline(timeout);
-    while (!is_closed_) {
-      if (read_ < filled_ && take()) return Burst{stream_.pop()};
-      if (read_ < filled_) continue;
-      const auto event_by = is_dropping_            ? deadline.or_in(uart_.silence)
-                            : stream_.has_begun() ? deadline.or_in(uart_.longest_pause)
-                                                  : deadline;
-      if (waiter_.wait(line_.get(), POLLIN, event_by)) {
-        fill();
-      } else if (!is_closed_ && !be_silent(event_by, deadline)) {
-        return std::nullopt;
-      }
-    }
+    do {
+      if (receive_within(deadline)) return Burst{stream_.pop()};
+    } while (!is_closed_ && !deadline.is_over());
     return std::nullopt;
   }
 
   void close() override {
     is_closed_ = true;
     waiter_.end();
+    set_dropping(false);
   }
 
  private:
@@ -121,14 +119,32 @@ class UartTransport : public Transport {
     if (::ioctl(line_.get(), TIOCEXCL) != 0) fail_with_errno(device_);
   }
 
+  // Take what is there, or wait for it; whether a frame is whole.
+  bool receive_within(const Deadline& deadline) {
+    if (read_ < filled_) return take();
+    const bool is_timed = is_dropping_ || stream_.has_begun();
+    const Deadline pause = Deadline::at(moved_ + (is_dropping_ ? uart_.silence : uart_.longest_pause));
+    if (waiter_.wait(line_.get(), POLLIN, is_timed ? deadline.or_earlier(pause) : deadline)) {
+      fill();
+    } else if (!is_closed_ && is_timed && pause.is_over()) {
+      if (is_dropping_) {
+        set_dropping(false);
+      } else {
+        lose();
+      }
+    }
+    return false;
+  }
+
   // Bring both sides together. A frame of ours that is on its way comes first: who receives must not wait for it, as the
   // board may take no more before we have received.
   void cut() {
-    is_dropping_ = true;
+    set_dropping(true);
     stream_.pop();
     is_break_wanted_ = true;
     const std::unique_lock<std::mutex> lock(sending_, std::try_to_lock);
     if (lock) make_wanted_break();
+    moved_ = std::chrono::steady_clock::now();
   }
 
   void make_wanted_break() {
@@ -166,19 +182,18 @@ class UartTransport : public Transport {
     if (found == 0) throw TransportError(device_ + ": the device is gone");
     read_ = 0;
     filled_ = static_cast<std::size_t>(found);
+    moved_ = std::chrono::steady_clock::now();
   }
 
-  // Nothing came: what that means. False if it is the time of the one who receives that is over.
-  bool be_silent(const Deadline& event_by, const Deadline& deadline) {
-    if (event_by.is_over() && !deadline.is_over()) {
-      if (is_dropping_) {
-        is_dropping_ = false;
-      } else {
-        lose();
-      }
-      return true;
-    }
-    return !deadline.is_over();
+  void set_dropping(bool is_dropping) {
+    const std::lock_guard<std::mutex> lock(dropping_);
+    is_dropping_ = is_dropping;
+    changed_.notify_all();
+  }
+
+  void wait_for_silence() {
+    std::unique_lock<std::mutex> lock(dropping_);
+    changed_.wait(lock, [this] { return !is_dropping_ || is_closed_; });
   }
 
   void throw_if_closed() const {
@@ -193,10 +208,13 @@ class UartTransport : public Transport {
   std::atomic<bool> is_closed_{false};
   std::mutex sending_;  // a frame, or a break
   std::atomic<bool> is_break_wanted_{false};
+  std::mutex dropping_;
+  std::condition_variable changed_;
+  std::atomic<bool> is_dropping_{false};  // what comes, until the line is silent
 
   // The receiver's own.
   FrameStream stream_;
-  bool is_dropping_ = false;
+  std::chrono::steady_clock::time_point moved_;  // when bytes came last
   std::array<std::uint8_t, 4096> buffer_;
   std::size_t read_ = 0;
   std::size_t filled_ = 0;

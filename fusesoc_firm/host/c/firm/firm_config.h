@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The sizes of a node, which are known before it is compiled: its memory is static. A node defines its own by -D, or in a
+ * header that is named by FIRM_CONFIG_HEADER. */
+#ifndef FIRM_CONFIG_H
+#define FIRM_CONFIG_H
+
+#ifdef FIRM_CONFIG_HEADER
+#include FIRM_CONFIG_HEADER
+#endif
+
+#ifndef FIRM_WIDTH
+#define FIRM_WIDTH 8 /* bits of the system's streams */
+#endif
+#ifndef FIRM_SUBSCRIBERS
+#define FIRM_SUBSCRIBERS 1
+#endif
+#ifndef FIRM_PUBLISHERS
+#define FIRM_PUBLISHERS 1
+#endif
+#ifndef FIRM_LONGEST_PAYLOAD
+#define FIRM_LONGEST_PAYLOAD 1024 /* bytes, in either direction */
+#endif
+#ifndef FIRM_QUEUE_DEPTH
+#define FIRM_QUEUE_DEPTH 4 /* frames, for each subscriber */
+#endif
+#ifndef FIRM_WRITERS
+#define FIRM_WRITERS 1 /* tasks that put payloads at the same time */
+#endif
+#ifndef FIRM_DMA_BUFFERS
+#define FIRM_DMA_BUFFERS 4 /* in each direction */
+#endif
+#ifndef FIRM_DMA_BUFFER_BYTES
+#define FIRM_DMA_BUFFER_BYTES 2048 /* a multiple of 64; a longer frame takes several */
+#endif
+
+/* A line that cannot be compiled says what is wrong. */
+typedef char firm_width_is_8_to_512[(FIRM_WIDTH >= 8 && FIRM_WIDTH <= 512 && (FIRM_WIDTH & (FIRM_WIDTH - 1)) == 0) ? 1 : -1];
+typedef char firm_ids_are_one_byte[(FIRM_SUBSCRIBERS >= 1 && FIRM_SUBSCRIBERS <= 256 && FIRM_PUBLISHERS >= 1 &&
+                                    FIRM_PUBLISHERS <= 256)
+                                       ? 1
+                                       : -1];
+typedef char firm_dma_buffers_are_aligned[(FIRM_DMA_BUFFER_BYTES > 0 && FIRM_DMA_BUFFER_BYTES % 64 == 0 &&
+                                           FIRM_DMA_BUFFERS >= 2)
+                                              ? 1
+                                              : -1];
+
+#endif

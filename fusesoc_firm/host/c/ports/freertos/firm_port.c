@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* FreeRTOS: short sections are its critical ones, and a wait lets other tasks run. */
+#include "firm_port.h"
+
+#include "FreeRTOS.h"
+#include "task.h"
+
+void firm_lock(firm_lock_t *lock) {
+    (void)lock;
+    taskENTER_CRITICAL();
+}
+
+void firm_unlock(firm_lock_t *lock) {
+    (void)lock;
+    taskEXIT_CRITICAL();
+}
+
+uint32_t firm_milliseconds(void) { return (uint32_t)xTaskGetTickCount() * (uint32_t)portTICK_PERIOD_MS; }
+
+/* At least one tick, so that tasks of a lower priority run, too. */
+void firm_pause(void) { vTaskDelay(1); }
