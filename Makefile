@@ -24,7 +24,7 @@ TOOLS :=
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
-# Parts of the bench, all if empty: BENCH='area manager timing use cycles fuzz images systems simulators'.
+# Parts of the bench, all if empty: BENCH='area manager timing use cycles fuzz images systems simulators live'.
 BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
@@ -74,7 +74,7 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing use cycles fuzz images systems simulators'
+bench: setup ros $(VENV)/.bench ## Measure area, cycles and robustness, write docs/figures.md; BENCH='area manager timing use cycles fuzz images systems simulators live'
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean

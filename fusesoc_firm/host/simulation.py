@@ -47,7 +47,7 @@ def generate(request: Request) -> GeneratedCore:
     """The core; it belongs beside the one that the same specification gives as a system. Raises `InputError`."""
     loaded = generator.load_requested(request)
     system = loaded.system
-    _check_simulator(system, str(request.parameters["simulator"]))
+    _check_simulator(system, str(request.parameters["simulator"]), "sim")
     stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
     answers = responses(_path(request, "model"), stimuli, answered(system))
     found = traffic(system, loaded.folder, stimuli, answers)
@@ -78,7 +78,7 @@ def generate_live(request: Request) -> GeneratedCore:
     """The core of a live simulation. Seed and rate of stalls are given where it is started. Raises `InputError`."""
     loaded = generator.load_requested(request)
     system = loaded.system
-    _check_simulator(system, str(request.parameters["simulator"]))
+    _check_simulator(system, str(request.parameters["simulator"]), "live")
     environment = environment_files(_environment(request), system)
     configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
     files = _surroundings(loaded, environment)
@@ -104,17 +104,20 @@ def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
     return [*environment][-1].stem if environment else None
 
 
-def _check_simulator(system: DerivedSystem, simulator: str) -> None:
-    """Fail if an accelerator is written in what the simulator does not understand, or the host's end of a link is."""
+def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None:
+    """Fail if an accelerator is written in what the simulator does not understand, or the host's end of a link is.
+
+    GHDL's `target` is what a user is pointed to.
+    """
     if simulator != GHDL and system.clocks:
         fail(
             f"{simulator} cannot simulate a system of several clocks",
-            hint="the clocks beside the host's are made in VHDL: --target=sim",
+            hint=f"the clocks beside the host's are made in VHDL: --target={target}",
         )
     if simulator != GHDL and system.link:
         fail(
             f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",
-            hint="the host's end of a link is written in VHDL: --target=sim",
+            hint=f"the host's end of a link is written in VHDL: --target={target}",
         )
     for type_ in system.accelerator_types:
         accelerator = type_.accelerator
@@ -122,7 +125,7 @@ def _check_simulator(system: DerivedSystem, simulator: str) -> None:
             hint = "'simulator: icarus' or 'verilator' link it with the Verilog that GHDL makes of the VHDL"
             fail(f"GHDL simulates no Verilog, which '{accelerator.name}' is written in", accelerator.name.source, hint)
         if simulator != GHDL and accelerator.type == "HLS":
-            hint = "only GHDL calls a C++ function from within a simulation: --target=sim"
+            hint = f"only GHDL calls a C++ function from within a simulation: --target={target}"
             fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
 
 

@@ -167,11 +167,12 @@ def _build(spec: Path, core: Path, tool: str, work: Path) -> None:
     content, target = _content(core), _TARGETS[tool]
     if target not in content.get("targets", {}):
         fail(f"{core} has no target '{target}'", hint=f"firm system core {spec}")
+    made_with = content["targets"][target].get("flow_options", {}).get("tool", tool)
+    if made_with != tool:
+        fail(f"{core}: target '{target}' is for {made_with}", hint=f"--tool {made_with}")
     command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.parent]
     command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, content["name"]]
     _run(spec, list(map(str, command)), _project_folder(spec))
-    if (made_with := _flow(work)["flow_options"]["tool"]) != tool:
-        fail(f"{core}: target '{target}' is for {made_with}", hint=f"--tool {made_with}")
     if tool == GHDL:
         # FuseSoC builds nothing before it runs.
         _run(spec, ["make", "analyze"], work)

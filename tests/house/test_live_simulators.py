@@ -113,14 +113,38 @@ def test_a_specification_without_a_core(tmp_path: Path) -> None:
     spec = copy_of("quat2euler", tmp_path, has_core=False)
     sources = CoreSources(depend=["robot:acc:cordic", "robot:acc:float64"])
     built = build_simulator(spec, build_root=tmp_path / "build", sources=sources)
-    frame = frames_of_quaternion()
+    frame = quaternion()
     assert len(answers(built, [frame], (1, 8))[0]) == 1
     # It leaves nothing beside the specification.
     assert not [*spec.parent.glob("*.core")]
 
 
-def frames_of_quaternion() -> bytes:
+def quaternion() -> bytes:
     return b"\x00\x20\x00\x00\x00" + bytes(24) + b"\x00\x00\x00\x00\x00\x00\xf0\x3f"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"  name: quat2euler\n": "  name: quat2euler\n  interconnect: uart\n  clock: 100 MHz\n"},
+        {
+            "  fpgaPart: xc7z020clg400-1\n": "  clock: 100 MHz\n  clocks: [{name: fast, frequency: 150 MHz}]\n",
+            "    type: quat2euler\n": "    type: quat2euler\n    clock: fast\n",
+        },
+    ],
+    ids=["link", "clocks"],
+)
+def test_links_and_further_clocks(tmp_path: Path, changes: dict[str, str]) -> None:
+    spec = copy_of("quat2euler", tmp_path, has_core=True)
+    text = spec.read_text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    spec.write_text(text)
+    built = build_simulator(spec, build_root=tmp_path / "build")
+    found, _ = answers(built, [quaternion()] * 3, (1, 8))
+    # Roll, pitch and yaw of no rotation.
+    assert found == [b"\x00\x18\x00\x00\x00" + bytes(24)] * 3
 
 
 def test_a_changed_source_is_built_and_its_fault_shown(tmp_path: Path) -> None:
@@ -168,7 +192,7 @@ def test_the_command_prints_a_program(tmp_path: Path, capsys: pytest.CaptureFixt
     echoed = subprocess.run(["/bin/sh", "-c", f"echo {printed}"], capture_output=True, text=True, check=True)
     assert shlex.split(printed) == [echoed.stdout.rstrip("\n")]
     with Simulator(shlex.split(printed)) as simulator:
-        simulator.request(frames_of_quaternion())
+        simulator.request(quaternion())
         while not any(isinstance(event, Burst) for event in simulator.run(1000)):
             assert simulator.quiet < 1000
         simulator.quit()

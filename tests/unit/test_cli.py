@@ -62,6 +62,8 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["scheduler"],
         ["scheduler", "bench"],
         ["scheduler", "choose"],
+        ["live"],
+        ["trace"],
         ["graph"],
         ["affected"],
         ["why"],

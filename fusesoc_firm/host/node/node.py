@@ -54,8 +54,8 @@ OpenTransport = Callable[[HardwareListener], Transport]
 class NodeSettings:
     """`depth` messages fit each queue; what a full one does is `overflow`.
 
-    At the end, what was received is processed: until the hardware has been silent for `settle` seconds, where it cannot
-    say that it is at rest, and for `drain` seconds at most. A transport that is gone is opened anew if it `restarts`.
+    At the end, what was received is processed: until the hardware has been silent for `settle` seconds, and does not
+    say that it still works, but for `drain` seconds at most. A transport that is gone is opened anew if it `restarts`.
     `report` gets what people should read.
     """
 
@@ -278,10 +278,8 @@ class Node:
         """Whether nothing is on its way any more, as far as the transport can know it."""
         if self._waiting() or hardware.joiner.unfinished:
             return False
-        is_at_rest: bool | None = hardware.transport.is_at_rest()
-        if is_at_rest is None:
-            return time.monotonic() - self._last_traffic > self._settings.settle
-        return is_at_rest
+        is_silent = time.monotonic() - self._last_traffic > self._settings.settle
+        return is_silent and hardware.transport.is_at_rest() is not False
 
     def _join(self, hardware: _Hardware, burst: Burst) -> None:
         try:

@@ -9,9 +9,10 @@ from fusesoc_firm.host.simulator import BuiltSimulator
 from fusesoc_firm.host.transport.open_transport import open_transport
 from fusesoc_firm.host.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
 
-# A simulation at rest goes on now and then, for accelerators that send without being asked. One that computes for
-# longer than so many cycles without a beat still works, but is not waited for at the end.
-_PACE = Pace(rest_cycles=20_000, idle_seconds=0.05)
+# After so many cycles without a beat a simulation takes no more of the processor than it needs to go on now and then,
+# for accelerators that send without being asked, and those that compute for longer. One that never slept would lose its
+# turn to others when a message comes.
+_PACE = Pace(rest_cycles=2_000, idle_seconds=0.05)
 
 
 def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -> OpenTransport:
