@@ -34,7 +34,12 @@ SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw)
 # A host in Verilog takes its seed from FuseSoC.
 RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 is for GHDL, TARGET=sim))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
 
-.PHONY: help sim test bitstream bench proofs corpus lint setup tools clean distclean
+# What a node and its peers need of ROS 1, as Debian has it: programs and libraries, and modules of its own Python.
+DEBIAN_MODULES := /usr/lib/python3/dist-packages
+ROS1 := pkg-config rosmaster:python3-rosmaster /usr/include/ros/ros.h:libroscpp-dev \
+  $(foreach name,rospy std_msgs geometry_msgs sensor_msgs,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
+
+.PHONY: help sim test ros bitstream bench proofs corpus lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -48,8 +53,12 @@ sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
 test: TOOLS = iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
-test: setup ## Run all tests; PYTEST_OPTIONS='...'
+test: setup ros ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+
+# Both are there for some of the tests, which are skipped without them.
+ros: $(VENV)/.ros2
+	@./.ci/install-tools $(ROS1) >/dev/null || echo "No ROS 1: the tests with it are skipped" >&2
 
 HAS_CORPUS := $(and $(wildcard $(CORPUS)/ros1),$(wildcard $(CORPUS)/ros2))
 
@@ -65,7 +74,7 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup $(VENV)/.bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
+bench: setup ros $(VENV)/.bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
@@ -94,6 +103,16 @@ $(VENV)/.installed: pyproject.toml | tools
 	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]' || \
 	  { echo "pip could not install what pyproject.toml lists; its message is above." >&2; exit 1; }
 	@touch $@
+
+# ROS 2 as wheels, and the libpython that some of their libraries expect in the process. They have a venv of their own, as
+# they fill it with libraries and headers.
+$(VENV)/.ros2: tests/ros/ros2.txt $(VENV)/.installed
+	@echo "Installing ROS 2 into $(VENV)/ros2"
+	@python=$$(./.ci/install-tools) && "$$python" -m venv --clear $(VENV)/ros2 && \
+	  ./.ci/install-tools $$("$$python" -c 'from sys import version_info as v; from ctypes.util import find_library as f; \
+	    name = f"python{v[0]}.{v[1]}"; print("" if f(name) else f"lib{name}")') >/dev/null && \
+	  $(VENV)/ros2/bin/pip install --quiet --disable-pip-version-check --requirement $< && touch $@ || \
+	  echo "No ROS 2: the tests with it are skipped" >&2
 
 # Yosys is there for the proofs; nextpnr is for the bench alone.
 $(VENV)/.bench: $(VENV)/.installed

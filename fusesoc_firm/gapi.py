@@ -94,21 +94,27 @@ def _copy_messages(request: Request) -> GeneratedCore:
 
 
 def _system_inputs(request: Request) -> list[Path]:
-    from fusesoc_firm.host import simulation
+    from fusesoc_firm.host import node_package, simulation
     from fusesoc_firm.system import generator
 
     if request.parameters["product"] == "live":
         return simulation.live_inputs(request)
-    return simulation.inputs(request) if _is_simulation(request) else generator.inputs(request)
+    if _is_simulation(request):
+        return simulation.inputs(request)
+    return [*generator.inputs(request), *node_package.headers()]
 
 
 def _generate_system(request: Request) -> GeneratedCore:
-    from fusesoc_firm.host import simulation
+    from fusesoc_firm.host import node_package, simulation
     from fusesoc_firm.system import generator
 
     if request.parameters["product"] == "live":
         return simulation.generate_live(request)
-    return simulation.generate(request) if _is_simulation(request) else generator.generate(request)
+    if _is_simulation(request):
+        return simulation.generate(request)
+    loaded = generator.load_requested(request)
+    core = generator.system_core(loaded)
+    return replace(core, files={**core.files, **node_package.generated_files(loaded)})
 
 
 def _simulator_programs(request: Request) -> Sequence[str]:

@@ -11,6 +11,7 @@ from fusesoc_firm import __version__
 from fusesoc_firm.cli.build import add_build
 from fusesoc_firm.cli.cache import add_cache
 from fusesoc_firm.cli.common import command
+from fusesoc_firm.cli.live import add_live
 from fusesoc_firm.cli.message import add_message
 from fusesoc_firm.cli.project import add_project
 from fusesoc_firm.cli.replay import add_replay
@@ -20,12 +21,13 @@ from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.host.node.options import remappings
 from fusesoc_firm.library_path import library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `firm`; the exit status is 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
-    arguments = _parser().parse_args(argv)
+    arguments = _parsed(argv)
     try:
         arguments.handler(arguments)
         sys.stdout.flush()
@@ -42,6 +44,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The command line; what remaps names for a node of ROS may stand anywhere in it."""
+    parser = _parser()
+    arguments, rest = parser.parse_known_args(argv)
+    if rest and not hasattr(arguments, "remappings"):
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    if rest:
+        arguments.remappings = remappings(rest, parser.error)
+    return arguments
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="firm", description="ROS messages and robot systems as FPGA hardware.")
     parser.add_argument("--version", action="version", version=f"firm {__version__}")
@@ -56,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     add_message(commands)
     add_system(commands)
     add_simulator(commands)
+    add_live(commands)
     add_scheduler(commands)
     add_build(commands)
     add_replay(commands)

@@ -5,10 +5,32 @@ from __future__ import annotations
 import argparse
 import json
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import add_sources, as_yaml, command, library_of, load, write
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.system.generator import LoadedSystem
+
+
+def _cpp_package(loaded: LoadedSystem, ros: RosVersion | None, _: argparse.Namespace) -> Mapping[str, str]:
+    from fusesoc_firm.host.node_package import cpp_package
+
+    return cpp_package(loaded, ros)
+
+
+def _python_node(loaded: LoadedSystem, ros: RosVersion | None, arguments: argparse.Namespace) -> Mapping[str, str]:
+    from fusesoc_firm.host.node.source import python_node
+
+    return python_node(loaded, ros, arguments.spec, arguments.output, arguments.path)
+
+
+_Writer = Callable[["LoadedSystem", "RosVersion | None", argparse.Namespace], Mapping[str, str]]
+# What nodes are written in: the files of one, by path within its folder.
+_NODE_LANGUAGES: Mapping[str, _Writer] = {"cpp": _cpp_package, "python": _python_node}
 
 
 def add_system(commands: Any) -> None:
@@ -59,7 +81,15 @@ def add_system(commands: Any) -> None:
         _write_core,
     )
     _add_core_options(core)
-    for parser in (new, check, show, skeletons, draw, report, core):
+    node = command(
+        actions,
+        "node",
+        "write the software node of a system: a package of ROS that joins its topics and its hardware",
+        "firm system node robot.yaml -o src/robot_node",
+        _write_node,
+    )
+    _add_node_options(node)
+    for parser in (new, check, show, skeletons, draw, report, core, node):
         parser.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
         add_sources(parser)
     command(
@@ -84,6 +114,14 @@ def _add_core_options(core: argparse.ArgumentParser) -> None:
     new.add_argument(
         "--environment", metavar="F", action="append", default=[], help="VHDL of what is at the pins; may be repeated"
     )
+
+
+def _add_node_options(node: argparse.ArgumentParser) -> None:
+    node.add_argument("-o", "--output", type=Path, metavar="DIR", help="the package's folder (default: <system>_node)")
+    node.add_argument(
+        "--language", choices=sorted(_NODE_LANGUAGES), default="cpp", help="what it is written in (default: cpp)"
+    )
+    node.add_argument("--ros", type=int, choices=(1, 2), help="fail unless the system speaks this version of ROS")
 
 
 def _check_system(arguments: argparse.Namespace) -> None:
@@ -155,6 +193,19 @@ def _write_core(arguments: argparse.Namespace) -> None:
         text = new_core(system, os.path.relpath(spec, folder), options)
     write(path, text)
     print(path)
+
+
+def _write_node(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.message.model import RosVersion
+
+    loaded = load(arguments, needs_sources=False)
+    ros = RosVersion(arguments.ros) if arguments.ros else None
+    folder: Path = arguments.output or Path(f"{loaded.system.name}_node")
+    arguments.output = folder
+    files = _NODE_LANGUAGES[arguments.language](loaded, ros, arguments)
+    for path, text in files.items():
+        write(folder / path, text)
+    print(folder)
 
 
 def _draw_system(arguments: argparse.Namespace) -> None:

@@ -14,6 +14,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from fusesoc_firm.diagnostics import fail
@@ -83,8 +84,11 @@ class Functions:
     calls: dict[str, int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, software: Software, folder: Path) -> Functions:
-        """Load all functions. Raises `InputError`, also for a fault within a file."""
+    def of(cls, software: Software, folder: Path, outside: Mapping[End, str] = MappingProxyType({})) -> Functions:
+        """Load all functions. Raises `InputError`, also for a fault within a file.
+
+        What goes to a block without sources is dropped, unless `outside` has a name for it.
+        """
         here = {block.block: block for block in software.blocks if block.type.accelerator.sources}
         elsewhere = {block.block for block in software.blocks} - here.keys()
         graph: dict[str, list[str]] = {name: [] for name in here}
@@ -97,15 +101,23 @@ class Functions:
             {name: _load(block, folder) for name, block in here.items()},
         )
         for connection in software.connections:
-            for sink, frame in zip(connection.sinks, connection.frames, strict=True):
+            for end, frame in zip(connection.sinks, connection.frames, strict=True):
+                sink = End(outside[end]) if end in outside else end
                 if sink.block not in elsewhere:
                     made.ways.setdefault(connection.source, []).append(_Way(sink, frame))
                     made.waiting.setdefault(sink, {})[connection.source] = deque()
         return made
 
     def take(self, source: End, message: Message) -> list[tuple[str, Message]]:
-        """Let a message in: the messages that leave because of it, each with the block outside that it goes to."""
+        """Let a message in: the messages that leave because of it, each with the block outside that it goes to.
+
+        After an `InputError`, `run` gives what is left of them: only the call that failed is lost.
+        """
         self._send(source, message)
+        return self.run()
+
+    def run(self) -> list[tuple[str, Message]]:
+        """Call what has all its messages: what leaves because of it, as `take` gives it. Raises `InputError`."""
         for block in self.blocks:
             ends = [End(block.block, side.prefix) for side in block.type.inputs]
             while all(map(self._is_there, ends)):

@@ -8,7 +8,7 @@ A block without sources stands for software elsewhere: the stimuli hold what it 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +21,7 @@ from fusesoc_firm.frame.values import shown
 from fusesoc_firm.host.functions import Functions, Message, importable_sources
 from fusesoc_firm.host.reference import Response
 from fusesoc_firm.host.stimuli import Stimulus
-from fusesoc_firm.system.derived import Converter, DerivedSystem, End, Topic
+from fusesoc_firm.system.derived import AcceleratorType, Converter, DerivedSystem, End, MessageSide, Topic
 
 
 @dataclass(frozen=True)
@@ -69,11 +69,20 @@ def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], re
 
 def sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
     """The outputs of software that is not here."""
+    return _elsewhere(system, lambda type_: type_.outputs)
+
+
+def taken_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
+    """The inputs of software that is not here."""
+    return _elsewhere(system, lambda type_: type_.inputs)
+
+
+def _elsewhere(system: DerivedSystem, sides: Callable[[AcceleratorType], Iterable[MessageSide]]) -> dict[Topic, End]:
     return {
         Topic(system.names[end], side.frame): end
         for block in system.software.blocks
         if not block.type.accelerator.sources
-        for side in block.type.outputs
+        for side in sides(block.type)
         for end in (End(block.block, side.prefix),)
     }
 
@@ -114,7 +123,7 @@ class _Run:
 
     @cached_property
     def _ways(self) -> dict[str, set[str]]:
-        return {item.block: _way_to(item.block, self.system) for item in self.system.publishers}
+        return {item.block: way_to(item.block, self.system) for item in self.system.publishers}
 
     def take(self, stimulus: Stimulus, responses: Sequence[Response]) -> None:
         """Send a message, and have software answer it and what the hardware sends for it."""
@@ -144,7 +153,7 @@ class _Run:
         return next(numbers, None)
 
 
-def _way_to(publisher: str, system: DerivedSystem) -> set[str]:
+def way_to(publisher: str, system: DerivedSystem) -> set[str]:
     """The blocks in hardware that a publisher's message comes from."""
     found: set[str] = set()
     new = {publisher}

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from fusesoc_firm.message.model import (
     Constant,
     DefaultValue,
     MessageDefinition,
+    MessageName,
     RosVersion,
     Scalar,
 )
+
+# What parts a message's text from those of the messages within it, in ROS' bags and connection headers.
+_SEPARATOR = "=" * 80
 
 
 def to_text(definition: MessageDefinition, signature: str = "") -> str:
@@ -26,6 +30,12 @@ def to_text(definition: MessageDefinition, signature: str = "") -> str:
     header = [f"# {definition.name} ({ros.title})", *([f"# signature: {signature}"] if signature else [])]
     blocks = [header, _aligned(constants), _aligned(fields)]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
+
+
+def closure_text(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> str:
+    """The texts of a message and of all others in `definitions`, as ROS' bags and connection headers join them."""
+    others = [f"{_SEPARATOR}\nMSG: {other}\n{to_text(definitions[other])}" for other in definitions if other != name]
+    return "".join([to_text(definitions[name]), *others])
 
 
 def _aligned(rows: Sequence[tuple[str, str, str]]) -> list[str]:

@@ -182,7 +182,11 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
 
 def generate(request: Request) -> GeneratedCore:
     """The system as a core, its files in the order in which a tool reads them. Raises `InputError`."""
-    loaded = load_requested(request)
+    return system_core(load_requested(request))
+
+
+def system_core(loaded: LoadedSystem) -> GeneratedCore:
+    """The core of a loaded system."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
     top = f"{system.entity}.vhd"

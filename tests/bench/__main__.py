@@ -21,6 +21,7 @@ from tests.bench import (
     fuzz,
     images,
     links,
+    live,
     manager,
     replay,
     simulators,
@@ -78,6 +79,7 @@ def _measure(part: str, seed: int, broken: int) -> list[Table]:
         "builds": lambda: builds.measure(_tell),
         "simulators": lambda: simulators.measure(_tell),
         "replay": lambda: replay.measure(seed, _tell),
+        "live": lambda: live.measure(_tell),
         "store": lambda: store.measure(_tell),
     }
     return measures[part]()

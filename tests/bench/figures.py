@@ -17,6 +17,7 @@ from tests.bench import (
     fuzz,
     images,
     links,
+    live,
     manager,
     nextpnr,
     replay,
@@ -47,6 +48,7 @@ _HEADINGS = {
     "simulators": "Simulators",
     "store": "Store",
     "replay": "Replay",
+    "live": "Live nodes",
 }
 _METHODS = {
     "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
@@ -71,6 +73,7 @@ _METHODS = {
         same frames and stalls in every simulator, and the same bytes back.""",
     "store": "What is generated on a second run of FuseSoC, and what that costs.",
     "replay": """Bags through `firm replay`: written with rosbags, and what is recorded is read with rosbags.""",
+    "live": "`firm live` in a running ROS, as docs/live.md has it.",
 }
 _INTRODUCTION = """
     Written by `make bench`; `make bench BENCH='area'` measures a part anew ({parts}). 'not converted' is a message that
@@ -101,6 +104,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         simulators,
         store,
         replay,
+        live,
     )
     return {title: rows for module in modules for title, rows in module.keys().items()}
 
@@ -138,6 +142,8 @@ def _versions(part: str) -> str:
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
+    elif part == "live":
+        tools += [_first_line("verilator"), *live.versions()]
     elif part == "simulators":
         tools += [_first_line("verilator"), *simulators.versions()]
     elif part in ("area", "manager", "timing", "links", "applications"):

@@ -63,6 +63,8 @@ def test_path_is_the_library(capsys: Captured) -> None:
         ["scheduler", "bench"],
         ["scheduler", "choose"],
         ["replay"],
+        ["live"],
+        ["trace"],
         ["graph"],
         ["affected"],
         ["why"],

@@ -181,6 +181,9 @@ class DmaTransport:
                     self._device.wait(rest)
         return None
 
+    def is_at_rest(self) -> None:
+        """Nothing: the hardware behind the engine may work at something."""
+
     def close(self) -> None:
         """Stop the engine, so that it does not write to memory that is somebody else's. A second call does nothing."""
         if self._closing.is_set():

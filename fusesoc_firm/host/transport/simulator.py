@@ -282,6 +282,12 @@ class SimulatorTransport:
             self._changed.notify_all()
             return item
 
+    def is_at_rest(self) -> bool:
+        """Whether the system has taken all that was sent, and has had no beat since `rest_cycles`."""
+        with self._changed:
+            is_busy = self._frames or self._received
+            return not is_busy and self._simulator.quiet >= self._pace.rest_cycles
+
     def close(self) -> None:
         """Stop, and kill the simulator. A second call does nothing."""
         with self._changed:
@@ -335,13 +341,13 @@ class SimulatorTransport:
         start, first = time.monotonic(), self._simulator.cycle
         events = self._simulator.run(self._step)
         self._adapt(self._simulator.cycle - first, time.monotonic() - start)
+        if self._observe:
+            for event in events:
+                self._observe(event)
         with self._changed:
             for event in events:
                 self._note(event)
             self._changed.notify_all()
-        if self._observe:
-            for event in events:
-                self._observe(event)
 
     def _adapt(self, cycles: int, seconds: float) -> None:
         """Step about so far as the simulator gets in a while."""

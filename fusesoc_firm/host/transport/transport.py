@@ -48,6 +48,9 @@ class Transport(Protocol):
         Raises `TransportError`, and of that `TransportResetError` where frames that have begun are to be forgotten.
         """
 
+    def is_at_rest(self) -> bool | None:
+        """Whether all that was sent has had its effect, and all of that was received; None where no one can know."""
+
     def close(self) -> None:
         """Stop; what has been sent may be lost. A second call does nothing."""
 

@@ -92,6 +92,9 @@ class UartTransport:
         with self._receiving:
             return self._receive(timeout)
 
+    def is_at_rest(self) -> None:
+        """Nothing: who is at the other end of a line may work at something."""
+
     def close(self) -> None:
         """Stop. A second call does nothing."""
         if self._is_closed:

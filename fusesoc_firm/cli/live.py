@@ -1,0 +1,63 @@
+"""`firm live`: a simulated system as a node of a running ROS. `firm trace`: the ways of its messages as a picture."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.cli.common import command, load
+from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
+
+
+def add_live(commands: Any) -> None:
+    """Declare the commands."""
+    from fusesoc_firm.host.node.options import add_node_options
+
+    live = command(
+        commands,
+        "live",
+        "be a node of a running ROS, whose messages go through a system, simulated or on a board",
+        "firm live robot.yaml --ros 1 --trace ways.csv sub:=/imu/orientation",
+        _live,
+    )
+    live.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
+    live.add_argument("--ros", type=int, choices=(1, 2), help="only topics of this version (default: all)")
+    live.add_argument(
+        "--transport", metavar="ADDRESS", help="the way to the hardware (default: build a simulator, and start it)"
+    )
+    add_node_options(live)
+    add_simulator_options(live)
+    live.set_defaults(remappings=[])
+    trace = command(
+        commands,
+        "trace",
+        "draw the ways of messages that a node wrote with --trace",
+        "firm trace ways.csv -o ways.svg",
+        _draw_trace,
+    )
+    trace.add_argument("table", metavar="F.csv", type=Path, help="what the node wrote")
+    trace.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where (default: beside it; also .png, .pdf)")
+
+
+def _live(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.host.node.description import describe
+    from fusesoc_firm.host.node.run import run_node, run_options
+    from fusesoc_firm.host.node.transports import at_address, of_simulator
+
+    loaded = load(arguments)
+    description = describe(loaded)
+    options = run_options(arguments, arguments.remappings, description, arguments.ros)
+    if arguments.transport:
+        opener = at_address(arguments.transport)
+    else:
+        opener = of_simulator(built_simulator(arguments), arguments.seed, arguments.stall_percent)
+    run_node(description, opener, options, loaded)
+
+
+def _draw_trace(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.host.node.trace_picture import draw_trace
+
+    output: Path = arguments.output or arguments.table.with_suffix(".svg")
+    draw_trace(arguments.table, output)
+    print(output)

@@ -1,0 +1,236 @@
+"""Real ROS for the generated nodes in C++: what compiles them, where they run, and the peers that speak to them."""
+
+from __future__ import annotations
+
+import base64
+import ctypes.util
+import json
+import os
+import queue
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import xmlrpc.client
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+DEBIAN_PYTHON = "/usr/bin/python3"
+# A venv with ROS 2 from wheels.
+ROS2 = Path(os.environ.get("FIRM_ROS2") or Path(sys.prefix) / "ros2")
+_OPTIONS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror", "-pthread"]
+_ROS1_MODULES = ("rospy", "geometry_msgs", "sensor_msgs", "std_msgs")
+_ROS2_LIBRARIES = ("rcl", "rcutils", "rmw", "rosidl_runtime_c")
+
+
+@dataclass(frozen=True)
+class Ros:
+    """A version of ROS that is there: what compiles and links against it, what runs in it, and its own Python."""
+
+    version: int
+    python: str
+    includes: tuple[str, ...]
+    libraries: tuple[str, ...]
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+    def compile(self, package: Path, program: Path | None, header: Path | None = None) -> None:
+        """Compile a node's package to `program`, or look only whether it would; `header` is a precompiled one."""
+        output = ["-fsyntax-only"] if program is None else ["-o", str(program)]
+        included = ["-include", str(header)] if header else []
+        sources = [str(path) for path in sorted((package / "src").glob("*.cpp"))]
+        libraries = [] if program is None else self.libraries
+        self._compile([*included, *self._includes(package), *sources, *output, *libraries])
+
+    def precompile(self, package: Path, folder: Path) -> Path:
+        """What all nodes include, compiled once: the header to hand to `compile`."""
+        header = folder / f"ros{self.version}_nodes.hpp"
+        header.write_text(f"#include <firm/ros{self.version}.hpp>\n#include <firm/ros_node.hpp>\n", encoding="utf-8")
+        self._compile([*self._includes(package), "-x", "c++-header", str(header), "-o", f"{header}.gch"])
+        return header
+
+    def _includes(self, package: Path) -> list[str]:
+        return ["-I", str(package / "include"), *self.includes]
+
+    def _compile(self, arguments: Sequence[str]) -> None:
+        done = subprocess.run(["g++", *_OPTIONS, *arguments], capture_output=True, text=True, timeout=300, check=False)
+        assert done.returncode == 0, done.stderr[-4000:]
+
+
+def missing_ros1() -> str:
+    """Why there is no ROS 1 here, or nothing."""
+    for program in ("g++", "pkg-config", "rosmaster"):
+        if not shutil.which(program):
+            return f"{program} is not installed"
+    if subprocess.run(["pkg-config", "--exists", "roscpp"], check=False).returncode:
+        return "roscpp is not installed (libroscpp-dev)"
+    modules = "; ".join(f"import {module}" for module in _ROS1_MODULES)
+    if subprocess.run([DEBIAN_PYTHON, "-c", modules], capture_output=True, check=False).returncode:
+        return f"{DEBIAN_PYTHON} lacks one of {', '.join(_ROS1_MODULES)}"
+    return ""
+
+
+def missing_ros2() -> str:
+    """Why there is no ROS 2 here, or nothing."""
+    if not shutil.which("g++"):
+        return "g++ is not installed"
+    if not (ROS2 / "include/rcl").is_dir():
+        return f"{ROS2} is no environment with ROS 2 (FIRM_ROS2 names another one)"
+    if not _libpython():
+        return "libpython is not installed, which the wheels of ROS 2 need"
+    return ""
+
+
+def _libpython() -> str:
+    """Some libraries of the wheels refer to Python, which a program in C++ is not."""
+    version = next(iter(sorted((ROS2 / "lib").glob("python3.*"))), Path("python3")).name
+    return ctypes.util.find_library(version) or ""
+
+
+@contextmanager
+def ros1(folder: Path) -> Iterator[Ros]:
+    """ROS 1 as Debian has it, with a master of its own."""
+    words = subprocess.run(
+        ["pkg-config", "--cflags", "--libs", "roscpp"], capture_output=True, text=True, check=True
+    ).stdout.split()
+    port = _free_port()
+    environment = {
+        **os.environ,
+        "ROS_MASTER_URI": f"http://127.0.0.1:{port}",
+        "ROS_IP": "127.0.0.1",
+        "ROS_HOME": str(folder),
+        "ROS_LOG_DIR": str(folder / "log"),
+    }
+    with (folder / "rosmaster.log").open("wb") as log:
+        master = subprocess.Popen(
+            ["rosmaster", "--core", "-p", str(port)], env=environment, stdout=log, stderr=subprocess.STDOUT
+        )
+        try:
+            _wait_for_master(environment["ROS_MASTER_URI"])
+            yield Ros(1, DEBIAN_PYTHON, (), tuple(words), environment)
+        finally:
+            master.terminate()
+            master.wait()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _wait_for_master(uri: str) -> None:
+    master = xmlrpc.client.ServerProxy(uri)
+    deadline = time.monotonic() + 20
+    while True:
+        try:
+            master.getSystemState("/test")
+            return
+        except OSError:
+            assert time.monotonic() < deadline, "rosmaster does not answer"
+            time.sleep(0.05)
+
+
+def ros2(folder: Path) -> Ros:
+    """ROS 2 out of wheels, on loopback and in a domain of its own."""
+    libraries = [ROS2 / "lib", *sorted(ROS2.glob("lib/python3.*/site-packages/*.libs"))]
+    environment = {
+        **os.environ,
+        "LD_LIBRARY_PATH": ":".join(map(str, libraries)),
+        "LD_PRELOAD": _libpython(),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        # Of those that leave Linux its ephemeral ports.
+        "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
+        "ROS_LOG_DIR": str(folder / "log"),
+    }
+    includes = [word for path in sorted((ROS2 / "include").iterdir()) for word in ("-isystem", str(path))]
+    links = ["-L", str(ROS2 / "lib"), *(f"-l{name}" for name in _ROS2_LIBRARIES), "-Wl,--allow-shlib-undefined"]
+    return Ros(2, str(ROS2 / "bin/python"), tuple(includes), tuple(links), environment)
+
+
+class Node:
+    """A node in C++ that runs."""
+
+    def __init__(self, ros: Ros, program: Path, transport: str, *arguments: str) -> None:
+        self._log = program.with_suffix(".log").open("w+b")
+        command = [str(program), "--transport", transport, *arguments]
+        self.process = subprocess.Popen(command, env=ros.environment, stdout=self._log, stderr=subprocess.STDOUT)
+
+    def said(self) -> str:
+        """All that it has printed."""
+        self._log.seek(0)
+        return self._log.read().decode(errors="replace")
+
+    def stop(self, number: int = signal.SIGINT) -> int:
+        """Ask it to end; its exit status."""
+        self.process.send_signal(number)
+        return self.wait()
+
+    def wait(self, seconds: float = 30) -> int:
+        """Wait until it ends; its exit status."""
+        return self.process.wait(seconds)
+
+    def __enter__(self) -> Node:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        if error is not None:
+            sys.stderr.write(self.said())
+        self._log.close()
+
+
+class Peer:
+    """A node of rospy or rclpy that publishes payloads and takes some (payload_peer.py)."""
+
+    def __init__(self, ros: Ros, subscribed: Mapping[str, str], published: Mapping[str, str]) -> None:
+        topics = map(json.dumps, (subscribed, published))
+        command = [ros.python, str(HERE / "payload_peer.py"), str(ros.version), *topics]
+        self._process = subprocess.Popen(
+            command, env=ros.environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self._lines: queue.Queue[dict[str, Any]] = queue.Queue()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self._process.stdout
+        for line in self._process.stdout:
+            self._lines.put(json.loads(line))
+
+    def wait_until_connected(self, seconds: float = 30) -> None:
+        assert self._lines.get(timeout=seconds) == {"connected": True}
+
+    def publish(self, topic: str, payload: bytes) -> None:
+        assert self._process.stdin
+        line = {"topic": topic, "payload": base64.b64encode(payload).decode()}
+        self._process.stdin.write(json.dumps(line) + "\n")
+        self._process.stdin.flush()
+
+    def take(self, seconds: float = 30) -> tuple[str, bytes]:
+        """The next message: its topic and payload. Raises queue.Empty."""
+        line = self._lines.get(timeout=seconds)
+        return line["topic"], base64.b64decode(line["payload"])
+
+    def kill(self) -> None:
+        """Let it die without a word."""
+        self._process.kill()
+        self._process.wait()
+
+    def __enter__(self) -> Peer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.kill()

@@ -1,0 +1,120 @@
+"""`firm live` and generated nodes in Python as processes, for peers of real ROS."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from tests.ros.cpp_nodes import Ros
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SPECS = REPOSITORY / "specs"
+MODEL_SIMULATOR = REPOSITORY / "tests/unit/host/model_simulator.py"
+
+
+def model_address(*arguments: str) -> str:
+    """The address of a model of hardware that sends back what it gets, at the end of a pipe."""
+    return f"pipe:env PYTHONPATH={REPOSITORY} {sys.executable} {MODEL_SIMULATOR} {' '.join(arguments)}"
+
+
+def specification(name: str, version: int, folder: Path) -> Path:
+    """An application's specification in a version of ROS, with all that lies beside it."""
+    copy = folder / f"{name}_ros{version}"
+    if not copy.exists():
+        shutil.copytree(SPECS / name, copy)
+    spec = copy / f"{name}.yaml"
+    if version == 2:
+        text = spec.read_text(encoding="utf-8")
+        spec.write_text(re.sub(r"\bmiddleware: ROS\b", "middleware: ROS2", text), encoding="utf-8")
+    return spec
+
+
+class LiveNode:
+    """A node that runs; within a `with`, after which it is gone."""
+
+    def __init__(self, ros: Ros, log: Path, command: Sequence[str], *ros_arguments: str) -> None:
+        """`command` are the arguments of `firm`, or a generated node with its own; those of ROS come behind all."""
+        is_script = command[0].endswith(".py")
+        program = [] if is_script else ["-m", "fusesoc_firm.cli"]
+        # What programs in C++ need of the wheels is not for our own Python.
+        environment = {name: value for name, value in ros.environment.items() if not name.startswith("LD_")}
+        environment["PYTHONPATH"] = os.pathsep.join([str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
+        self._path = log
+        self._log = log.open("wb")
+        self.process = subprocess.Popen(
+            [sys.executable, *program, *command, "--ros-python", ros.python, *ros_arguments],
+            env=environment,
+            stdout=self._log,
+            stderr=subprocess.STDOUT,
+        )
+
+    def said(self) -> str:
+        """All that it has printed."""
+        return self._path.read_text(encoding="utf-8", errors="replace")
+
+    def wait_until_ready(self, seconds: float = 300.0) -> None:
+        """Wait until it is a node of ROS, its simulator being built."""
+        self.wait_until_said(" is a node of ROS ", seconds)
+
+    def wait_until_said(self, text: str, seconds: float = 30.0) -> None:
+        """Wait until it prints a text."""
+        latest = time.monotonic() + seconds
+        while text not in self.said():
+            assert self.process.poll() is None, self.said()
+            assert time.monotonic() < latest, f"'{text}' was not said, but\n{self.said()}"
+            time.sleep(0.02)
+
+    def children(self) -> dict[str, int]:
+        """The processes that it started, by their command lines."""
+        path = Path(f"/proc/{self.process.pid}/task")
+        numbers = [int(word) for task in path.iterdir() for word in (task / "children").read_text().split()]
+        return {Path(f"/proc/{n}/cmdline").read_bytes().replace(b"\0", b" ").decode(): n for n in numbers}
+
+    def kill_child(self, word: str) -> None:
+        """Kill what it started with `word` in its command line."""
+        (number,) = [number for line, number in self.children().items() if word in line]
+        os.kill(number, signal.SIGKILL)
+
+    def stop(self, number: int = signal.SIGINT) -> int:
+        """Ask it to end; its exit status."""
+        self.process.send_signal(number)
+        return self.wait()
+
+    def wait(self, seconds: float = 30.0) -> int:
+        """Wait until it ends; its exit status."""
+        return self.process.wait(seconds)
+
+    def __enter__(self) -> LiveNode:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        self._log.close()
+        if error is not None:
+            sys.stderr.write(self.said())
+
+
+def paced(ros: Ros, rate: int, seconds: float, ways: Sequence[tuple[str, str]]) -> list[dict[str, Any]]:
+    """Quaternions at a rate to the first topic of each way; what came from its second one (paced_peer.py)."""
+    script = str(Path(__file__).with_name("paced_peer.py"))
+    command = [ros.python, script, str(ros.version), str(rate), str(seconds), json.dumps(ways)]
+    done = subprocess.run(
+        command, env=dict(ros.environment), capture_output=True, text=True, timeout=seconds + 60, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found

@@ -1,0 +1,114 @@
+"""A node of rospy or rclpy that sends quaternions at a rate, and takes the time until something comes back.
+
+    python paced_peer.py 1|2 RATE SECONDS '[["in", "out"], ...]'
+
+Quaternion n of a topic turns by n thousandths of a rad about z, from -3 on, and around again behind 3. The result, as
+JSON: for each way how many were sent, the z of the points that came, and the seconds that each took, the n-th that came
+being the answer to the n-th that was sent. `echo IN OUT` in place of a rate is a node that answers with x, y and z of
+what comes.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import threading
+import time
+from typing import Any
+
+_TURN = 6000
+
+
+class Ros1:
+    def __init__(self) -> None:
+        import rospy
+        from geometry_msgs.msg import Point, Quaternion
+
+        self.rospy, self.point, self.quaternion = rospy, Point, Quaternion
+        rospy.init_node("paced", anonymous=True, disable_signals=True)
+
+    def publisher(self, topic: str, message: Any) -> Any:
+        return self.rospy.Publisher(topic, message, queue_size=1000, tcp_nodelay=True)
+
+    def subscriber(self, topic: str, message: Any, take: Any) -> Any:
+        return self.rospy.Subscriber(topic, message, take, tcp_nodelay=True)
+
+    def is_connected(self, publisher: Any, subscriber: Any) -> bool:
+        return bool(publisher.get_num_connections() and subscriber.get_num_connections())
+
+
+class Ros2:
+    def __init__(self) -> None:
+        import rclpy
+        from geometry_msgs.msg import Point, Quaternion
+
+        self.point, self.quaternion = Point, Quaternion
+        rclpy.init()
+        self.node = rclpy.create_node("paced")
+        threading.Thread(target=rclpy.spin, args=(self.node,), daemon=True).start()
+
+    def publisher(self, topic: str, message: Any) -> Any:
+        return self.node.create_publisher(message, topic, 1000)
+
+    def subscriber(self, topic: str, message: Any, take: Any) -> Any:
+        return self.node.create_subscription(message, topic, take, 1000)
+
+    def is_connected(self, publisher: Any, subscriber: Any) -> bool:
+        return bool(publisher.get_subscription_count() and self.node.count_publishers(subscriber.topic_name))
+
+
+class Way:
+    def __init__(self, ros: Any, sent: str, received: str) -> None:
+        self.ros = ros
+        self.sent_at: list[float] = []
+        self.came: list[tuple[float, float]] = []
+        self.publisher = ros.publisher(sent, ros.quaternion)
+        self.subscriber = ros.subscriber(received, ros.point, self.take)
+
+    def take(self, point: Any) -> None:
+        self.came.append((time.perf_counter(), point.z))
+
+    def send(self) -> None:
+        angle = (len(self.sent_at) % _TURN) / 1000 - 3
+        message = self.ros.quaternion(x=0.0, y=0.0, z=math.sin(angle / 2), w=math.cos(angle / 2))
+        self.sent_at.append(time.perf_counter())
+        self.publisher.publish(message)
+
+    def result(self) -> dict[str, Any]:
+        seconds = [came - sent for sent, (came, _) in zip(self.sent_at, self.came)]  # noqa: B905 - Python 3.8
+        return {"sent": len(self.sent_at), "z": [z for _, z in self.came], "seconds": seconds}
+
+
+def run(ros: Any, rate: int, seconds: float, ways: list[Way]) -> None:
+    while not all(ros.is_connected(way.publisher, way.subscriber) for way in ways):
+        time.sleep(0.02)
+    # Who is seen may not see us yet.
+    time.sleep(0.5)
+    start, steps = time.perf_counter(), round(rate * seconds) * len(ways)
+    for step in range(steps):
+        time.sleep(max(0.0, start + step / rate / len(ways) - time.perf_counter()))
+        ways[step % len(ways)].send()
+    latest = time.perf_counter() + 5
+    while time.perf_counter() < latest and any(len(way.came) < len(way.sent_at) for way in ways):
+        time.sleep(0.02)
+    print(json.dumps([way.result() for way in ways]), flush=True)
+
+
+def echo(ros: Any, sent: str, received: str) -> None:
+    publisher = ros.publisher(received, ros.point)
+    subscriber = ros.subscriber(sent, ros.quaternion, lambda q: publisher.publish(ros.point(x=q.x, y=q.y, z=q.z)))
+    while subscriber:
+        time.sleep(1)
+
+
+if __name__ == "__main__":
+    middleware: Any = {"1": Ros1, "2": Ros2}[sys.argv[1]]()
+    if sys.argv[2] == "echo":
+        echo(middleware, *sys.argv[3:])
+    else:
+        pairs = [Way(middleware, *pair) for pair in json.loads(sys.argv[4])]
+        run(middleware, int(sys.argv[2]), float(sys.argv[3]), pairs)
+    # rclpy's thread is still at work.
+    sys.stdout.flush()
+    __import__("os")._exit(0)
