@@ -313,6 +313,24 @@ def test_software_that_gives_more_than_fits_never_waits_for_itself(tmp_path: Pat
     assert len(run.carrier.published) == counts.sent == counts.received - counts.dropped
 
 
+def test_a_fault_of_software_holds_up_nobody_else(tmp_path: Path) -> None:
+    """Two blocks take a message, and one of them fails at it: the other one's answer comes all the same."""
+    (tmp_path / "soft.py").write_text(DOUBLE, encoding="utf-8")
+    (tmp_path / "same.py").write_text("def same(message):\n    return message\n", encoding="utf-8")
+    blocks = converter("sub", "subscriber", "Point", "bad", "good") + instance("bad", "soft", "b0")
+    blocks += instance("b0", "hard", "z0") + converter("z0", "publisher", "Point")
+    blocks += instance("good", "same", "z1") + converter("z1", "publisher", "Point")
+    types = accelerator("hard", "Point", "Point") + accelerator("soft", "Point", "Point", "ROS-SW", "soft.py")
+    types += accelerator("same", "Point", "Point", "ROS-SW", "same.py")
+    system = loaded(tmp_path, specification(blocks, types))
+    with node_software(system, lambda error: None) as software:
+        run = Run(describe(system), Bench().open, software=software)
+        run.carrier.give(0, point(3.0))
+        run.stop()
+    assert run.carrier.published == [(1, point(3.0))]
+    assert software and software.faults == 1
+
+
 def test_a_message_that_is_none_is_reported(tmp_path: Path) -> None:
     system = with_software(tmp_path, "soft", "hard")
     faults: list[InputError] = []
