@@ -21,7 +21,7 @@ from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.frame.codec import CodecError, decode, pack_frame
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
-from fusesoc_firm.host.functions import Functions, importable_sources
+from fusesoc_firm.host.functions import Functions, Message, importable_sources
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.system.derived import DerivedSystem, End, Topic
 from fusesoc_firm.system.generator import load_system
@@ -76,9 +76,13 @@ def serve(system: DerivedSystem, folder: Path, taken: BinaryIO, given: BinaryIO)
             except CodecError as error:
                 print(f"a message of '{topic.block}' is none: {error}", file=sys.stderr, flush=True)
                 continue
-            for block, answer in functions.take(End(topic.block), message):
-                given.write(pack_frame(ids[block], encode_used(ports.outputs[ids[block]].frame, answer)))
+            answers = functions.take(End(topic.block), message)
+            given.writelines(_framed(ids[block], ports.outputs[ids[block]], answer) for block, answer in answers)
             given.flush()
+
+
+def _framed(identifier: int, topic: Topic, message: Message) -> bytes:
+    return pack_frame(identifier, encode_used(topic.frame, message))
 
 
 def _frames(row: BinaryIO, ids: int) -> Iterator[tuple[int, bytes]]:

@@ -33,6 +33,8 @@ ECHO_SIMULATOR = f"pipe:exec {sys.executable} {Path(__file__).with_name('echo_si
 MODEL_SIMULATOR = REPOSITORY / "tests/unit/host/model_simulator.py"
 APPLICATIONS = ["quat2euler", "image_pipeline", "multi_type", "mobile_robot", "robotic_arm", "sobel"]
 SEED = 20240721
+# A simulator on a machine that does other things, too, comes to rest late.
+PATIENT = ("--drain", "100")
 
 # Two topics through which messages of any size go, with no accelerator between.
 ECHO = """\
@@ -179,7 +181,7 @@ def test_quaternions_come_back_as_angles(workshop: Workshop) -> None:
     source = random.Random(SEED)
     trace = workshop.folder / "trace.csv"
     with (
-        Node(workshop.ros, program, transport, "--trace", str(trace)) as node,
+        Node(workshop.ros, program, transport, *PATIENT, "--trace", str(trace)) as node,
         Peer(workshop.ros, {"/QuaternionToEuler_pub": point}, {"/QuaternionToEuler_sub": quaternion}) as peer,
     ):
         peer.wait_until_connected()
@@ -210,7 +212,7 @@ def test_blocks_in_software_run_beside_the_hardware(workshop: Workshop) -> None:
     software = f"PYTHONPATH={REPOSITORY} exec {sys.executable} -m fusesoc_firm.host.software_process {spec}"
     program, transport = workshop.program("image_pipeline_software"), live_simulator(workshop, spec)
     with (
-        Node(workshop.ros, program, transport, "--software", software) as node,
+        Node(workshop.ros, program, transport, *PATIENT, "--software", software) as node,
         Peer(workshop.ros, {"/sums": "sensor_msgs/Image"}, {"/camera": "sensor_msgs/Image"}) as peer,
     ):
         peer.wait_until_connected()
@@ -242,7 +244,7 @@ def test_an_image_of_six_megabytes_goes_through_hardware(workshop: Workshop) -> 
     text = re.sub(r",\s*buffer: 230500}", "}", spec.read_text(encoding="utf-8"))
     spec.write_text(text + ECHO.partition("blocks:\n")[2].partition("  - {name: image")[0], encoding="utf-8")
     transport = live_simulator(workshop, spec, "verilator")
-    with Node(workshop.ros, workshop.program("multi_type"), transport) as node, workshop.echo_peer() as peer:
+    with Node(workshop.ros, workshop.program("multi_type"), transport, *PATIENT) as node, workshop.echo_peer() as peer:
         peer.wait_until_connected()
         send_all_sizes(workshop, peer)
         assert node.stop() == 0

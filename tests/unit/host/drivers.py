@@ -1,4 +1,4 @@
-"""Programs that speak for the C++ headers of `fusesoc_firm/host/cpp` and for `fusesoc_firm/host/c`: lines in, lines out."""
+"""Programs that speak for `fusesoc_firm/host/cpp` and `fusesoc_firm/host/c`: lines in, lines out."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ FAULTS = ("exit", "kill", "cut", "garbage", "hang", "unsent", "backwards", "long
 
 @dataclass
 class Simulator:
-    """The model: a frame of n beats takes n cycles to come in, a latency, and n cycles to go out, in bursts if asked."""
+    """A frame of n beats takes n cycles to come in, a latency, and n cycles to go out, in bursts if asked."""
 
     width: int
     latency: int

@@ -40,12 +40,8 @@ def drivers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     port = C_FOLDER / "ports" / request.param
     sources = [f"firm/firm_{name}.c" for name in ("frame", "bursts", "queues")]
     sources += ["ports/zynq.c", f"ports/{request.param}/firm_port.c"]
-    sizes = {
-        "FIRM_PUBLISHERS": IDS,
-        "FIRM_SUBSCRIBERS": IDS,
-        "FIRM_LONGEST_PAYLOAD": LONGEST,
-        "FIRM_QUEUE_DEPTH": DEPTH,
-    }
+    sizes = {"FIRM_PUBLISHERS": IDS, "FIRM_SUBSCRIBERS": IDS}
+    sizes |= {"FIRM_LONGEST_PAYLOAD": LONGEST, "FIRM_QUEUE_DEPTH": DEPTH}
     if request.param == "freertos":
         sizes["STAND_IN"] = 1
     return {

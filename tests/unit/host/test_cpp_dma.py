@@ -50,8 +50,8 @@ def test_errors_of_the_engine_are_named(driver: Driver, fault: str, error: str) 
 @pytest.mark.parametrize("size", [63, 100, 1 << 21])
 def test_illegal_buffers_are_named(driver: Driver, size: int) -> None:
     assert play(driver, 1, 1, size) == (
-        f"error: the DMA has 4 buffers of {size} bytes; legal: 2 and more, a multiple of 64, and all within the memory's"
-        f" 4194304"
+        f"error: the DMA has 4 buffers of {size} bytes; legal: 2 and more, a multiple of 64, and all within the"
+        " memory's 4194304"
     )
 
 

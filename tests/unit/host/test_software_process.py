@@ -15,7 +15,7 @@ from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode, encode, pack_frame
 from fusesoc_firm.host.software_process import SoftwarePorts, serve, software_ports
 from fusesoc_firm.system.derived import DerivedSystem
-from tests.unit.host.drivers import Driver, compile_driver
+from tests.unit.host.drivers import Driver
 from tests.unit.host.test_cpp_node import puts, run
 from tests.unit.host.test_software import elsewhere, point, soft
 from tests.unit.system.systems import accelerator, converter, derived, instance, specification
@@ -28,11 +28,6 @@ def soft(m):
         raise ValueError('the beast')
     return None if m['x'] < 0 else {**m, 'x': 2 * m['x']}
 """
-
-
-@pytest.fixture(scope="module")
-def driver(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    return compile_driver("node", tmp_path_factory.mktemp("software"))
 
 
 def text_of(folder: Path) -> str:
@@ -102,7 +97,7 @@ def _command(folder: Path) -> str:
     return shlex.join(words)
 
 
-def test_a_node_drives_the_process(driver: Driver, tmp_path: Path) -> None:
+def test_a_node_drives_the_process(node_driver: Driver, tmp_path: Path) -> None:
     """What a function prints is no frame, and all that was put is answered before the process ends."""
     print(f"seed {SEED}")
     source = random.Random(SEED)
@@ -110,7 +105,7 @@ def test_a_node_drives_the_process(driver: Driver, tmp_path: Path) -> None:
     given = [(source.randrange(2), source.uniform(-10, 10)) for _ in range(200)]
     payloads = [(identifier, encode(ports.inputs[identifier].frame, point(x))) for identifier, x in given]
     address = f"software:{_command(tmp_path)} 2>/dev/null"
-    outcome = run(driver, puts(payloads), address, converters=3, depth=300)
+    outcome = run(node_driver, puts(payloads), address, converters=3, depth=300)
     assert outcome.said["status"] == "0", outcome.said
     found = {
         identifier: [decode(ports.outputs[identifier].frame, payload)["x"] for payload in answers]
@@ -120,20 +115,20 @@ def test_a_node_drives_the_process(driver: Driver, tmp_path: Path) -> None:
     assert found == {0: doubled[0], 1: doubled[0], 2: doubled[1]}
 
 
-def test_a_function_that_fails_ends_the_node_or_is_started_again(driver: Driver, tmp_path: Path) -> None:
+def test_a_function_that_fails_ends_the_node_or_is_started_again(node_driver: Driver, tmp_path: Path) -> None:
     _, ports = made(tmp_path)
     payloads = [(1, encode(ports.inputs[1].frame, point(x))) for x in (1.0, 666.0)]
     address = f"software:{_command(tmp_path)} 2>/dev/null"
-    outcome = run(driver, puts(payloads), address, converters=3)
+    outcome = run(node_driver, puts(payloads), address, converters=3)
     assert outcome.said["status"] == "1"
     assert outcome.said["error"] == "the software ended with status 1"
     assert len(outcome.published[2]) == 1
-    again = run(driver, [*puts(payloads), "await 1"], address, converters=3, restarts=1)
+    again = run(node_driver, [*puts(payloads), "await 1"], address, converters=3, restarts=1)
     assert again.said["status"] == "0" and again.count("restarts") == 1
 
 
-def test_a_process_that_talks_nonsense_ends_the_node(driver: Driver) -> None:
-    outcome = run(driver, ["put 0 00"], "software:printf '\\377nonsense'; cat >/dev/null")
+def test_a_process_that_talks_nonsense_ends_the_node(node_driver: Driver) -> None:
+    outcome = run(node_driver, ["put 0 00"], "software:printf '\\377nonsense'; cat >/dev/null")
     assert outcome.said["error"] == "the software sends no frames: the id is 255, but the publishers are 0 to 1"
 
 

@@ -2,12 +2,10 @@
 // A node's engine, whatever its middleware: payloads to the hardware, payloads from it (docs/nodes.md).
 //
 //     firm::NodeConfiguration system;                       // its width, subscribers, publishers
-//     firm::Node node(system, "dma:/dev/uio0:udmabuf0", [](unsigned publisher, const std::uint8_t* payload, std::size_t size) {
-//       publish(publisher, payload, size);
-//     });
+//     firm::Node node(system, "dma:/dev/uio0:udmabuf0", publish);   // called with publisher, payload, size
 //     std::thread engine([&] { status = node.run(); shut_the_middleware_down(); });
 //     node.put(subscriber, payload, size);                  // any thread, a middleware's callback
-//     node.stop(std::chrono::seconds(2));                   // what was put is sent, what comes back is published
+//     node.stop(std::chrono::seconds(10));                  // what was put is sent, what comes back is published
 //     engine.join();
 //
 // Payloads are what the middleware has serialised; nothing here parses them. C++17, no dependencies but POSIX.
@@ -133,7 +131,7 @@ class Node {
 
   // Take no more payloads, send what waits, publish what comes back, and end. What is not done in the time given is
   // abandoned, and run() says so. Returns when run() is about to. Any thread but that of `publish`.
-  void stop(std::chrono::nanoseconds drain = std::chrono::seconds(2)) {
+  void stop(std::chrono::nanoseconds drain = std::chrono::seconds(10)) {
     queues_.close();
     std::unique_lock<std::mutex> lock(mutex_);
     is_stopping_ = true;

@@ -22,11 +22,12 @@
 namespace firm {
 
 struct PipeOptions {
-  std::size_t frames_in_flight = 8;      // sent, and not yet taken by the system
-  std::size_t bursts_waiting = 64;       // come, and not yet received
-  std::uint32_t cycles_a_run = 1000;     // a frame that comes in the meantime waits for the end of the run
-  std::uint32_t cycles_to_rest = 10000;  // without a beat, after which the system is thought to have come to rest
-  Timeout idle_run = std::nullopt;       // how often a system at rest runs, for accelerators that send without being asked
+  std::size_t frames_in_flight = 2;       // sent, and not yet taken by the system
+  std::size_t bytes_waiting = 1 << 24;    // of bursts that have come, and not yet been received
+  // A run takes so long by the wall clock: a frame that comes in the meantime waits for its end.
+  std::chrono::nanoseconds run_time = std::chrono::milliseconds(1);
+  std::uint32_t cycles_to_rest = 100000;  // without a beat, after which the system is thought to have come to rest
+  Timeout idle_run = std::nullopt;        // how often a system at rest runs, for accelerators that send without being asked
   std::chrono::nanoseconds patience = std::chrono::seconds(2);  // with a simulator that is to end
 };
 
@@ -69,6 +70,7 @@ class PipeTransport : public Transport {
     }
     std::optional<Burst> burst(std::move(bursts_.front()));
     bursts_.pop_front();
+    bytes_waiting_ -= burst->data.size();
     changed_.notify_all();
     return burst;
   }
@@ -105,9 +107,12 @@ class PipeTransport : public Transport {
     std::string error;
     try {
       while (wait_for_work()) {
+        const auto begun = std::chrono::steady_clock::now();
+        const std::uint64_t before = cycle_;
         if (!request()) fail_with_child();
         while (take_report()) {
         }
+        adapt(cycle_ - before, std::chrono::steady_clock::now() - begun);
       }
       const std::uint8_t quit = 'Q';
       child_.write(&quit, 1);
@@ -128,7 +133,7 @@ class PipeTransport : public Transport {
   // Sleep until the simulator is to run; false when the transport is closed.
   bool wait_for_work() {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(lock, [this] { return is_closing_ || bursts_.size() < pipe_.bursts_waiting; });
+    changed_.wait(lock, [this] { return is_closing_ || bytes_waiting_ < pipe_.bytes_waiting; });
     const auto has_work = [this] { return is_closing_ || !is_at_rest_; };
     if (pipe_.idle_run) {
       changed_.wait_for(lock, *pipe_.idle_run, has_work);
@@ -151,8 +156,17 @@ class PipeTransport : public Transport {
       const auto header = with_number('F', static_cast<std::uint32_t>(frame.size()));
       if (!child_.write(header.data(), header.size()) || !child_.write(frame.data(), frame.size())) return false;
     }
-    const auto run = with_number('R', pipe_.cycles_a_run);
+    const auto run = with_number('R', static_cast<std::uint32_t>(cycles_a_run_));
     return child_.write(run.data(), run.size());
+  }
+
+  // The next run shall take as long as runs are to take, as far as the last one tells.
+  void adapt(std::uint64_t cycles, std::chrono::nanoseconds time) {
+    constexpr double kFewest = 16, kMost = 1 << 20;
+    if (cycles == 0 || time.count() <= 0) return;
+    const double wanted = static_cast<double>(cycles) * static_cast<double>(pipe_.run_time.count()) /
+                          static_cast<double>(time.count());
+    cycles_a_run_ = std::clamp(wanted, kFewest, kMost);
   }
 
   static Bytes with_number(char letter, std::uint32_t number) {
@@ -211,6 +225,7 @@ class PipeTransport : public Transport {
     burst.data.resize(static_cast<std::size_t>(size));
     take(burst.data.data(), burst.data.size());
     const std::lock_guard<std::mutex> lock(mutex_);
+    bytes_waiting_ += burst.data.size();
     bursts_.push_back(std::move(burst));
     changed_.notify_all();
   }
@@ -284,12 +299,14 @@ class PipeTransport : public Transport {
   std::uint64_t place_ = 0;  // bytes of reports so far
   std::uint64_t cycle_ = 0;  // where the simulator stands
   std::uint64_t busy_ = 0;   // where it stood when it got a frame last
+  double cycles_a_run_ = 1000;
 
   mutable std::mutex mutex_;  // of what follows
   std::condition_variable changed_;
   std::deque<Bytes> waiting_;
   std::size_t requested_ = 0;  // frames that the simulator has and the system does not
   std::deque<Burst> bursts_;
+  std::size_t bytes_waiting_ = 0;
   bool is_at_rest_ = false;
   bool is_closing_ = false;
   bool is_over_ = false;

@@ -31,8 +31,8 @@
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -159,6 +159,11 @@ class Ros2 {
 
   // Handle what comes, for about `duration`. False if ROS wants the node to end. Throws MiddlewareError.
   bool spin(std::chrono::milliseconds duration) {
+    if (subscriptions_.empty()) {
+      // rcl would not wait for nothing.
+      std::this_thread::sleep_for(duration);
+      return rcl_context_is_valid(&context_);
+    }
     check_rcl(rcl_wait_set_clear(&waiting_), "wait for messages");
     for (const auto& subscription : subscriptions_) {
       check_rcl(rcl_wait_set_add_subscription(&waiting_, &subscription->rcl, nullptr), "wait for messages");
