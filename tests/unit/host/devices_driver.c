@@ -1,7 +1,7 @@
 /* The back ends in C before models of AXI DMA and of a Zynq's UART, which the port's registers lead to.
  *
  * `dma COUNT LONGEST SEED FAULT AT`: random frames go out and must come back; the model works when it is looked at, and
- * watches the rules of descriptors and caches. `uart HEX...`: what comes in when, `-` is a silence of 300 ms; prints the
+ * watches the rules of descriptors and caches. `uart HEX...`: what comes in when, `-` is a silence of 300 ms, `,` of 20; prints the
  * frames that are found, what was sent and how many errors and breaks there were. */
 #include <stdio.h>
 #include <stdlib.h>
@@ -166,9 +166,9 @@ static char sent[4096];
 static int next_byte(void) {
     unsigned value;
     static uint32_t silent_until;
-    while (*script && (strcmp(*script, "-") == 0 || (*script)[script_place] == 0)) {
-        if (strcmp(*script, "-") == 0) {
-            silent_until = silent_until == 0 ? now + 300 : silent_until;
+    while (*script && (strchr("-,", **script) || (*script)[script_place] == 0)) {
+        if (strchr("-,", **script)) {
+            silent_until = silent_until == 0 ? now + (**script == '-' ? 300u : 20u) : silent_until;
             if (now < silent_until) {
                 return -1;
             }

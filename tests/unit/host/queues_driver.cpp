@@ -48,10 +48,11 @@ static void answer(Queues& queues, std::istringstream& words, const std::string&
 }
 
 static int threads() {
-  constexpr int kSubscribers = 4, kItems = 5000;
+  constexpr std::size_t kSubscribers = 4;
+  constexpr int kItems = 5000;
   Queues queues(kSubscribers, 3, nullptr, firm::Overflow::kBlock);
   std::vector<std::thread> writers;
-  for (int subscriber = 0; subscriber < kSubscribers; ++subscriber) {
+  for (std::size_t subscriber = 0; subscriber < kSubscribers; ++subscriber) {
     writers.emplace_back([&queues, subscriber] {
       for (int item = 0; item < kItems; ++item) queues.put(subscriber, item);
     });

@@ -189,7 +189,7 @@ def test_frames_come_from_the_uart(devices: Driver) -> None:
     """What begins before the line was silent is no frame; a frame that is broken costs what comes before a silence."""
     frames = deque(pack_frame(number % 2, bytes([number])).hex() for number in range(6))
     first, second, third, fourth, fifth, sixth = frames
-    words = [first, "-", second + third, "ff", fourth, "-", fifth, "0004000000aa", "-", "-", sixth]
+    words = [first, "-", second + third, "ff", ",", fourth, "-", fifth, "0004000000aa", "-", "-", sixth]
     answer = devices.answers([], "uart", *words)[0]
     assert answer == f"{second} {third} {fifth} {sixth} errors 2 breaks 3 sent 0001000000aa"
 
