@@ -189,6 +189,8 @@ def connected(node: LiveNode, peer: Peer) -> Iterator[Peer]:
     with peer:
         node.wait_until_ready()
         peer.wait_until_connected()
+        # rospy's publisher knows a subscriber a moment after that knows it.
+        time.sleep(0.5)
         yield peer
 
 

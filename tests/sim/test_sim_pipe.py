@@ -156,8 +156,9 @@ def test_what_happened_before_a_fault_is_reported(bench: PipeBench) -> None:
             simulator.run(100)
 
 
-def ended(bench: PipeBench, requests: bytes) -> tuple[int, bytes, str]:
+def ended(bench: PipeBench, requests: bytes, width: int = 8, fault: str = "none") -> tuple[int, bytes, str]:
     """Status, reports and output of a simulator that reads just these requests."""
+    command = bench.command(width, FAULT=fault)
     requests_file, reports_file = bench.folder / "requests", bench.folder / "reports"
     requests_file.write_bytes(requests)
     done = subprocess.run(
@@ -168,7 +169,7 @@ def ended(bench: PipeBench, requests: bytes) -> tuple[int, bytes, str]:
             "sh",
             requests_file,
             reports_file,
-            *bench.command(),
+            *command,
         ],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -177,6 +178,15 @@ def ended(bench: PipeBench, requests: bytes) -> tuple[int, bytes, str]:
         check=False,
     )
     return done.returncode, reports_file.read_bytes(), done.stdout
+
+
+def test_what_happened_in_the_cycle_of_a_fault_is_reported(bench: PipeBench) -> None:
+    # The third beat is the frame's last, so it is taken in the cycle in which it comes back with a wrong tid.
+    requests = b"F\x06\x00\x00\x00" + FRAME[:6] + b"R\x64\x00\x00\x00"
+    status, reports, printed = ended(bench, requests, 16, "wrong_tid")
+    assert status != 0
+    assert "s_axis_tid changes within a burst" in printed
+    assert reports == b"T" + (1).to_bytes(8, "little") + (3).to_bytes(8, "little")
 
 
 @pytest.mark.parametrize(

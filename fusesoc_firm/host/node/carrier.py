@@ -16,6 +16,7 @@ from typing import Protocol
 
 from fusesoc_firm.host.node import bridge
 from fusesoc_firm.host.node.description import NodeDescription, NodeTopic
+from fusesoc_firm.host.node.options import ROS_ARGUMENTS
 
 # What the Python of each version of ROS can import.
 _MODULES = {1: "rospy", 2: "rclpy"}
@@ -86,7 +87,7 @@ class RosCarrier:
         self.title = f"ROS {ros}"
         self._python = options.python or _python_of(ros)
         mine, its = socket.socketpair()
-        arguments = [*_arguments(ros, options.arguments)]
+        arguments = [*ros_arguments(ros, options.arguments)]
         # A session of its own: Ctrl-C is for us, and the node has to publish what is still in the hardware.
         self._process = subprocess.Popen(
             [self._python, bridge.__file__, str(its.fileno()), *arguments],
@@ -188,17 +189,16 @@ def _numbered(ros: int, topics: Sequence[NodeTopic]) -> list[dict[str, object]]:
     return [{"number": number, **asdict(topic)} for number, topic in enumerate(topics) if topic.ros == ros]
 
 
-def _arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
-    """ROS's own arguments as this version has them: ROS 2 takes NAME:=VALUE only behind a word of its own."""
-    if ros == 1:
-        yield from arguments
-        return
-    yield "--ros-args"
-    for position, argument in enumerate(arguments):
-        if argument == "--ros-args":
-            yield from arguments[position + 1 :]
+def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
+    """ROS's own arguments as a version has them: NAME:=VALUE is for both, all behind `--ros-args` for ROS 2."""
+    words = iter(arguments)
+    if ros == 2:
+        yield ROS_ARGUMENTS
+    for word in words:
+        if word == ROS_ARGUMENTS:
+            yield from words if ros == 2 else ()
             return
-        yield from ("-r", argument)
+        yield from ("-r", word) if ros == 2 else (word,)
 
 
 @cache

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import csv
 import random
+import re
 import struct
 import threading
 from dataclasses import replace
@@ -14,13 +16,18 @@ import pytest
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.host.bursts import split_frame
-from fusesoc_firm.host.node.carrier import CarrierError
+from fusesoc_firm.host.node.carrier import CarrierError, ros_arguments
 from fusesoc_firm.host.node.description import describe
 from fusesoc_firm.host.node.node import HardwareListener, NodeSettings
+from fusesoc_firm.host.node.options import add_node_options, remappings
+from fusesoc_firm.host.node.run import run_options
 from fusesoc_firm.host.node.software import node_software
+from fusesoc_firm.host.node.source import python_node
 from fusesoc_firm.host.node.trace import Trace
+from fusesoc_firm.host.node.trace_picture import draw_trace
 from fusesoc_firm.host.queues import Overflow
 from fusesoc_firm.host.transport.transport import Burst, TransportError
+from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.generator import LoadedSystem
 from tests.unit.host.fake_node import FakeHardware, Run, echo, loaded, pairs, until
 from tests.unit.system.systems import accelerator, converter, instance, specification
@@ -306,6 +313,24 @@ def test_software_that_gives_more_than_fits_never_waits_for_itself(tmp_path: Pat
     assert len(run.carrier.published) == counts.sent == counts.received - counts.dropped
 
 
+def test_a_fault_of_software_holds_up_nobody_else(tmp_path: Path) -> None:
+    """Two blocks take a message, and one of them fails at it: the other one's answer comes all the same."""
+    (tmp_path / "soft.py").write_text(DOUBLE, encoding="utf-8")
+    (tmp_path / "same.py").write_text("def same(message):\n    return message\n", encoding="utf-8")
+    blocks = converter("sub", "subscriber", "Point", "bad", "good") + instance("bad", "soft", "b0")
+    blocks += instance("b0", "hard", "z0") + converter("z0", "publisher", "Point")
+    blocks += instance("good", "same", "z1") + converter("z1", "publisher", "Point")
+    types = accelerator("hard", "Point", "Point") + accelerator("soft", "Point", "Point", "ROS-SW", "soft.py")
+    types += accelerator("same", "Point", "Point", "ROS-SW", "same.py")
+    system = loaded(tmp_path, specification(blocks, types))
+    with node_software(system, lambda error: None) as software:
+        run = Run(describe(system), Bench().open, software=software)
+        run.carrier.give(0, point(3.0))
+        run.stop()
+    assert run.carrier.published == [(1, point(3.0))]
+    assert software and software.faults == 1
+
+
 def test_a_message_that_is_none_is_reported(tmp_path: Path) -> None:
     system = with_software(tmp_path, "soft", "hard")
     faults: list[InputError] = []
@@ -364,6 +389,98 @@ def test_the_trace_knows_what_got_no_answer(tmp_path: Path) -> None:
     trace.close()
     rows = {int(row["message"]): row["publisher"] for row in csv.DictReader((tmp_path / "trace.csv").open())}
     assert rows == {0: "z0", 2: "z0", 3: "z0", 4: ""}
+
+
+def test_a_trace_is_drawn(tmp_path: Path) -> None:
+    description = describe(pairs(tmp_path))
+    trace = Trace(tmp_path / "trace.csv", description)
+    run = Run(description, Bench().open, trace=trace)
+    run.carrier.give(0, *POINTS[:3])
+    run.stop()
+    trace.close()
+    for name in ("one.svg", "two.svg", "picture.png"):
+        draw_trace(tmp_path / "trace.csv", tmp_path / name)
+    drawn = (tmp_path / "one.svg").read_text(encoding="utf-8")
+    assert drawn == (tmp_path / "two.svg").read_text(encoding="utf-8")
+    for text in ("a0 to z0: wall time", "a0 to z0: simulated time", "accelerator, median 1 "):
+        assert f"<!-- {text.strip()} -->" in drawn
+
+
+@pytest.mark.parametrize(
+    ("table", "picture", "message"),
+    [
+        ("trace.csv", "ways.gif", "'ways.gif' is no picture that can be drawn"),
+        ("none.csv", "ways.svg", "cannot read "),
+        ("other.csv", "ways.svg", "is no trace of a node"),
+        ("trace.csv", "ways.svg", "has no message that came back"),
+        ("broken.csv", "ways.svg", "broken.csv:2 is no row of a trace"),
+        ("good.csv", "no/ways.svg", "cannot write "),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(tmp_path: Path, table: str, picture: str, message: str) -> None:
+    Trace(tmp_path / "trace.csv", describe(pairs(tmp_path))).close()
+    head = (tmp_path / "trace.csv").read_text(encoding="utf-8")
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    (tmp_path / "broken.csv").write_text(f"{head}0,a0,z0,many{',' * 14}\n", encoding="utf-8")
+    (tmp_path / "good.csv").write_text(f"{head}0,a0,z0{',' * 15}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(message)):
+        draw_trace(tmp_path / table, tmp_path / picture)
+
+
+# --- the description, as a file and on a command line ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kinds", [("hard", "soft", "hard"), ("hard",)])
+def test_the_generated_file_has_the_table(tmp_path: Path, kinds: tuple[str, ...]) -> None:
+    system = with_software(tmp_path, *kinds)
+    spec = tmp_path / "spec.yaml"
+    (source,) = python_node(system, RosVersion.ROS1, spec, tmp_path / "nodes" / "robot").values()
+    names: dict[str, object] = {"__name__": "generated"}
+    exec(compile(source, "robot_node.py", "exec"), names)
+    assert names["NODE"] == describe(system)
+    call = 'main(NODE, __file__, "../../spec.yaml", [])' if "soft" in kinds else "main(NODE)"
+    assert source.endswith(f'if __name__ == "__main__":\n    {call}\n')
+
+
+def test_a_generated_file_of_another_version_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="system 'robot' has no topic of ROS 2"):
+        python_node(pairs(tmp_path), RosVersion.ROS2, tmp_path / "spec.yaml", tmp_path)
+
+
+def parsed(line: str) -> tuple[argparse.Namespace, tuple[str, ...]]:
+    parser = argparse.ArgumentParser()
+    add_node_options(parser)
+    arguments, rest = parser.parse_known_args(line.split())
+    return arguments, remappings(rest, parser.error)
+
+
+def test_what_is_for_ros_goes_to_ros(tmp_path: Path) -> None:
+    description = describe(pairs(tmp_path))
+    options = run_options(*parsed("a0:=/b --queue 3 __ns:=/left --name eye --qos best_effort"), description)
+    assert options.ros.arguments == ("a0:=/b", "__ns:=/left")
+    assert (options.ros.name, options.ros.depth, options.ros.is_reliable) == ("eye", 3, False)
+    assert (options.versions, options.settings.depth) == ((1,), 3)
+    both = replace(description, publishers=(replace(description.publishers[0], ros=2),))
+    options = run_options(*parsed("a:=b --ros-args -r __ns:=/left --log-level debug"), both)
+    assert options.versions == (1, 2)
+    assert [*ros_arguments(2, options.ros.arguments)] == "--ros-args -r a:=b -r __ns:=/left --log-level debug".split()
+    assert [*ros_arguments(1, options.ros.arguments)] == ["a:=b"]
+    assert run_options(*parsed(""), both, ros=2).versions == (2,)
+
+
+@pytest.mark.parametrize("line", ["--bogus", "word", "--queue 0", "--queue x", "--drain -1", "--drain nan"])
+def test_a_wrong_command_line_is_refused(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        parsed(line)
+    assert line.rsplit(maxsplit=1)[-1] in capsys.readouterr().err
+
+
+def test_what_no_version_knows_is_refused(tmp_path: Path) -> None:
+    description = describe(pairs(tmp_path))
+    with pytest.raises(InputError, match="has no topic of ROS 2, but of ROS 1"):
+        run_options(*parsed(""), description, ros=2)
+    with pytest.raises(InputError, match="'--ros-args' is for ROS 2"):
+        run_options(*parsed("--ros-args -r a:=b"), description)
 
 
 def test_a_relative_topic_moves_with_the_namespace(tmp_path: Path) -> None:
