@@ -173,7 +173,7 @@ class Node:
         self.process.send_signal(number)
         return self.wait()
 
-    def wait(self, seconds: float = 30) -> int:
+    def wait(self, seconds: float = 120) -> int:
         """Wait until it ends; its exit status."""
         return self.process.wait(seconds)
 
