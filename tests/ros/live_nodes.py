@@ -30,9 +30,10 @@ def model_address(*arguments: str) -> str:
 def specification(name: str, version: int, folder: Path) -> Path:
     """An application's specification in a version of ROS, with all that lies beside it."""
     copy = folder / f"{name}_ros{version}"
-    if not copy.exists():
-        shutil.copytree(SPECS / name, copy)
     spec = copy / f"{name}.yaml"
+    if copy.exists():
+        return spec
+    shutil.copytree(SPECS / name, copy)
     if version == 2:
         text = spec.read_text(encoding="utf-8")
         spec.write_text(re.sub(r"\bmiddleware: ROS\b", "middleware: ROS2", text), encoding="utf-8")
