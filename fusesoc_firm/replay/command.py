@@ -25,7 +25,6 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
 from fusesoc_firm.system.derived import Topic
 from fusesoc_firm.system.generator import LoadedSystem
-from fusesoc_firm.system.timing import frequency
 
 # Lines about messages that were refused; the rest is counted.
 _SHOWN = 100
@@ -86,8 +85,10 @@ def replay(
     if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
         fail(f"{target.path} is what is to be replayed")
     check_writable(target.path, force=target.force)
-    clock = _clock(loaded) if settings.has_latency else None
     system = loaded.system
+    if settings.has_latency and system.clock is None:
+        fail("without a 'clock' in the specification it is not known how long a cycle is")
+    clock = system.clock if settings.has_latency else None
     _check_names(settings.names, [item.block for item in (*stimulated(system), *published(system))])
     subscribers = renamed(stimulated(system), settings.names)
     publishers = renamed(published(system), settings.names)
@@ -226,18 +227,6 @@ def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
         if block not in blocks:
             faults.error(f"the system has no subscriber and no publisher '{block}'", hint=nearest(block, blocks))
     faults.raise_if_any()
-
-
-def _clock(loaded: LoadedSystem) -> Fraction:
-    """The frequency of clk in Hz. Raises `InputError`."""
-    text = loaded.specification.project.clock
-    if text is None:
-        fail("without a 'clock' in the specification it is not known how long a cycle is")
-    faults = Diagnostics()
-    found = frequency("clock", text, faults)
-    faults.raise_if_any()
-    assert found is not None
-    return found
 
 
 def _form(target: Target, like: Form) -> Form:

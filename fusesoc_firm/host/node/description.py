@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.host.software import sent_elsewhere, taken_elsewhere, way_to
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.printer import closure_text
@@ -16,7 +16,6 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import Converter, Topic
 from fusesoc_firm.system.generator import LoadedSystem
-from fusesoc_firm.system.timing import clock_frequency
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,6 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
     taken = (*subscribers, *software.subscribers, *sent_elsewhere(system))
     given = (*publishers, *software.publishers, *taken_elsewhere(system))
     lengths = [item.frame.payload_bytes if item.frame.is_fixed_size else None for item in system.publishers]
-    clock = clock_frequency(loaded.specification.project, Diagnostics())
     ids = {item.block: item.id for item in system.subscribers}
     return NodeDescription(
         system.name,
@@ -103,7 +101,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
         entering,
         leaving,
         max(length for length in lengths if length is not None) if None not in lengths else None,
-        None if clock is None else float(clock),
+        None if system.clock is None else float(system.clock),
     )
 
 
