@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import command, load
+from fusesoc_firm.cli.common import add_sources, command, load
 from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
+from fusesoc_firm.diagnostics import fail
 
 
 def add_live(commands: Any) -> None:
@@ -37,7 +38,11 @@ def add_live(commands: Any) -> None:
         _draw_trace,
     )
     trace.add_argument("table", metavar="F.csv", type=Path, help="what the node wrote")
+    trace.add_argument(
+        "--system", type=Path, metavar="SPEC", help="the system's specification, for the table of a node in C++"
+    )
     trace.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where (default: beside it; also .png, .pdf)")
+    add_sources(trace)
 
 
 def _live(arguments: argparse.Namespace) -> None:
@@ -56,8 +61,26 @@ def _live(arguments: argparse.Namespace) -> None:
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.host.node.steps import are_steps
     from fusesoc_firm.host.node.trace_picture import draw_trace
 
-    output: Path = arguments.output or arguments.table.with_suffix(".svg")
-    draw_trace(arguments.table, output)
+    table: Path = arguments.table
+    output: Path = arguments.output or table.with_suffix(".svg")
+    if are_steps(table):
+        table = _ways_of_steps(table, arguments)
+    draw_trace(table, output)
     print(output)
+
+
+def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
+    """The table of ways beside one of steps, which is made."""
+    from fusesoc_firm.host.node.description import describe
+    from fusesoc_firm.host.node.steps import write_ways
+
+    if not arguments.system:
+        fail(f"{steps} is of a node in C++, whose table has no names", hint="--system SPEC says what its ids mean")
+    arguments.spec = arguments.system
+    table = steps.with_name(f"{steps.stem}-ways.csv")
+    write_ways(steps, table, describe(load(arguments, needs_sources=False)))
+    print(table)
+    return table

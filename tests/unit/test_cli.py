@@ -317,3 +317,17 @@ def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, mo
 
 def test_the_schema_is_json(capsys: Captured) -> None:
     assert json.loads(out(capsys, "system", "schema"))["title"] == "System specification of fusesoc_firm"
+
+
+def test_steps_of_a_node_in_cpp_need_its_system(capsys: Captured, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    steps, picture = tmp_path / "steps.csv", tmp_path / "ways.svg"
+    steps.write_text(
+        "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n"
+        "1,received,0,0,32,,\n2,sent,0,0,32,,\n3,burst,0,0,29,,\n4,published,0,0,24,,\n"
+    )
+    assert "--system SPEC says what its ids mean" in error(capsys, "trace", str(steps))
+    ways = tmp_path / "steps-ways.csv"
+    assert out(capsys, "trace", str(steps), "--system", str(SPEC), "-o", str(picture)) == f"{ways}\n{picture}\n"
+    assert "0,QuaternionToEuler_sub,QuaternionToEuler_pub,32,24,0,0,1,2,3," in ways.read_text(encoding="utf-8")
+    assert picture.is_file()

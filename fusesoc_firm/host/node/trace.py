@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import csv
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -70,8 +70,8 @@ class _Ways:
 class Trace:
     """Writes the table; any thread may tell it something. Its times count from when it was made."""
 
-    def __init__(self, path: Path, description: NodeDescription) -> None:
-        """Begin the file at `path`. Raises `InputError`."""
+    def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
+        """Begin the file at `path`; `clock` gives ns. Raises `InputError`."""
         try:
             self._file = path.open("w", newline="", encoding="utf-8")
         except OSError as error:
@@ -87,7 +87,8 @@ class Trace:
         self._ways = _Ways()
         self._numbers = count()
         self._lock = RLock()
-        self._start = monotonic_ns()
+        self._clock = clock
+        self._start = clock()
 
     def sending(self, entry: Entry) -> None:
         """A message is being sent to the hardware."""
@@ -99,7 +100,7 @@ class Trace:
 
     def sent(self, entry: Entry) -> None:
         """The hardware, or a bounded buffer before it, has the message."""
-        entry.sent_ns = monotonic_ns()
+        entry.sent_ns = self._clock()
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
         """Simulated hardware took the next one of the messages sent."""
@@ -119,7 +120,7 @@ class Trace:
     def came(self, publisher: int, size: int, cycles: tuple[int, int] | None, *, is_published: bool) -> None:
         """A message came out of the hardware. It `is_published` later, or is for software."""
         with self._lock:
-            answer = _Answer(self._cause(publisher), publisher, size, cycles, monotonic_ns())
+            answer = _Answer(self._cause(publisher), publisher, size, cycles, self._clock())
             if is_published:
                 self._ways.unpublished.setdefault(publisher, deque()).append(answer)
             else:

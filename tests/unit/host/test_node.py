@@ -23,7 +23,8 @@ from fusesoc_firm.host.node.options import add_node_options, remappings
 from fusesoc_firm.host.node.run import run_options
 from fusesoc_firm.host.node.software import node_software
 from fusesoc_firm.host.node.source import python_node
-from fusesoc_firm.host.node.trace import Trace
+from fusesoc_firm.host.node.steps import are_steps, write_ways
+from fusesoc_firm.host.node.trace import CYCLES, WALL_TIMES, Trace
 from fusesoc_firm.host.node.trace_picture import draw_trace
 from fusesoc_firm.host.queues import Overflow
 from fusesoc_firm.host.transport.transport import Burst, TransportError
@@ -389,6 +390,59 @@ def test_the_trace_knows_what_got_no_answer(tmp_path: Path) -> None:
     trace.close()
     rows = {int(row["message"]): row["publisher"] for row in csv.DictReader((tmp_path / "trace.csv").open())}
     assert rows == {0: "z0", 2: "z0", 3: "z0", 4: ""}
+
+
+# What a node in C++ writes of two messages whose answers come in turn, the first one in two bursts; a third gets none.
+STEPS = """\
+wall_ns,event,converter,message,bytes,first_cycle,last_cycle
+1000,received,0,0,24,,
+1100,queued,0,0,24,,
+1200,received,1,1,24,,
+1250,queued,1,1,24,,
+1300,taken,0,0,24,10,38
+1350,sent,0,0,24,,
+1400,sent,1,1,24,,
+1500,taken,1,1,24,40,68
+1600,burst,0,0,16,39,54
+1700,burst,1,0,29,69,97
+1750,received,0,2,24,,
+1800,burst,0,0,14,98,111
+1900,published,1,0,24,,
+2000,published,0,1,24,,
+2100,sent,0,2,24,,
+"""
+
+
+def test_the_steps_of_a_node_in_cpp_become_ways(tmp_path: Path) -> None:
+    steps, ways = tmp_path / "steps.csv", tmp_path / "ways.csv"
+    steps.write_text(STEPS)
+    assert are_steps(steps)
+    write_ways(steps, ways, describe(pairs(tmp_path)))
+    assert not are_steps(ways)
+    rows = [*csv.DictReader(ways.open())]
+    names = ("subscriber", "publisher", "bytes_out", *WALL_TIMES, *CYCLES)
+    assert [",".join(row[name] for name in names) for row in rows] == [
+        "a1,z1,24,200,250,400,700,900,40,68,69,97",
+        "a0,z0,24,0,100,350,800,1000,10,38,39,111",
+        "a0,,,750,750,1100,,,,,,",
+    ]
+    draw_trace(ways, tmp_path / "ways.svg")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("1,received,0,zero,24,,", "steps.csv:2 is no step of a node"),
+        ("1,received,0", "steps.csv:2 is no step of a node"),
+        ("1,lost,0,0,24,,", "steps.csv:2: there is no step 'lost'"),
+        ("1,received,2,0,24,,", "steps.csv:2: 'robot' has no topic of converter 2, received"),
+    ],
+)
+def test_steps_that_are_none_are_told(tmp_path: Path, line: str, message: str) -> None:
+    (tmp_path / "steps.csv").write_text(f"{STEPS.splitlines()[0]}\n{line}\n")
+    with pytest.raises(InputError) as raised:
+        write_ways(tmp_path / "steps.csv", tmp_path / "ways.csv", describe(pairs(tmp_path)))
+    assert message in str(raised.value)
 
 
 def test_a_trace_is_drawn(tmp_path: Path) -> None:
