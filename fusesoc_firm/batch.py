@@ -2,8 +2,9 @@
 
     python -m fusesoc_firm.batch GENERATOR < calls.json
 
-Such a process does the calls of one generator, so that it uses the files of ours that a call by itself would use, and
-none of another one's. What cannot be made is left alone: FuseSoC's own call makes it, or says what is wrong.
+Such a process does the calls of one generator. The files of ours that it uses count for all of its calls, so an edit of
+one may make more of them anew than it would have to, but none of another generator's. What cannot be made is left
+alone: FuseSoC's own call makes it, or says what is wrong.
 """
 
 from __future__ import annotations

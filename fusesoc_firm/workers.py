@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import multiprocessing
 import os
@@ -74,11 +75,7 @@ def cluster_workers(address: str) -> Iterator[Workers]:
         fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
     # What is lost is told here, once and in a sentence.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
-    try:
-        client = distributed.Client(address, timeout=_CONNECT_SECONDS)
-    except (OSError, ValueError) as error:
-        fail(f"no Dask scheduler answers at '{address}'", hint=str(error).splitlines()[0])
-    with client:
+    with _connected(distributed, address) as client:
         count = sum(client.ncores().values())
         if not count:
             fail(f"the Dask cluster at '{address}' has no workers", hint=f"start some: dask worker {address}")
@@ -92,6 +89,18 @@ def cluster_workers(address: str) -> Iterator[Workers]:
             )
         finally:
             executor.shutdown(wait=False)
+
+
+def _connected(distributed: Any, address: str) -> Any:
+    """A client of the scheduler. Raises `InputError` if none answers."""
+    try:
+        return distributed.Client(address, timeout=_CONNECT_SECONDS)
+    except (OSError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+    # What is left of the client ends its loop when it is collected. If that came while another one begins, both would
+    # wait for the same lock for ever.
+    gc.collect()
+    return fail(f"no Dask scheduler answers at '{address}'", hint=reason)
 
 
 def _check_versions(client: Any, address: str) -> None:

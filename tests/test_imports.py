@@ -34,7 +34,7 @@ ALLOWED: dict[str, set[str]] = {
     "scheduling": {"diagnostics", "workers"},
     "system": _CONVERTER | {"prompts", "scheduling"},
     # It builds simulators of systems, by FuseSoC and with the library.
-    "host": _SYSTEM | {"launcher", "library_path", "store"},
+    "host": _SYSTEM | {"files", "library_path", "store_files", "tools"},
     "replay": _SYSTEM | {"host"},
     # The cores of its bench lie in the library.
     "verify": _SYSTEM | {"files", "library_path", "workers"},

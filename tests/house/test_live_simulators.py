@@ -178,7 +178,9 @@ def test_what_cannot_be_built_is_said(tmp_path: Path, monkeypatch: pytest.Monkey
         build_simulator(old, build_root=tmp_path / "build")
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
-    with pytest.raises(InputError, match=r"'ghdl' is not installed(.|\n)*apt install ghdl"):
+    with pytest.raises(
+        InputError, match=r"not installed: ghdl make(.|\n)*apt-get install --no-install-recommends ghdl"
+    ):
         build_simulator(SPECS / "quat2euler" / "quat2euler.yaml")
 
 

@@ -27,6 +27,8 @@ SAID = {
     "sim": [f"{APT} ghdl"],
     "sim_icarus": [GHDL, f"iverilog: {APT} iverilog"],
     "sim_verilator": [GHDL, VERILATOR, f"g++: {APT} g++"],
+    "live": [f"{APT} ghdl"],
+    "live_verilator": [GHDL, VERILATOR, f"g++: {APT} g++"],
     "lint": [GHDL, VERILATOR],
     **{f"synth_{family}": SYNTHESIS for family in ("xilinx", "ecp5", "ice40", "gowin")},
     "icebreaker": [

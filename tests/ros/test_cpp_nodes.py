@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import queue
 import random
@@ -21,9 +22,12 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.host.node.description import describe
+from fusesoc_firm.host.node.steps import write_ways
 from fusesoc_firm.host.simulator import build_simulator
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.system.generator import load_system
 from tests.ros.cpp_nodes import Node, Peer, Ros, missing_ros1, missing_ros2, ros1, ros2
 from tests.sim.images import filtered, image, load_model
 
@@ -200,6 +204,13 @@ def test_quaternions_come_back_as_angles(workshop: Workshop) -> None:
         assert "20 received, 0 dropped, 20 sent, 20 published, 0 errors, 0 restarts" in node.said()
     steps = [line.split(",")[1] for line in trace.read_text(encoding="utf-8").splitlines()[1:]]
     assert {steps.count(step) for step in ("received", "queued", "sent", "taken", "burst", "published")} == {20}
+    ways = workshop.folder / "ways.csv"
+    spec = workshop.specification("quat2euler")
+    write_ways(trace, ways, describe(load_system(spec, libraries([], {}, None))))
+    with ways.open(newline="", encoding="utf-8") as file:
+        accelerator = [int(row["accelerator_cycles"]) for row in csv.DictReader(file)]
+    # Without stalls it takes as long for any quaternion, but for the cycle in which its loop is when one comes.
+    assert len(accelerator) == 20 and max(accelerator) - min(accelerator) <= 1
 
 
 @only_ros1

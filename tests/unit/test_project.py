@@ -355,7 +355,7 @@ def test_a_generator_refuses_what_is_not_locked(
     size.write_text("uint8 a\n")
     # It is in the store, and compared all the same.
     assert call(project, **more) == 0
-    monkeypatch.setattr("fusesoc_firm.lock.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.own_code.digests", lambda: {"naming.py": "edited"})
     assert call(project, **more) == 1
     assert "tool fusesoc-firm: sha256 is " in capsys.readouterr().err
     monkeypatch.undo()
