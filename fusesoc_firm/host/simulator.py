@@ -32,14 +32,13 @@ from fusesoc_firm.message.library import libraries
 from fusesoc_firm.store_files import default_root
 from fusesoc_firm.system.core_file import CoreOptions, new_core
 from fusesoc_firm.system.generator import load_system
-from fusesoc_firm.tools import missing, ways
+from fusesoc_firm.tools import missing, simulation_programs, ways
 
 GHDL, VERILATOR = "ghdl", "verilator"
 TOOLS = (GHDL, VERILATOR)
 
-# The target of a system's core for each tool, and the programs that its build needs.
+# The target of a system's core for each tool.
 _TARGETS = {GHDL: "live", VERILATOR: "live_verilator"}
-_PROGRAMS = {GHDL: ("ghdl", "make"), VERILATOR: ("ghdl", "verilator", "g++", "make")}
 _SHOWN_LINES = 20
 
 
@@ -88,7 +87,7 @@ def build_simulator(
         fail(f"there is no simulator '{tool}' of live systems", hint=f"legal: {', '.join(TOOLS)}")
     if not spec.is_file():
         fail(f"there is no specification '{spec}'")
-    if absent := missing(_PROGRAMS[tool]):
+    if absent := missing(dict.fromkeys([*simulation_programs(tool), "make"])):
         fail(f"not installed: {' '.join(absent)}", hint="; ".join(ways(program) for program in absent))
     spec = spec.resolve()
     folder = _build_folder(spec, tool, build_root or Path(default_root()) / "simulators")

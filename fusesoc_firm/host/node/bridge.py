@@ -16,6 +16,7 @@ import struct
 import sys
 import threading
 import time
+from abc import ABC, abstractmethod
 from typing import Any, NamedTuple
 
 # To the bridge: what it is to be. From the bridge: what the topics are called after remapping.
@@ -98,7 +99,7 @@ class BridgeError(Exception):
     """ROS cannot do what is asked for."""
 
 
-class Ros:
+class Ros(ABC):
     """What both versions of ROS have in common."""
 
     def __init__(self, config: dict[str, Any], channel: Channel) -> None:
@@ -120,25 +121,25 @@ class Ros:
         """Let `spin` return; any thread."""
         self._ended.set()
 
+    @abstractmethod
     def names(self) -> dict[str, dict[int, str]]:
         """What the topics are called after remapping."""
-        raise NotImplementedError
 
+    @abstractmethod
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message."""
-        raise NotImplementedError
 
+    @abstractmethod
     def stop(self) -> None:
         """Take no more messages, and say DONE when all that was taken is handed over."""
-        raise NotImplementedError
 
+    @abstractmethod
     def spin(self) -> None:
         """Work until `end`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def close(self) -> None:
         """Let leave what was published, and be no node any more."""
-        raise NotImplementedError
 
 
 class Ros1(Ros):
