@@ -11,12 +11,11 @@ import subprocess
 import tempfile
 from bisect import bisect_left
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.ros.cpp_nodes import DEBIAN_PYTHON, ROS2, Ros, missing_ros1, missing_ros2, ros1, ros2
+from tests.ros.cpp_nodes import DEBIAN_PYTHON, ROS2, missing_ros, running_ros
 from tests.ros.live_nodes import LiveNode, paced, specification
 
 TITLE = "A minute of messages at 100 Hz"
@@ -55,7 +54,7 @@ def measure(tell: Tell) -> list[Table]:
     """Run both versions of ROS, one after the other; `tell` hears of each."""
     rows = []
     for version, names in _NODES.items():
-        reason = missing_ros1() if version == 1 else missing_ros2()
+        reason = missing_ros(version)
         found: list[dict[str, Any]] = []
         if not reason:
             try:
@@ -76,7 +75,7 @@ def measure(tell: Tell) -> list[Table]:
 
 def _run(version: int) -> list[dict[str, Any]]:
     """What came back from the node and from the echo."""
-    with tempfile.TemporaryDirectory() as name, _ros(version, Path(name)) as ros:
+    with tempfile.TemporaryDirectory() as name, running_ros(version, Path(name)) as ros:
         folder = Path(name)
         spec = specification("quat2euler", version, folder)
         command = ["live", str(spec), "--tool", "verilator", "--queue", "1000"]
@@ -92,10 +91,6 @@ def _run(version: int) -> list[dict[str, Any]]:
                 echo.wait()
             assert node.stop() == 0, node.said()
         return found
-
-
-def _ros(version: int, folder: Path) -> AbstractContextManager[Ros]:
-    return ros1(folder) if version == 1 else nullcontext(ros2(folder))
 
 
 def _is_among(value: float, ascending: list[float]) -> bool:

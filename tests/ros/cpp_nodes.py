@@ -16,11 +16,11 @@ import threading
 import time
 import xmlrpc.client
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Self
 
 HERE = Path(__file__).resolve().parent
 DEBIAN_PYTHON = "/usr/bin/python3"
@@ -155,29 +155,40 @@ def ros2(folder: Path) -> Ros:
     return Ros(2, str(ROS2 / "bin/python"), tuple(includes), tuple(links), environment)
 
 
-class Node:
-    """A node in C++ that runs."""
+def missing_ros(version: int) -> str:
+    """Why this version of ROS is not here, or nothing."""
+    return missing_ros1() if version == 1 else missing_ros2()
 
-    def __init__(self, ros: Ros, program: Path, transport: str, *arguments: str) -> None:
-        self._log = program.with_suffix(".log").open("w+b")
-        command = [str(program), "--transport", transport, *arguments]
-        self.process = subprocess.Popen(command, env=ros.environment, stdout=self._log, stderr=subprocess.STDOUT)
+
+def running_ros(version: int, folder: Path) -> AbstractContextManager[Ros]:
+    """A version of ROS that is here, for as long as it is wanted."""
+    return ros1(folder) if version == 1 else nullcontext(ros2(folder))
+
+
+class NodeProcess:
+    """A node that runs; within a `with`, after which it is gone."""
+
+    def __init__(self, log: Path, command: Sequence[str], environment: Mapping[str, str], patience: float) -> None:
+        """What it prints goes to `log`; its end is waited for `patience` seconds."""
+        self._path = log
+        self._patience = patience
+        self._log = log.open("wb")
+        self.process = subprocess.Popen(command, env=environment, stdout=self._log, stderr=subprocess.STDOUT)
 
     def said(self) -> str:
         """All that it has printed."""
-        self._log.seek(0)
-        return self._log.read().decode(errors="replace")
+        return self._path.read_text(encoding="utf-8", errors="replace")
 
     def stop(self, number: int = signal.SIGINT) -> int:
         """Ask it to end; its exit status."""
         self.process.send_signal(number)
         return self.wait()
 
-    def wait(self, seconds: float = 120) -> int:
+    def wait(self, seconds: float | None = None) -> int:
         """Wait until it ends; its exit status."""
-        return self.process.wait(seconds)
+        return self.process.wait(self._patience if seconds is None else seconds)
 
-    def __enter__(self) -> Node:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(
@@ -186,9 +197,17 @@ class Node:
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()
+        self._log.close()
         if error is not None:
             sys.stderr.write(self.said())
-        self._log.close()
+
+
+class Node(NodeProcess):
+    """A node in C++."""
+
+    def __init__(self, ros: Ros, program: Path, transport: str, *arguments: str) -> None:
+        command = [str(program), "--transport", transport, *arguments]
+        super().__init__(program.with_suffix(".log"), command, ros.environment, 120.0)
 
 
 class Peer:

@@ -12,10 +12,9 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
-from tests.ros.cpp_nodes import Ros
+from tests.ros.cpp_nodes import NodeProcess, Ros
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SPECS = REPOSITORY / "specs"
@@ -40,8 +39,8 @@ def specification(name: str, version: int, folder: Path) -> Path:
     return spec
 
 
-class LiveNode:
-    """A node that runs; within a `with`, after which it is gone."""
+class LiveNode(NodeProcess):
+    """A node in Python."""
 
     def __init__(self, ros: Ros, log: Path, command: Sequence[str], *ros_arguments: str) -> None:
         """`command` are the arguments of `firm`, or a generated node with its own; those of ROS come behind all."""
@@ -50,18 +49,8 @@ class LiveNode:
         # What programs in C++ need of the wheels is not for our own Python.
         environment = {name: value for name, value in ros.environment.items() if not name.startswith("LD_")}
         environment["PYTHONPATH"] = os.pathsep.join([str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
-        self._path = log
-        self._log = log.open("wb")
-        self.process = subprocess.Popen(
-            [sys.executable, *program, *command, "--ros-python", ros.python, *ros_arguments],
-            env=environment,
-            stdout=self._log,
-            stderr=subprocess.STDOUT,
-        )
-
-    def said(self) -> str:
-        """All that it has printed."""
-        return self._path.read_text(encoding="utf-8", errors="replace")
+        line = [sys.executable, *program, *command, "--ros-python", ros.python, *ros_arguments]
+        super().__init__(log, line, environment, 30.0)
 
     def wait_until_ready(self, seconds: float = 300.0) -> None:
         """Wait until it is a node of ROS, its simulator being built."""
@@ -85,28 +74,6 @@ class LiveNode:
         """Kill what it started with `word` in its command line."""
         (number,) = [number for line, number in self.children().items() if word in line]
         os.kill(number, signal.SIGKILL)
-
-    def stop(self, number: int = signal.SIGINT) -> int:
-        """Ask it to end; its exit status."""
-        self.process.send_signal(number)
-        return self.wait()
-
-    def wait(self, seconds: float = 30.0) -> int:
-        """Wait until it ends; its exit status."""
-        return self.process.wait(seconds)
-
-    def __enter__(self) -> LiveNode:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.wait()
-        self._log.close()
-        if error is not None:
-            sys.stderr.write(self.said())
 
 
 def paced(ros: Ros, rate: int, seconds: float, ways: Sequence[tuple[str, str]]) -> list[dict[str, Any]]:

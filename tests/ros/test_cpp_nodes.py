@@ -28,7 +28,7 @@ from fusesoc_firm.host.simulator import build_simulator
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.system.generator import load_system
-from tests.ros.cpp_nodes import Node, Peer, Ros, missing_ros1, missing_ros2, ros1, ros2
+from tests.ros.cpp_nodes import Node, Peer, Ros, missing_ros, running_ros
 from tests.sim.images import filtered, image, load_model
 
 REPOSITORY = Path(__file__).parents[2]
@@ -162,12 +162,9 @@ only_ros2 = pytest.mark.parametrize("workshop", [ROS2], indirect=True)
 @pytest.fixture(scope="module", params=[ROS1, ROS2])
 def workshop(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Workshop]:
     folder = tmp_path_factory.mktemp(f"ros{request.param}")
-    if reason := missing_ros1() if request.param == 1 else missing_ros2():
+    if reason := missing_ros(request.param):
         pytest.skip(reason)
-    if request.param == 2:
-        yield Workshop(ros2(folder), folder)
-        return
-    with ros1(folder) as ros:
+    with running_ros(request.param, folder) as ros:
         yield Workshop(ros, folder)
 
 

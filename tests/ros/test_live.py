@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from tests.ros.cpp_nodes import Peer, Ros, missing_ros1, missing_ros2, ros1, ros2
+from tests.ros.cpp_nodes import Peer, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import LiveNode, model_address, paced, specification
 
 # Topics of no bytes and of any number, with no accelerator between.
@@ -93,12 +93,9 @@ class Place:
 )
 def place(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
     folder = tmp_path_factory.mktemp(f"live{request.param}")
-    if reason := missing_ros1() if request.param == 1 else missing_ros2():
+    if reason := missing_ros(request.param):
         pytest.skip(reason)
-    if request.param == 2:
-        yield Place(ros2(folder), folder)
-        return
-    with ros1(folder) as ros:
+    with running_ros(request.param, folder) as ros:
         yield Place(ros, folder)
 
 
