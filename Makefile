@@ -39,11 +39,15 @@ DEBIAN_MODULES := /usr/lib/python3/dist-packages
 ROS1 := pkg-config rosmaster:python3-rosmaster /usr/include/ros/ros.h:libroscpp-dev \
   $(foreach name,rospy std_msgs geometry_msgs sensor_msgs,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
 
-.PHONY: help sim test ros bitstream bench proofs corpus lint setup tools clean distclean
+# Designs of make fuzz-netlist, and further options, such as FUZZ_OPTIONS='--judges icarus'.
+DESIGNS ?= 10000
+FUZZ_OPTIONS ?=
+
+.PHONY: help sim test ros bitstream bench proofs corpus fuzz-netlist lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # Without what make and Edalize say about folders, the result is the last line.
 sim: TOOLS = $(if $(filter sim,$(TARGET)),,$(patsubst icarus,iverilog,$(TARGET:sim_%=%)))
@@ -84,6 +88,10 @@ bitstream: setup $(VENV)/.boards ## Build SYSTEM for BOARD (icebreaker, tangnano
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
 	@$(BIN)/python -m tests.proofs
+
+fuzz-netlist: TOOLS = iverilog verilator
+fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
+	@$(BIN)/python -m tests.netlists --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
 lint: setup ## Check style and types
 	@$(BIN)/ruff check .

@@ -39,7 +39,7 @@ ALLOWED: dict[str, set[str]] = {
     # The cores of its bench lie in the library.
     "verify": _SYSTEM | {"files", "library_path", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.
-    "netlist": {"launcher", "manifest", "tools"},
+    "netlist": {"launcher", "manifest", "naming", "tools"},
     "render": set(),
     "own_code": {"render"},
     "files": set(),

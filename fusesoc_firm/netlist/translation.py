@@ -10,19 +10,23 @@ import json
 import re
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from itertools import pairwise
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.launcher import starts_everything
-from fusesoc_firm.netlist.repair import NetlistError, repair
+from fusesoc_firm.netlist import dump, verilog
+from fusesoc_firm.netlist.corrections import FUNCTIONS, correct, need_sources
+from fusesoc_firm.netlist.model import LostRegisterError, Module, Modules, NetlistError
+from fusesoc_firm.netlist.sources import calls
 from fusesoc_firm.tools import explanation, missing
 
-_UNBOUND = re.compile(r'instance "(.*?)" of component "(.*?)" is not bound')
 _MODULE = r"^[ \t]*module\s+({name})\b"
-_EMPTY_MODULE = r"^module\s+({name})\b[^;]*;\s*endmodule\n*"
+_DEFINITION = re.compile(r"^module (\S+)(.*?)^endmodule", re.MULTILINE | re.DOTALL)
+_GENERIC_MAP = re.compile(r"^  \S+ #\(\n(.*?)\)\n +(\S+) \($", re.MULTILINE | re.DOTALL)
+_GENERIC = re.compile(r"^ +\.(\w+)\((.*?)\),?$", re.MULTILINE)
 # GHDL compares with bounds that a number cannot leave, and puts what is in no loop into one vector; a module may have
 # ports that a message has in another ROS version only. A linter is to look at what people wrote.
 _WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT", "PINMISSING")
@@ -32,6 +36,13 @@ _HEADER = "\n".join(
 _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 # What GHDL says of logic that is not there afterwards; the words are those of its sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
+
+# GHDL's option for that; it loses registers of which it wanted to make memories.
+_NO_MEMORIES = "-dm"
+_WITHOUT_MEMORIES = (
+    "; GHDL loses a register that is written by a dynamic index and read by a constant one. So all memories of this "
+    "netlist are registers; read that one by dynamic indices alone, or write it by constant ones, to get memories."
+)
 
 
 @dataclass(frozen=True)
@@ -94,19 +105,34 @@ def translate(translation: Translation, folder: Path) -> str:
         if files:
             ghdl.run("-i", f"--work={library}", *files)
     ghdl.run("-m", f"--work={translation.library}", translation.unit)
-    netlist, warnings = ghdl.synthesise("verilog")
+    try:
+        netlist, warnings = _netlist(ghdl)
+    except LostRegisterError as error:
+        if _NO_MEMORIES in translation.options:
+            raise
+        ghdl = _Ghdl(replace(translation, options=[*translation.options, _NO_MEMORIES]), folder)
+        netlist, warnings = _netlist(ghdl)
+        warnings = f"{error.args[0].replace('error', 'warning', 1)}{_WITHOUT_MEMORIES}\n{warnings}"
+    part = output.with_name(f"{output.name}.part")
+    part.write_text(netlist, encoding="utf-8")
+    part.replace(output)
+    return warnings
+
+
+def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
+    """The netlist in Verilog, and what GHDL warns of that is of interest."""
+    text, warnings = ghdl.synthesise("dump")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
         raise NetlistError(
             "\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"])
         )
-    black_boxes = _black_boxes(warnings, translation.verilog)
-    vhdl, _ = ghdl.synthesise("vhdl")
-    netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl, translation.unit) + _FOOTER
-    part = output.with_name(f"{output.name}.part")
-    part.write_text(netlist, encoding="utf-8")
-    part.replace(output)
-    return _other_warnings(warnings)
+    modules = dump.read(text)
+    components = _components(modules, ghdl.translation.verilog)
+    # The dump has all but these.
+    generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
+    correct(modules, ghdl.called() if need_sources(modules) else {})
+    return _HEADER + verilog.write(modules, generics) + _FOOTER, _other_warnings(warnings)
 
 
 @dataclass(frozen=True)
@@ -119,12 +145,28 @@ class _Ghdl:
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
         """What it prints on its two streams."""
         options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
-        done = subprocess.run(
-            ["ghdl", command, *options, *arguments], capture_output=True, text=True, errors="replace", check=False
-        )
+        # Through a file: GHDL writes a word at a time, which a pipe makes slow.
+        with tempfile.TemporaryFile("w+", encoding="latin-1") as output:
+            done = subprocess.run(
+                ["ghdl", command, *options, *arguments],
+                stdout=output,
+                stderr=subprocess.PIPE,
+                encoding="latin-1",
+                check=False,
+            )
+            output.seek(0)
+            printed = output.read()
         if done.returncode:
-            raise NetlistError((done.stdout + done.stderr).rstrip())
-        return done.stdout, done.stderr
+            raise NetlistError(_errors(printed + done.stderr))
+        return printed, done.stderr
+
+    def called(self) -> dict[str, str]:
+        """Functions of IEEE's packages that GHDL has wrong, by the places of their calls in the sources."""
+        found: dict[str, str] = {}
+        for library, files in self.translation.libraries.items():
+            if files:
+                found |= calls(self.run("--file-to-xml", f"--work={library}", *files)[0], FUNCTIONS)
+        return found
 
     def synthesise(self, language: str) -> tuple[str, str]:
         """The netlist, and what GHDL says about it."""
@@ -135,17 +177,29 @@ class _Ghdl:
         )
 
 
-def _black_boxes(warnings: str, verilog: Sequence[str]) -> set[str]:
-    """The components without an entity, each of which must be a module; in the case that Verilog has them."""
-    found: set[str] = set()
-    for instance, component in set(_UNBOUND.findall(warnings)):
-        name = component.strip("\\")
-        if not (module := _module(name, verilog)):
-            raise NetlistError(
-                f"error: instance '{instance}' is of '{name}', which is neither an entity of this build's VHDL nor a "
-                f"module of its Verilog ({', '.join(verilog) or 'it has none'})"
+def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
+    """The components without an entity, each of which must be a module of the Verilog, and gets its name."""
+    found: dict[str, Module] = {}
+    for instance in (instance for module in modules.values() for instance in module.instances):
+        module = modules.get(instance.kind)
+        if module is None or module.is_defined or instance.kind in found:
+            continue
+        if not (name := _module(module.name, sources)):
+            raise instance.error(
+                f"instance '{instance.name}' is of '{module.name}', which is neither an entity of this build's VHDL "
+                f"nor a module of its Verilog ({', '.join(sources) or 'it has none'})"
             )
-        found.add(module)
+        module.name = name
+        found[instance.kind] = module
+    return list(found.values())
+
+
+def _generics(netlist: str) -> dict[tuple[str, str], dict[str, str]]:
+    """The generics of instances in GHDL's own Verilog, by the enclosing module and the instance."""
+    found: dict[tuple[str, str], dict[str, str]] = {}
+    for name, text in _DEFINITION.findall(netlist):
+        for values, instance in _GENERIC_MAP.findall(text):
+            found[name, instance] = dict(_GENERIC.findall(values))
     return found
 
 
@@ -158,22 +212,27 @@ def _module(name: str, verilog: Sequence[str]) -> str | None:
     return None
 
 
-def _without(netlist: str, modules: set[str]) -> str:
-    """A netlist without the empty modules that GHDL writes for components."""
-    for name in modules:
-        pattern = _EMPTY_MODULE.format(name=re.escape(name))
-        netlist = re.sub(pattern, "", netlist, flags=re.MULTILINE | re.IGNORECASE)
-    return netlist
+def _errors(text: str) -> str:
+    """What GHDL says of an end without success, without its notes and warnings; all if there is nothing else."""
+    found = "\n".join(line for item in _messages(text) if not re.search(r":(note|warning):", item[0]) for line in item)
+    return (found or text).rstrip()
 
 
 def _other_warnings(text: str) -> str:
-    """What GHDL warns of besides components without an entity; each warning is a line, and the source with a caret."""
-    lines = text.splitlines()
-    starts = [number for number, line in enumerate(lines) if re.match(r"\S+:\d+:\d+:", line)]
-    warnings = [lines[start:end] for start, end in pairwise([*starts, len(lines)])]
+    """What GHDL warns of besides components without an entity."""
     kept = [
         item
-        for item in warnings
+        for item in _messages(text)
         if ":warning:" in item[0] and "is not bound" not in item[0] and "(in default configuration" not in item[0]
     ]
     return "\n".join(line for item in kept for line in item)
+
+
+def _messages(text: str) -> list[list[str]]:
+    """GHDL's messages: each is a line, and may be followed by the source with a caret, or by more about a crash."""
+    messages: list[list[str]] = []
+    for line in text.splitlines():
+        if not messages or not line.startswith("  "):
+            messages.append([])
+        messages[-1].append(line)
+    return messages

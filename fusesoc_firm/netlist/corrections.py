@@ -1,0 +1,107 @@
+"""Corrects what GHDL 2.0 synthesises wrongly, as far as a netlist and its sources show what was meant.
+
+* A rotation by as many places as there are bits, or by more, gives zeros: it is made of two shifts.
+* A comparison with a number that the vector cannot hold is one with that number's lowest bits.
+* `integer - signed` is `signed - integer`.
+* `resize` of a signed number to fewer bits drops the sign, which numeric_std keeps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from operator import eq, ge, gt, le, lt, ne
+
+from fusesoc_firm.netlist.model import Instance, Modules
+
+_COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
+    "$eq": eq,
+    "$ne": ne,
+    "$ult": lt,
+    "$ule": le,
+    "$ugt": gt,
+    "$uge": ge,
+    "$slt": lt,
+    "$sle": le,
+    "$sgt": gt,
+    "$sge": ge,
+}
+_SHIFTS = {("$lsl", "$lsr"): "$rol", ("$lsr", "$lsl"): "$ror"}
+_SWAPPED = frozenset(
+    {
+        "NUMERIC_STD_SUB_INT_SGN",
+        "STD_LOGIC_ARITH_SUB_INT_SGN_SGN",
+        "STD_LOGIC_ARITH_SUB_INT_SGN_SLV",
+        "STD_LOGIC_SIGNED_SUB_INT_SLV",
+    }
+)
+_RESIZED = frozenset({"NUMERIC_STD_RESIZE_SGN_NAT", "NUMERIC_STD_RESIZE_SGN_SGN"})
+# The functions of IEEE's packages whose calls must be known.
+FUNCTIONS = _SWAPPED | _RESIZED
+
+
+def need_sources(modules: Modules) -> bool:
+    """Whether a netlist has gates that only the sources tell the meaning of."""
+    return any(gate.kind in {"$sub", "$strunc"} for gate in _gates(modules))
+
+
+def correct(modules: Modules, called: Mapping[str, str]) -> None:
+    """Correct a netlist in place; `called` are those of `FUNCTIONS` by the places of their calls."""
+    for module in modules.values():
+        drivers = {net.number: gate for gate in module.instances for net in gate.outputs}
+        for gate in module.instances:
+            function = called.get(gate.location, "")
+            if gate.kind == "$or":
+                _correct_rotation(gate, drivers)
+            elif gate.kind in _COMPARISONS:
+                _correct_comparison(gate, drivers)
+            elif gate.kind == "$sub" and function in _SWAPPED:
+                gate.inputs.reverse()
+            elif gate.kind == "$strunc" and function in _RESIZED:
+                gate.kind = "$sresize"
+
+
+def _gates(modules: Modules) -> Iterable[Instance]:
+    return (gate for module in modules.values() for gate in module.instances)
+
+
+def _driver(gate: Instance, index: int, drivers: Mapping[int, Instance]) -> Instance | None:
+    net = gate.inputs[index]
+    return drivers.get(net.number) if net else None
+
+
+def _correct_rotation(gate: Instance, drivers: Mapping[int, Instance]) -> None:
+    """`shift(value, places) | other_shift(value, width - places)`, all of one place in the VHDL."""
+    one, other = (_driver(gate, index, drivers) for index in (0, 1))
+    if one and other and one.location == other.location == gate.location:
+        kind = _SHIFTS.get((one.kind, other.kind))
+        rest = _driver(other, 1, drivers) if kind else None
+        if kind and rest and rest.kind == "$sub" and rest.location == gate.location:
+            gate.kind, gate.inputs = kind, list(one.inputs)
+
+
+def _correct_comparison(gate: Instance, drivers: Mapping[int, Instance]) -> None:
+    """A number that the other side cannot be decides at once."""
+    for index in (0, 1):
+        number, other = _driver(gate, index, drivers), gate.inputs[1 - index]
+        if number and other and other.width and (value := _number(number)) is not None:
+            is_signed = number.kind == "$const_SB32"
+            low, high = (
+                (-(1 << other.width - 1), (1 << other.width - 1) - 1) if is_signed else (0, (1 << other.width) - 1)
+            )
+            if not low <= value <= high:
+                # Any number that the other side can be is on the same side of this one.
+                compared = (value, 0) if index == 0 else (0, value)
+                gate.parameters = [str(int(_COMPARISONS[gate.kind](*compared)))]
+                gate.kind, gate.inputs = "$const_UB32", []
+                return
+
+
+def _number(gate: Instance) -> int | None:
+    """The number that GHDL made a constant of, which may have more bits than that."""
+    match gate.kind:
+        case "$const_UB32":
+            return gate.numbers[0]
+        case "$const_SB32":
+            return gate.numbers[0] - (gate.numbers[0] >> 31 << 32)
+        case _:
+            return None
