@@ -57,7 +57,10 @@ def differences(batch: Sequence[Design], judges: Sequence[str]) -> list[Differen
 def _named(message: str, batch: Sequence[Design]) -> list[Design]:
     """The designs of a batch in whose lines an error is."""
     ends = list(accumulate(item.text.count("\n") for item in batch))
-    lines = {int(line) for line in re.findall(rf"^\S*{simulators.TOP}\.vhd:(\d+):", message, re.MULTILINE)}
+    lines = {
+        int(line)
+        for line in re.findall(rf"^\S*{simulators.TOP}\.vhd:(\d+):(?!.*was not analysed)", message, re.MULTILINE)
+    }
     places = {bisect_left(ends, line) for line in lines}
     return [batch[place] for place in sorted(places) if place < len(batch)]
 

@@ -641,7 +641,7 @@ class _Maker(Expressions):
         self.signal(vector)
         self.signal(selector)
         self.statements.append(f"{selector.name} <= {self.vector(self.scope, selector.kind, width, 2)};")
-        value = lambda: self.vector(self.scope, vector.kind, vector.width, self.depth())  # noqa: E731
+        value: Callable[[], str] = lambda: self.vector(self.scope, vector.kind, vector.width, self.depth())  # noqa: E731
         choices = [f"{value()} when {choice}," for choice in self.choices(width)]
         self.statements.append(
             "\n    ".join([f"with {selector.name} select {vector.name} <=", *choices, f"{value()} when others;"])
@@ -890,8 +890,8 @@ class _Maker(Expressions):
         type_ = self.array_type(depth, kind, width)
         name, result = self.fresh("a"), Vector(self.fresh("s"), kind, width)
         fixed = Vector(self.fresh("s"), kind, width)
-        value = lambda: self.vector(self.scope, kind, width, 2)  # noqa: E731
-        place = lambda: self.below(self.scope, depth, 2)  # noqa: E731
+        value: Callable[[], str] = lambda: self.vector(self.scope, kind, width, 2)  # noqa: E731
+        place: Callable[[], str] = lambda: self.below(self.scope, depth, 2)  # noqa: E731
         self.signal(result)
         self.signal(fixed)
         reads = [f"{result.name} <= {name}({place()});", f"{fixed.name} <= {name}({self.random.randrange(depth)});"]
@@ -960,7 +960,7 @@ class _Maker(Expressions):
         self.process(["clk"], [], ["if rising_edge(clk) then", *(f"  {line}" for line in body), "end if;"])
         result = self.new_vector()
         self.signal(result)
-        value = lambda: self.vector(self.scope, result.kind, result.width, 1)  # noqa: E731
+        value: Callable[[], str] = lambda: self.vector(self.scope, result.kind, result.width, 1)  # noqa: E731
         self.statements.append(
             "\n    ".join(
                 [
@@ -988,7 +988,7 @@ class _Maker(Expressions):
         ]
         first = ", ".join(f"{item.name} => {self.literal(item.kind, item.width)}" for item in fields)
         self.types.append(f"signal {signal} : {name} := ({first});")
-        value = lambda item: self.vector(self.scope, item.kind, item.width, 2)  # noqa: E731
+        value: Callable[[Vector], str] = lambda item: self.vector(self.scope, item.kind, item.width, 2)  # noqa: E731
         aggregate = ", ".join(f"{item.name} => {value(item)}" for item in fields)
         body = [
             "if rising_edge(clk) then",

@@ -136,7 +136,7 @@ FAULTS = [
 WITHOUT_MEMORIES = _design(
     "mixed_indices",
     16,
-    f"m({_OTHER}) & m(1)",
+    f"std_logic_vector'(m({_OTHER}) & m(1))",
     f'{_WORDS} signal m : words := (X"01", X"12", X"23", X"34");',
     _clocked(f"if x(0) = '1' then m({_PLACE}) <= x(27 downto 20); end if;"),
 )
