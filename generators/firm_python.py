@@ -2,7 +2,7 @@
 
 FuseSoC starts generators with the `python3` that is first on PATH. That need be neither the one FuseSoC runs in nor the
 one this package was installed for, unless an environment is activated. So a generator first looks for the right one.
-Started itself, by the makefile of a build, this file prints which one that is, or nothing.
+Started itself, by the launcher of a build, this file prints which one that is, or nothing.
 
 This file runs in any Python 3.9 or later.
 """
@@ -144,19 +144,24 @@ sys.exit(not all(map(find_spec, {_NEEDED})))
 
 
 def _above_make() -> int:
-    """The process that started the make in whose makefile this one is, maybe by a shell."""
-    from pathlib import Path
-
+    """The process that started the make in whose makefile this one is, maybe below several shells."""
     process = os.getppid()
     for name in ("sh", "make"):
-        try:
-            # Behind the program's name, which may hold anything: its state, its parent.
-            program, _, rest = Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")
-        except OSError:
-            break
-        if program.endswith(name):
-            process = int(rest.split()[1])
+        while (parent := _parent(process, name)) is not None:
+            process = parent
     return process
+
+
+def _parent(process: int, name: str) -> int | None:
+    """The parent of a process if its program's name ends with `name`."""
+    from pathlib import Path
+
+    try:
+        # After the program's name, which may hold anything: its state, its parent.
+        program, _, rest = Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")
+    except OSError:
+        return None
+    return int(rest.split()[1]) if program.endswith(name) else None
 
 
 if __name__ == "__main__":

@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fusesoc_firm import __version__
+
 ROOT = Path(__file__).resolve().parents[2]
 ROBOT = Path(__file__).parent / "data" / "robot"
 # One worker does them all, so that each kind is installed once.
@@ -147,7 +149,7 @@ def test_the_library_is_installed_whole(installation: Installation) -> None:
 
 def test_another_project_sees_each_core_once(installation: Installation, project: Path) -> None:
     done = installation.fusesoc("core", "list", cwd=project)
-    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert f"robot:firm:generators:{__version__}" in done.stdout
     assert "left-behind" not in done.stdout
     assert "Replacing" not in done.stderr
     assert "Parse error" not in done.stderr
@@ -158,14 +160,14 @@ def test_another_project_sees_each_core_once(installation: Installation, project
 def test_a_whole_checkout_can_be_the_library(installation: Installation, tmp_path: Path) -> None:
     (tmp_path / "fusesoc.conf").write_text(f"[library.firm]\nlocation = {installation.source}\n")
     done = installation.fusesoc("core", "list", cwd=tmp_path)
-    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert f"robot:firm:generators:{__version__}" in done.stdout
     assert "left-behind" not in done.stdout
     assert "Replacing" not in done.stderr
 
 
 def test_the_checkout_itself_is_a_project(installation: Installation) -> None:
     done = installation.fusesoc("core", "list", cwd=installation.source)
-    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert f"robot:firm:generators:{__version__}" in done.stdout
     assert "left-behind" not in done.stdout
     assert "Replacing" not in done.stderr
 
@@ -188,10 +190,11 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
     for name in ("axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"):
         assert files[name]["file_type"] == "vhdlSource-93"
         assert files[name]["core"] == "me:proj:robot-pose:1.0"
-    # The run-time cores come along with the generators; the simulated host stays out of a target that is not `sim`.
-    cores = {file["core"] for file in files.values()}
-    assert "robot:manager:firm_manager:0.1.0" in cores
-    assert not any(core.startswith("robot:sim:") for core in cores)
+    # A converter brings what it instantiates: no Manager, no schedulers, no links, no launcher.
+    assert {file["core"] for file in files.values()} == {
+        "me:proj:robot-pose:1.0",
+        f"robot:axis:firm_axis:{__version__}",
+    }
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")

@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import pytest
 
-from fusesoc_firm import manifest
+from fusesoc_firm import __version__, manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 FUSESOC = Path(sys.executable).parent / "fusesoc"
@@ -70,7 +70,7 @@ def test_every_other_application_passes(tmp_path: Path, name: str, messages: int
 
 
 def work_folder(build_root: Path, core: str) -> Path:
-    return build_root / f"robot_sys_{core}_0.1.0" / "sim"
+    return build_root / f"robot_sys_{core}_{__version__}" / "sim"
 
 
 @pytest.fixture(scope="module")

@@ -76,7 +76,7 @@ def test_a_new_core_has_all_that_is_given(tmp_path: Path) -> None:
     )
     found = content(new_core(system(tmp_path), "arm.yaml", options))
     assert (found["name"], found["description"]) == ("me:robots:arm:1.0", "An arm")
-    assert found["filesets"]["base"]["depend"] == ["robot:firm:generators", "robot:acc:firm_cordic"]
+    assert found["filesets"]["base"]["depend"] == ["robot:firm:firm_system", "robot:acc:firm_cordic"]
     common = {"spec": "arm.yaml", "paths": ["msg"], "distro": "noetic"}
     assert found["generate"]["system"]["parameters"] == common
     assert found["generate"]["simulation"]["parameters"] == {
@@ -87,6 +87,19 @@ def test_a_new_core_has_all_that_is_given(tmp_path: Path) -> None:
         "environment": ["tb/a.vhd", "tb/b.vhd"],
     }
     assert found["targets"]["sim_icarus"]["flow_options"]["ghdlsynth_top"] == "robot_system_in_environment"
+
+
+def test_a_core_that_depends_on_the_generators_of_converters_alone_is_refused(tmp_path: Path) -> None:
+    core = tmp_path / "robot.core"
+    text = new_core(system(tmp_path), "robot.yaml", CoreOptions())
+    core.write_text(text.replace("robot:firm:firm_system", "robot:firm:generators"), encoding="utf-8")
+    with pytest.raises(InputError, match="does not depend on 'robot:firm:firm_system', which has the generator 'far'"):
+        updated_core(system(tmp_path), core)
+
+
+def test_only_targets_for_tools_have_the_launcher(tmp_path: Path) -> None:
+    targets = content(new_core(system(tmp_path), "robot.yaml", CoreOptions()))["targets"]
+    assert [name for name, target in targets.items() if "firm_launcher" not in target.get("flags", {})] == ["default"]
 
 
 def test_a_new_core_without_options_is_whole(tmp_path: Path) -> None:
