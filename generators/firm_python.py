@@ -33,6 +33,7 @@ def run(command: str) -> NoReturn:
     try:
         if chosen and not tried and chosen != sys.executable:
             _start_next(command, [], [chosen])
+        _warn_of_another_version(command)
         if _is_recalled(command):
             sys.exit(0)
         from importlib.util import find_spec
@@ -48,6 +49,29 @@ def run(command: str) -> NoReturn:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         sys.exit(130)
+
+
+def _warn_of_another_version(command: str) -> None:
+    """Warn if the library that this file is in and the package of this Python have different versions.
+
+    The hardware that is generated is made for the cores of the package's own library.
+    """
+    folder = os.path.dirname(os.path.abspath(__file__))
+    try:
+        from fusesoc_firm import __version__
+
+        with open(os.path.join(folder, "generators.core"), encoding="utf-8") as core:
+            name = next((line for line in core if line.startswith("name:")), "")
+    except (ImportError, OSError):
+        return
+    version = name.strip().rpartition(":")[2]
+    if version != __version__:
+        print(
+            f"{command}: warning: the library in {folder} is of version {version}, fusesoc-firm in {sys.prefix} of "
+            f"{__version__}\n      = 'firm path' prints the folder of the installed package's library",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def _is_recalled(command: str) -> bool:

@@ -85,7 +85,7 @@ def project(tmp_path: Path) -> Path:
 
 
 def copy_project(destination: Path) -> Path:
-    ignored = shutil.ignore_patterns("__pycache__", "library")
+    ignored = shutil.ignore_patterns("__pycache__", "demos", "library")
     for folder in ("fusesoc_firm", "cores", "generators", "specs"):
         shutil.copytree(ROOT / folder, destination / folder, ignore=ignored)
     shutil.copy(ROOT / "fusesoc.conf", destination)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from collections import Counter
 from pathlib import Path
@@ -12,6 +15,7 @@ import pytest
 import yaml
 
 from fusesoc_firm import __version__
+from fusesoc_firm.library_path import library_root
 
 ROOT = Path(__file__).resolve().parents[2]
 GENERATORS = "robot:firm:generators"
@@ -59,3 +63,46 @@ def test_the_package_has_one_version() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert (project["version"], project["license"]) == (__version__, LICENSE)
     assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+CONVERTER = """\
+CAPI=2:
+name: me:p:one:1.0
+filesets: {base: {depend: ["robot:firm:generators"]}}
+generate: {pose: {generator: firm, parameters: {message: geometry_msgs/Point, ros: 2}}}
+targets:
+  default:
+    filesets: [base]
+    generate: [pose]
+    toplevel: axis_to_geometry_msgs_point
+    flow: generic
+    flow_options: {tool: ghdl}
+"""
+
+
+def test_what_a_project_generates_is_no_core_of_its_own_folder(tmp_path: Path) -> None:
+    """FuseSoC takes every .core below a library, and a build is below a project's own folder."""
+    (tmp_path / "one.core").write_text(CONVERTER)
+    (tmp_path / "fusesoc.conf").write_text(
+        f"[library.firm]\nlocation = {library_root()}\n[library.own]\nlocation = .\n"
+    )
+
+    def fusesoc(*arguments: str) -> str:
+        done = subprocess.run(
+            [sys.executable, "-m", "fusesoc.main", *arguments],
+            cwd=tmp_path,
+            env=os.environ | {"FUSESOC_FIRM_CACHE": str(tmp_path / "store")},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=True,
+        )
+        return done.stdout
+
+    for origin in ("generated", "from store"):
+        assert f"firm: one-pose {origin}" in fusesoc("run", "--setup", "me:p:one")
+        (ignored,) = tmp_path.rglob("FUSESOC_IGNORE")
+        listed = fusesoc("core", "list")
+        assert "me:p:one:1.0 " in listed
+        assert "one-pose" not in listed
+        ignored.unlink()
