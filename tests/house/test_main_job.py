@@ -60,7 +60,14 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("name", "messages"), [("image_pipeline", 7), ("image_pipeline_software", 14), ("sobel", 7), ("multi_type", 19)]
+    ("name", "messages"),
+    [
+        ("image_pipeline", 7),
+        ("image_pipeline_software", 14),
+        ("sobel", 7),
+        ("multi_type", 19),
+        ("robotic_arm_franka", 3),
+    ],
 )
 def test_every_other_application_passes(tmp_path: Path, name: str, messages: int) -> None:
     done = run(name, tmp_path / "build")

@@ -12,7 +12,6 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.system.board import boards
 from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
-from tests.house.test_franka_job import write_definition
 from tests.unit.system.systems import accelerator, converter, derived, instance, specification
 
 SPECS = Path(__file__).resolve().parents[3] / "specs"
@@ -49,10 +48,7 @@ def test_there_are_cores() -> None:
 
 
 @pytest.mark.parametrize("core", CORES, ids=lambda path: path.stem)
-def test_a_checked_in_core_is_what_the_command_writes(
-    core: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(write_definition(tmp_path)))
+def test_a_checked_in_core_is_what_the_command_writes(core: Path, tmp_path: Path) -> None:
     text = core.read_text(encoding="utf-8")
     made = tmp_path / core.name
     # Of the targets, nothing is taken over.
