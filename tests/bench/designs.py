@@ -18,7 +18,7 @@ from fusesoc_firm.message.parser import parse_name
 from tests.sim.ghdl import REPOSITORY, Library, core_files
 
 SUBSCRIBER, PUBLISHER = "subscriber", "publisher"
-CORES = ("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager")
+CORES = ("axis/package", "axis/axis", "sched/package", "sched/fixed_priority", "manager/manager")
 # Definitions of ROS 1 that no distribution holds.
 _FURTHER = REPOSITORY / "specs" / "robotic_arm" / "franka_msgs"
 

@@ -225,6 +225,7 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
     assert {file["core"] for file in files.values()} == {
         "me:proj:robot-pose:1.0",
         f"robot:axis:firm_axis:{__version__}",
+        f"robot:axis:firm_axis_package:{__version__}",
     }
 
 
