@@ -212,5 +212,5 @@ def _words(work: Path, tool: str) -> list[str]:
     if tool == VERILATOR:
         return [str(work / f"V{_flow(work)['toplevel']}")]
     # The line of Edalize's makefile has the options of the analysis.
-    steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).splitlines()
+    steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).split("\n")
     return shlex.split([line for line in steps if line.startswith("ghdl -r ")][-1])
