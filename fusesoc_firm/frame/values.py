@@ -38,7 +38,7 @@ class SignallingNan(float):
         made.bits = bits
         return made
 
-    def __getnewargs__(self) -> tuple[int]:  # type: ignore[override]
+    def __getnewargs__(self) -> tuple[int]:
         """How a copy is made."""
         return (self.bits,)
 

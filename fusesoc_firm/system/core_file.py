@@ -54,9 +54,8 @@ class CoreOptions:
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
     """The text of a `.core` that is not there yet, for the specification `spec` beside it. Raises `InputError`."""
-    for option in ("name", "description"):
-        if fault := text_fault(getattr(options, option)):
-            fail(f"--{option} {fault[0]}", hint=fault[1])
+    if fault := text_fault(options.description):
+        fail(f"--description {fault[0]}", hint=fault[1])
     further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
     head = render(
         HEAD_TEMPLATE,

@@ -26,6 +26,7 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.gapi import GENERATORS
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request, as_files
+from fusesoc_firm.host.simulator import _build_folder
 from fusesoc_firm.system.board import read_board
 
 CANARY = "hostile_canary"
@@ -500,3 +501,10 @@ def test_a_file_name_that_no_file_system_takes() -> None:
         core = GeneratedCore("", {name: GeneratedFile("", "user")})
         with contextlib.nullcontext() if is_legal else pytest.raises(InputError, match="file systems take 255"):
             as_files(core, request)
+
+
+def test_a_simulator_is_built_in_a_folder_that_tools_take(tmp_path: Path) -> None:
+    """The folder is called after the specification's file, which may be called anything."""
+    folder = _build_folder(tmp_path / f"-{HOSTILE[0]} für {'x' * 200}.yaml", "ghdl", tmp_path)
+    assert re.fullmatch(r"_exec_touch_hostile_canary__f_r_x+-[0-9a-f]{12}-ghdl", folder.name) and len(folder.name) < 100
+    assert folder.is_dir()
