@@ -84,8 +84,10 @@ def _ours(calls: Iterable[GeneratorCall]) -> list[GeneratorCall]:
 
 
 def _request(call: GeneratorCall) -> Request:
-    known = GENERATORS[call.generator].parameters
-    return make_request(call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), known, lambda _: ())
+    generator = GENERATORS[call.generator]
+    return make_request(
+        call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), generator, lambda _: ()
+    )
 
 
 def main() -> None:

@@ -18,10 +18,12 @@ from typing import Any
 
 import yaml
 
+from fusesoc_firm.design_units import clash, note_units, units_of
 from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.files import write_if_changed
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
-from fusesoc_firm.message_runs import mark_run
+from fusesoc_firm.message_runs import mark_run, run_of
+from fusesoc_firm.naming import PREFIX_RULE, is_prefix
 from fusesoc_firm.own_code import PACKAGE, digests, used_code
 from fusesoc_firm.parameters import Parameter, check_parameters
 from fusesoc_firm.reads import Reads, noted
@@ -155,13 +157,19 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("ros", "int", "the ROS version whose wire format is spoken", is_required=True, choices=(1, 2)),
             Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
             Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter(
+                "name",
+                "str",
+                "what the names of all generated units begin with, such as left; a second core of a message needs one",
+                rule=(PREFIX_RULE, is_prefix),
+            ),
             Parameter("include", "list", "fields that get ports, such as pose.position; all unless given"),
             Parameter("exclude", "list", "fields that get none of these; a publisher sends their defaults"),
             Parameter(
                 "config",
                 "str",
                 "a file that lists messages and the names of their interfaces, relative to the core",
-                replaces=("message", "ros", "direction", "width", "include", "exclude"),
+                replaces=("message", "ros", "direction", "width", "name", "include", "exclude"),
             ),
             _PATHS,
             _MESSAGES,
@@ -215,12 +223,12 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
         if len(argv) != 1:
             fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
         path = Path(argv[0])
-        request = read_request(command, path, generators[command].parameters)
+        request = read_request(command, path, generators[command])
         absent = missing(generators[command].programs(request))
         is_locked = _check_locked(request)
         # What is locked is compared on every run, and what is missing is said.
         entry = obtain(request, generators[command], None if absent or is_locked else path)
-        _write(entry.files)
+        _write_core(entry.files, request, run_of(os.getppid()))
         if marks := _marks(request):
             mark_run("", marks)
     except InputError as error:
@@ -271,7 +279,7 @@ def _marks(request: Request) -> str:
     return find_requesting_core(request.files_root, request.name).name if request.command == MESSAGES else ""
 
 
-def read_request(command: str, path: Path, parameters: tuple[Parameter, ...], *, is_this_run: bool = True) -> Request:
+def read_request(command: str, path: Path, generator: Generator, *, is_this_run: bool = True) -> Request:
     """The request in FuseSoC's file, with checked parameters; if it `is_this_run`, of the FuseSoC that started us.
 
     Raises `InputError`.
@@ -288,13 +296,13 @@ def read_request(command: str, path: Path, parameters: tuple[Parameter, ...], *,
 
         return folders_of_run(names, path.absolute().parent.parent, is_this_run=is_this_run)
 
-    return make_request(command, Call(vlnv, files_root, given), parameters, beside)
+    return make_request(command, Call(vlnv, files_root, given), generator, beside)
 
 
 def make_request(
     command: str,
     call: Call,
-    parameters: tuple[Parameter, ...],
+    generator: Generator,
     message_folders: Callable[[MessageCores], tuple[Path, ...]],
 ) -> Request:
     """The request of a call, with checked parameters; `message_folders` finds those of the cores that it names.
@@ -302,7 +310,7 @@ def make_request(
     Raises `InputError`.
     """
     origin = find_requesting_core(call.files_root, call.vlnv.split(":")[2])
-    checked = check_parameters(call.given, parameters, origin)
+    checked = check_parameters(call.given, generator.parameters, origin)
     places = {name: origin.items(name) for name, value in checked.items() if isinstance(value, list)}
     request = Request(command, call.vlnv, call.files_root, checked, places)
     return (
@@ -347,10 +355,12 @@ def answer_from_store(command: str, path: Path) -> bool:
     generator = GENERATORS[command]
     start = time.monotonic()
     try:
-        request = read_request(command, path, generator.parameters)
+        request = read_request(command, path, generator)
         if missing(generator.programs(request)) or _check_locked(request) or _marks(request):
             return False
-        _write(default_store().obtain(lambda: _key(request, generator, Reads()), refuse).files)
+        files = default_store().obtain(lambda: _key(request, generator, Reads()), refuse).files
+        # This process is FuseSoC itself.
+        _write_core(files, request, run_of(os.getpid()))
     except (InputError, _NotStoredError):
         return False
     print(f"{command}: {request.name} from store in {time.monotonic() - start:.2f} s", flush=True)
@@ -407,7 +417,20 @@ def _stored_call(request: Request, generator: Generator, path: Path, reads: Read
         ]
 
     digest = call_digest(request.command, path.read_bytes())
-    return StoredCall(digest, facts_of_key, {"name": request.name, "marks": _marks(request)})
+    return StoredCall(digest, facts_of_key, {"name": request.name, "core": request.vlnv, "marks": _marks(request)})
+
+
+def _write_core(files: Files, request: Request, run: str) -> None:
+    """Write a core into the current folder, unless another one of the run defines one of its units otherwise."""
+    units = units_of(files)
+    if found := clash("", units, run):
+        fail(
+            f"{request.vlnv} and {found.core} define the design unit '{found.unit}' in two ways, and a tool keeps one",
+            find_requesting_core(request.files_root, request.name).instance(),
+            "the parameter 'name' of generator 'firm' gives the units of a core names of their own: name: left",
+        )
+    _write(files)
+    note_units("", request.vlnv, units, run)
 
 
 def _write(files: Files) -> None:

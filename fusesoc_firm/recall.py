@@ -25,8 +25,9 @@ import sys
 import time
 from collections.abc import Sequence
 
+from fusesoc_firm.design_units import clash, note_units, units_of
 from fusesoc_firm.files import read_file, write_if_changed
-from fusesoc_firm.message_runs import mark_run, marked_folders
+from fusesoc_firm.message_runs import mark_run, marked_folders, run_of
 from fusesoc_firm.own_code import PACKAGE, all_names
 from fusesoc_firm.store_files import (
     CALL,
@@ -69,11 +70,15 @@ def answer(command: str, arguments: Sequence[str]) -> bool:
     if (found := read_entry(stored)) is None:
         return False
     mark_used(stored, noted)
+    units, run = units_of(found[1]), run_of(os.getppid())
+    if clash("", units, run):
+        return False
     try:
         for name, content in found[1].items():
             write_if_changed(name, content)
         if note["marks"]:
             mark_run("", note["marks"])
+        note_units("", note["core"], units, run)
     except OSError:
         return False
     print(f"{command}: {note['name']} from store in {time.monotonic() - start:.2f} s", flush=True)

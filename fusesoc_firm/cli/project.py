@@ -167,7 +167,7 @@ def _request(instance: Instance) -> Request | None:
 
     if instance.generator not in GENERATORS:
         return None
-    known = GENERATORS[instance.generator].parameters
+    known = GENERATORS[instance.generator]
     call = Call(instance.vlnv, instance.files_root, instance.parameters)
     return make_request(instance.generator, call, known, _message_folders)
 

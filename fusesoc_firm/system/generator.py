@@ -166,11 +166,11 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for path, configuration in constants_configurations(loaded.messages()):
         yield Artifact(path, Part.CONVERTERS, CONSTANTS_TEMPLATE, configuration)
     for item in system.subscribers:
-        source = subscriber_source(item.frame, system.width, item.suffix)
-        yield Artifact(f"{subscriber_entity(item.frame, item.suffix)}.vhd", Part.CONVERTERS, *source)
+        entity = subscriber_entity(item.frame, item.suffix)
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity))
     for item in system.publishers:
-        source = publisher_source(item.frame, system.width, item.suffix)
-        yield Artifact(f"{publisher_entity(item.frame, item.suffix)}.vhd", Part.CONVERTERS, *source)
+        entity = publisher_entity(item.frame, item.suffix)
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *publisher_source(item.frame, system.width, entity))
     for frame, suffix in system.computed_lengths.items():
         configuration = payload_length_configuration(frame, suffix)
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
