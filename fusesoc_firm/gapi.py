@@ -26,7 +26,7 @@ from fusesoc_firm.message_runs import mark_run, run_of
 from fusesoc_firm.naming import PREFIX_RULE, is_prefix
 from fusesoc_firm.own_code import PACKAGE, digests, used_code
 from fusesoc_firm.parameters import Parameter, check_parameters
-from fusesoc_firm.reads import Reads, noted
+from fusesoc_firm.reads import Input, Reads, noted
 from fusesoc_firm.recall import LOCKED, SEARCHED, Fact, call_digest, facts
 from fusesoc_firm.requesting_core import find_requesting_core
 from fusesoc_firm.store import Call as StoredCall
@@ -65,13 +65,13 @@ class Generator:
     """
 
     parameters: tuple[Parameter, ...]
-    inputs: Callable[[Request], list[Path]]
+    inputs: Callable[[Request], Sequence[Input]]
     generate: Callable[[Request], GeneratedCore]
     programs: Callable[[Request], Sequence[str]] = lambda _: ()
     tools: Callable[[Request], Mapping[str, str]] = lambda _: {}
 
 
-def _converter_inputs(request: Request) -> list[Path]:
+def _converter_inputs(request: Request) -> list[Input]:
     from fusesoc_firm.converter import generator
 
     return generator.inputs(request)
@@ -83,7 +83,7 @@ def _generate_converters(request: Request) -> GeneratedCore:
     return generator.generate(request)
 
 
-def _message_inputs(request: Request) -> list[Path]:
+def _message_inputs(request: Request) -> Sequence[Input]:
     from fusesoc_firm import message_core
 
     return message_core.inputs(request)
@@ -95,7 +95,7 @@ def _copy_messages(request: Request) -> GeneratedCore:
     return message_core.generate(request)
 
 
-def _system_inputs(request: Request) -> list[Path]:
+def _system_inputs(request: Request) -> list[Input]:
     from fusesoc_firm.host import node_package, simulation
     from fusesoc_firm.system import generator
 
@@ -135,7 +135,7 @@ def _is_simulation(request: Request) -> bool:
     return request.parameters["product"] != "system"
 
 
-_PATHS = Parameter("paths", "list", "folders with message definitions, relative to the core")
+_PATHS = Parameter("paths", "list", "folders and bags with message definitions, relative to the core")
 
 _MESSAGES = Parameter(
     "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
@@ -383,9 +383,9 @@ def _key(request: Request, generator: Generator, reads: Reads) -> Key:
         "parameters": {name: value for name, value in request.parameters.items() if name != "locked"},
         "tools": dict(generator.tools(request)),
     }
-    paths = generator.inputs(request)
-    reads.files |= dict.fromkeys(str(path.absolute()) for path in paths)
-    inputs = {_name(path, request): _content(path) for path in paths}
+    given = generator.inputs(request)
+    reads.files |= dict.fromkeys(str(item.absolute()) for item in given if isinstance(item, Path))
+    inputs = dict(_named_content(item, request) for item in given)
     return Key(request_digest(asked, inputs, code), code, {"core": request.vlnv, "generator": request.command})
 
 
@@ -393,8 +393,10 @@ def _check_declared(of_build: Reads, of_key: Reads) -> None:
     """Raise `InputError` if something was read that the key does not cover: an edit of it would never be noticed."""
     faults = Diagnostics()
     known = {os.path.realpath(file) for file in of_key.files}
-    for file in of_build.files:
-        if os.path.realpath(file) not in known and Path(file).is_file():
+    parts = {os.path.realpath(file) for file in of_key.parts}
+    found = [(file, known) for file in of_build.files] + [(file, known | parts) for file in of_build.parts]
+    for file, covered in found:
+        if os.path.realpath(file) not in covered and Path(file).is_file():
             faults.error(f"{file} was read, which is no input", hint="list it under the generator's parameter 'files'")
     faults.raise_if_any()
 
@@ -410,6 +412,7 @@ def _stored_call(request: Request, generator: Generator, path: Path, reads: Read
         generated = str(path.absolute().parent.parent)
         return [
             *facts("file", [*reads.files, *(str(PACKAGE / name) for name in used)]),
+            *facts("part", [*reads.parts]),
             *facts("folder", [*reads.folders, *environment]),
             *facts("code", [""]),
             *facts("program", sorted({*generator.tools(request), *generator.programs(request)})),
@@ -450,6 +453,13 @@ def _name(path: Path, request: Request) -> str:
             name = str(path.relative_to(root))
             return name if number is None else f"messages/{number}/{name}"
     return str(path)
+
+
+def _named_content(item: Input, request: Request) -> tuple[str, bytes | None]:
+    """An input's name in the key, and what counts of it."""
+    if isinstance(item, Path):
+        return _name(item, request), _content(item)
+    return f"{_name(item.path, request)}:{item.name}", item.content
 
 
 def _content(path: Path) -> bytes | None:

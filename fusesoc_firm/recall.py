@@ -5,6 +5,7 @@ takes longer than all else where nothing has changed. So a call that was answere
 and the facts that it follows from, each with its state at that time. These are
 
     file        each one that was read to make the key, that the key covers, and of our own: its SHA-256
+    part        each file of which a part was read: its size and time
     folder      each one that was searched, and those that the environment names: which names are in it
     code        the names of all our own files
     program     one that makes part of the result, or runs it: the file that the PATH leads to, its size and time
@@ -97,6 +98,8 @@ def state(kind: str, name: str) -> str | None:
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)
+    if kind == "part":
+        return _part(name)
     if kind == "folder":
         return _folder(name)
     if kind == "code":
@@ -121,6 +124,14 @@ def _folder(path: str) -> str | None:
             return digest_of(sorted([entry.name, entry.is_dir()] for entry in entries))
     except OSError:
         return None
+
+
+def _part(path: str) -> str | None:
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return f"{status.st_size} {status.st_mtime_ns}"
 
 
 def _program(name: str) -> str | None:

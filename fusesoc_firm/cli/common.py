@@ -67,8 +67,8 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        metavar="DIR",
-        help="a folder with message definitions; may be given more than once",
+        metavar="PLACE",
+        help="a folder or bag with message definitions; may be given more than once",
     )
     parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
 

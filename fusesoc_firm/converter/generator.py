@@ -22,6 +22,7 @@ from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.reads import Input
 from fusesoc_firm.render import render
 
 VHDL = "vhdlSource-93"
@@ -36,7 +37,7 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
     return folders, os.environ, None if distro is None else str(distro)
 
 
-def inputs(request: Request) -> list[Path]:
+def inputs(request: Request) -> list[Input]:
     """The files that say what is wanted and that hold the definitions; none for those of a type store."""
     return list(order_of_request(request).files)
 

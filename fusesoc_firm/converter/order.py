@@ -20,6 +20,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.reads import Input
 
 # The directions and the entity of a frame's converter in each.
 ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
@@ -57,7 +58,7 @@ class Order:
     title: str
     width: int
     messages: tuple[Wanted, ...]
-    files: tuple[Path, ...]
+    files: tuple[Input, ...]
     prefix: str = ""
 
     def entity(self, frame: Frame, direction: str) -> str:

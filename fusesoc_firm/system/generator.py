@@ -20,6 +20,7 @@ from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.reads import Input
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
 from fusesoc_firm.system.block_design import (
@@ -68,9 +69,9 @@ class LoadedSystem:
     system: DerivedSystem
     board: Board | None = None
 
-    def inputs(self) -> list[Path]:
+    def inputs(self) -> list[Input]:
         """The accelerators' sources and the files of all messages."""
-        return source_files(self.specification, self.folder) + self._message_files()
+        return [*source_files(self.specification, self.folder), *self._message_files()]
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
         """Every message of a converter once, whichever of its fields are used, with all definitions within it."""
@@ -84,7 +85,7 @@ class LoadedSystem:
         frames = dict.fromkeys((*self.system.frames, *sides))
         return [(self.libraries[frame.ros], self.libraries[frame.ros].closure(frame.message)) for frame in frames]
 
-    def _message_files(self) -> list[Path]:
+    def _message_files(self) -> list[Input]:
         found = [path for library, definitions in self.definitions() for path in library.files(definitions)]
         return list(dict.fromkeys(found))
 
@@ -118,7 +119,7 @@ def specification_path(request: Request) -> Path:
     return request.files_root / str(request.parameters["spec"])
 
 
-def inputs(request: Request) -> list[Path]:
+def inputs(request: Request) -> list[Input]:
     """The specification and every file that it leads to. Raises `InputError`."""
     board = [_board_path(request)] if request.parameters.get("board") else []
     return [specification_path(request), *board, *load_requested(request).inputs()]
