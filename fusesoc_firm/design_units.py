@@ -17,6 +17,8 @@ from typing import NamedTuple
 
 from fusesoc_firm.files import read_file, write_whole
 
+# The folder in which FuseSoC has a folder for each call; what lies side by side elsewhere is no design.
+_GENERATED = "generator_cache"
 _FILE = "firm_units.run"
 _VHDL = re.compile(rb"^[ \t]*(?:entity|package)[ \t]+(\w+)[ \t\r\n]+is\b", re.MULTILINE | re.IGNORECASE)
 _VERILOG = re.compile(rb"^[ \t]*module[ \t]+(\w+)", re.MULTILINE)
@@ -59,6 +61,8 @@ def note_units(folder: str, core: str, units: Mapping[str, str], run: str) -> No
 def _others(folder: str, run: str) -> Iterator[tuple[str, dict[str, str]]]:
     """Core and units of every call of the run but that of `folder`, in the order of their folders' names."""
     generated = os.path.dirname(folder)
+    if os.path.basename(generated) != _GENERATED:
+        return
     try:
         names = sorted(os.listdir(generated))
     except OSError:

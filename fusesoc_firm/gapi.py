@@ -61,7 +61,7 @@ class Generator:
 
     `inputs` is cheap, since it is asked on every run; a path in it need not exist. `generate` raises `InputError` for
     what its user did wrong. `programs` are those without which what was made cannot be run. `tools` are the versions
-    of programs that make part of it.
+    of programs that make part of it. `cores` carry messages and are named by the files of a request.
     """
 
     parameters: tuple[Parameter, ...]
@@ -69,6 +69,7 @@ class Generator:
     generate: Callable[[Request], GeneratedCore]
     programs: Callable[[Request], Sequence[str]] = lambda _: ()
     tools: Callable[[Request], Mapping[str, str]] = lambda _: {}
+    cores: Callable[[Request], MessageCores] = lambda _: {}
 
 
 def _converter_inputs(request: Request) -> list[Input]:
@@ -129,6 +130,12 @@ def _compiler(request: Request) -> Mapping[str, str]:
     from fusesoc_firm.host.kernel import toolchain
 
     return toolchain()
+
+
+def _cores_of_specification(request: Request) -> MessageCores:
+    from fusesoc_firm.system.generator import message_cores
+
+    return message_cores(request)
 
 
 def _is_simulation(request: Request) -> bool:
@@ -204,6 +211,7 @@ GENERATORS: Mapping[str, Generator] = {
         _generate_system,
         _simulator_programs,
         _compiler,
+        _cores_of_specification,
     ),
     MESSAGES: Generator(
         (
@@ -313,9 +321,15 @@ def make_request(
     checked = check_parameters(call.given, generator.parameters, origin)
     places = {name: origin.items(name) for name, value in checked.items() if isinstance(value, list)}
     request = Request(command, call.vlnv, call.files_root, checked, places)
-    return (
-        replace(request, message_folders=message_folders(names)) if (names := request.listed("messages")) else request
-    )
+    folders: dict[str, tuple[Path, ...]] = {}
+    faults = Diagnostics()
+    for name, source in {**request.listed("messages"), **generator.cores(request)}.items():
+        try:
+            folders[name] = message_folders({name: source})
+        except InputError as error:
+            faults.take(error, source)
+    faults.raise_if_any()
+    return replace(request, message_folders=folders)
 
 
 def obtain(request: Request, generator: Generator, path: Path | None = None) -> Entry:
@@ -416,7 +430,7 @@ def _stored_call(request: Request, generator: Generator, path: Path, reads: Read
             *facts("folder", [*reads.folders, *environment]),
             *facts("code", [""]),
             *facts("program", sorted({*generator.tools(request), *generator.programs(request)})),
-            *facts("messages", [json.dumps([generated, core_name(name)]) for name in request.listed("messages")]),
+            *facts("messages", [json.dumps([generated, core_name(name)]) for name in request.message_folders]),
         ]
 
     digest = call_digest(request.command, path.read_bytes())
@@ -447,9 +461,10 @@ def _write(files: Files) -> None:
 
 def _name(path: Path, request: Request) -> str:
     """An input's name in the key: the same for copies of a project in different folders."""
-    for root in (request.files_root, *request.message_folders):
+    folders = request.folders_of(request.message_folders)
+    for root in (request.files_root, *folders):
         if path.is_relative_to(root):
-            number = request.message_folders.index(root) if root != request.files_root else None
+            number = folders.index(root) if root != request.files_root else None
             name = str(path.relative_to(root))
             return name if number is None else f"messages/{number}/{name}"
     return str(path)

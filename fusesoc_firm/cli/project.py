@@ -170,10 +170,10 @@ def _request(instance: Instance) -> Request | None:
         return None
     known = GENERATORS[instance.generator]
     call = Call(instance.vlnv, instance.files_root, instance.parameters)
-    return make_request(instance.generator, call, known, _message_folders)
+    return make_request(instance.generator, call, known, message_folders)
 
 
-def _message_folders(names: MessageCores) -> tuple[Path, ...]:
+def message_folders(names: MessageCores) -> tuple[Path, ...]:
     """The folders of cores that carry messages, where these lie: there is no run that copies them."""
     from fusesoc_firm.gapi import MESSAGES
     from fusesoc_firm.message_core import folders

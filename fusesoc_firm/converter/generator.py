@@ -33,7 +33,7 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
-    folders = [*(request.files_root / path for path in paths), *request.message_folders]
+    folders = [*(request.files_root / path for path in paths), *request.folders_of(request.listed("messages"))]
     return folders, os.environ, None if distro is None else str(distro)
 
 

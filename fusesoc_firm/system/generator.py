@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
@@ -14,7 +14,7 @@ from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.generator import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -44,8 +44,11 @@ from fusesoc_firm.system.board import (
 from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, function_name, wrapper_configuration
-from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
+from fusesoc_firm.system.specification import Accelerator, Specification, is_core, read_specification
 from fusesoc_firm.system.timing_constraints import clocks_configuration
+
+CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
+"""Finds the folders of the messages of cores, given by name and place. Raises `InputError` for an unknown one."""
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {
@@ -57,6 +60,13 @@ _FILE_TYPES = {
     ".svh": "systemVerilogSource",
 }
 _INCLUDE_SUFFIXES = (".vh", ".svh")
+
+
+def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
+    """Where no core can be looked up."""
+    for name, source in names.items():
+        fail(f"core '{name}' cannot be looked up here", source, "name the folder of its messages")
+    return ()
 
 
 @dataclass(frozen=True)
@@ -96,22 +106,72 @@ def load_system(
     *,
     needs_sources: bool = True,
     board: Board | None = None,
+    core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
     """Read and derive the system of a specification, on a board if one is given. Raises `InputError` with all faults.
 
-    Unless it `needs_sources`, those of accelerators may be missing.
+    Unless it `needs_sources`, those of accelerators may be missing. What the specification names under `paths` goes
+    before what the `libraries` know.
     """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
     if board:
         specification = on_board(specification, board)
+    own = {str(item): item.source for item in specification.paths}
+    libraries = with_paths(libraries, own, path.parent, core_folders, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system, board)
 
 
+def with_paths(
+    known: dict[RosVersion, MessageLibrary],
+    paths: Mapping[str, SourceRef | None],
+    folder: Path,
+    core_folders: CoreFolders,
+    faults: Diagnostics,
+) -> dict[RosVersion, MessageLibrary]:
+    """The libraries with the `paths` of a specification in `folder` before all else.
+
+    Raises `InputError` with all `faults` if one of these paths is wrong, since unknown messages would follow from it.
+    """
+    before = len(faults.found)
+    places: dict[Path, SourceRef | None] = {}
+    for item, source in paths.items():
+        try:
+            places |= dict.fromkeys(core_folders({item: source}) if is_core(item) else [folder / item], source)
+        except InputError as error:
+            faults.take(error, source)
+    own = dict(known)
+    for ros, library in known.items():
+        try:
+            own[ros] = library.before(places)
+        except InputError as error:
+            faults.take(error, None)
+    if len(faults.found) > before:
+        faults.raise_if_any()
+    return own
+
+
+def message_cores(request: Request) -> dict[str, SourceRef | None]:
+    """The cores that the specification of a generator call names; none where it cannot be read."""
+    path = specification_path(request)
+    try:
+        # Most name none, and are spared a second reading.
+        if "paths" not in path.read_text(encoding="utf-8"):
+            return {}
+        return read_specification(path, str(path), Diagnostics()).message_cores
+    except (OSError, UnicodeDecodeError, InputError):
+        return {}
+
+
 def load_requested(request: Request) -> LoadedSystem:
     """The system of a generator call."""
-    return load_system(specification_path(request), libraries(*library_sources(request)), board=_board(request))
+    return load_system(
+        specification_path(request),
+        libraries(*library_sources(request)),
+        board=_board(request),
+        core_folders=request.folders_of,
+    )
 
 
 def specification_path(request: Request) -> Path:

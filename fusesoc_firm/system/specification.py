@@ -6,11 +6,12 @@ stand at the field. What the sections say together (names that must be known, co
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.message.model import MIDDLEWARES
 from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
@@ -47,6 +48,8 @@ AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
+# `vendor:library:name`, maybe with a version.
+_CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
 
 _INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
 _EXCLUDE = {"form": "texts", "meaning": "none of these fields"}
@@ -186,10 +189,24 @@ class Specification(Section):
     """The whole file."""
 
     project: Project = key("what holds for the whole system", form="section", section=Project, is_required=True)
+    paths: tuple[Text, ...] = key(
+        "folders, bags and cores with message definitions, relative to the file, searched before all others",
+        form="texts",
+    )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
     # The file stops being YAML somewhere, so there may be more of everything.
     is_cut: bool = False
+
+    @property
+    def message_cores(self) -> dict[str, SourceRef | None]:
+        """The cores among `paths`, each with its place."""
+        return {str(item): item.source for item in self.paths if is_core(item)}
+
+
+def is_core(path: str) -> bool:
+    """Whether an item of `paths` is the name of a core."""
+    return _CORE.fullmatch(path) is not None
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:

@@ -17,8 +17,7 @@ import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import nearest
-from fusesoc_firm.message import library
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.specification import Specification
 from fusesoc_firm.yaml_sections import Section, keys_of
@@ -112,7 +111,7 @@ def checker(
     state = tmp_path / "franka_msgs/msg/FrankaState.msg"
     state.parent.mkdir(parents=True)
     state.write_text(_FRANKA_STATE, encoding="utf-8")
-    make = library.libraries
+    make = libraries
     known: dict[RosVersion, MessageLibrary] = {}
 
     def shared(paths: Sequence[Path], _: Mapping[str, str] | None, store: str | None) -> object:
@@ -121,7 +120,7 @@ def checker(
             known.update(make(paths, None, store))
         return known
 
-    monkeypatch.setattr(library, "libraries", shared)
+    monkeypatch.setattr("fusesoc_firm.system.beside.libraries", shared)
     own = [folder / "msg"] if (folder / "msg").is_dir() else []
     return Checker(folder / spec.name, [*own, state.parent.parent], capsys)
 
