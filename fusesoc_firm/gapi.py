@@ -20,7 +20,7 @@ import yaml
 
 from fusesoc_firm.design_units import clash, note_units, units_of
 from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
-from fusesoc_firm.files import write_if_changed
+from fusesoc_firm.files import hide_generated, write_if_changed
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
 from fusesoc_firm.message_runs import mark_run, run_of
 from fusesoc_firm.naming import PREFIX_RULE, is_prefix
@@ -452,6 +452,7 @@ def _write_core(files: Files, request: Request, run: str) -> None:
 
 def _write(files: Files) -> None:
     """Write a core into the current folder, the `.core` last."""
+    hide_generated()
     for name, content in files.items():
         try:
             write_if_changed(Path(name), content)

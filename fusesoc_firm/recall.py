@@ -27,7 +27,7 @@ import time
 from collections.abc import Sequence
 
 from fusesoc_firm.design_units import clash, note_units, units_of
-from fusesoc_firm.files import read_file, write_if_changed
+from fusesoc_firm.files import hide_generated, read_file, write_if_changed
 from fusesoc_firm.message_runs import mark_run, marked_folders, run_of
 from fusesoc_firm.own_code import PACKAGE, all_names
 from fusesoc_firm.store_files import (
@@ -75,6 +75,7 @@ def answer(command: str, arguments: Sequence[str]) -> bool:
     if clash("", units, run):
         return False
     try:
+        hide_generated()
         for name, content in found[1].items():
             write_if_changed(name, content)
         if note["marks"]:

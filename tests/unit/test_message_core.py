@@ -173,7 +173,7 @@ blocks:
   - {name: a, middleware: ROS2, mode: subscriber, message: arm_msgs/Pose, outgoing: [{name: b}]}
   - {name: b, middleware: ROS2, mode: publisher, message: arm_msgs/Pose}
 """
-SYSTEM = TOP.replace(
+SYSTEM = TOP.replace("robot:firm:generators", "robot:firm:firm_system").replace(
     "pose: {generator: firm, parameters: {message: arm_msgs/Pose, ros: 2, messages: [me:msgs:arm]}}",
     "pose: {generator: far, parameters: {spec: robot.yaml}}",
 )
