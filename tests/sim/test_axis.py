@@ -1,4 +1,4 @@
-"""The parts of robot:axis:axis that a stream passes unchanged, and the synthesis of all of them."""
+"""The parts of robot:axis:firm_axis that a stream passes unchanged, and the synthesis of all of them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/axis", "sim/host", "sim/parts"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/parts"))
     library.analyse(core_files("axis/axis", fileset="tb"))
     return library
 

@@ -1,4 +1,4 @@
-"""The byte gearboxes of robot:axis:axis, window and packer, against the bytes that went in."""
+"""The byte gearboxes of robot:axis:firm_axis, window and packer, against the bytes that went in."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/axis", "sim/host", "sim/parts"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/parts"))
     library.analyse(core_files("axis/axis", fileset="tb"))
     return library
 

@@ -1,4 +1,4 @@
-"""The trimmer of robot:axis:axis alone: whatever a frame has, it gets the length that it announces."""
+"""The trimmer of robot:axis:firm_axis alone: whatever a frame has, it gets the length that it announces."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/axis", "sim/host", "sim/parts"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/parts"))
     _analyse_bench(library)
     return library
 
