@@ -26,6 +26,7 @@ def test_what_ghdl_has_wrong_is_right(judges: list[str]) -> None:
     assert not found, shown(found)
 
 
+@pytest.mark.thorough
 def test_random_designs() -> None:
     print(f"{DESIGNS} designs of seed {SEED}; make fuzz-netlist SEED={SEED} DESIGNS={DESIGNS} repeats it")
     found = differences(comparison.designs(SEED, 0, DESIGNS), ["icarus", "yosys"])
