@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
-
-from fusesoc_firm.diagnostics import fail
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.library import MessageLibrary
@@ -82,7 +81,7 @@ def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
 
 
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
-    """The system of the specification that the arguments name.
+    """The system of the specification that the arguments name, whose warnings are printed.
 
     Unless it `needs_sources`, those of its accelerators may be missing.
     """
@@ -90,16 +89,22 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
     from fusesoc_firm.system.generator import load_system
 
     known = libraries(arguments.path, os.environ, arguments.distro)
-    return load_system(arguments.spec, known, needs_sources=needs_sources)
+    loaded = load_system(arguments.spec, known, needs_sources=needs_sources)
+    for warning in loaded.warnings:
+        print(warning, file=sys.stderr)
+    return loaded
 
 
-def write(path: Path, text: str) -> None:
-    """Write a file of the user, with the folders above it."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        fail(f"cannot write {path}: {error.strerror}")
+def add_picture(parser: argparse.ArgumentParser) -> None:
+    """The arguments of commands that draw a graph, for `pictures.draw`."""
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="F.svg",
+        help="where to write it, also as F.png, F.pdf or F.dot (default: print it)",
+    )
+    parser.add_argument("--format", choices=("svg", "dot"), help="of what is printed (default: svg)")
 
 
 def as_yaml(data: dict[str, Any]) -> str:

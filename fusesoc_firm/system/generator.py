@@ -14,7 +14,7 @@ from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.generator import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.diagnostics import Diagnostic, Diagnostics
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -60,13 +60,17 @@ _INCLUDE_SUFFIXES = (".vh", ".svh")
 
 @dataclass(frozen=True)
 class LoadedSystem:
-    """A specification, the folder its paths are relative to, the board if one is given, and the system derived."""
+    """A specification, the folder its paths are relative to, the board if one is given, and the system derived.
+
+    `warnings` are for whoever wrote the specification.
+    """
 
     specification: Specification
     folder: Path
     libraries: dict[RosVersion, MessageLibrary]
     system: DerivedSystem
     board: Board | None = None
+    warnings: tuple[Diagnostic, ...] = ()
 
     def inputs(self) -> list[Path]:
         """The accelerators' sources and the files of all messages."""
@@ -105,7 +109,7 @@ def load_system(
     if board:
         specification = on_board(specification, board)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
-    return LoadedSystem(specification, path.parent, libraries, system, board)
+    return LoadedSystem(specification, path.parent, libraries, system, board, faults.warnings)
 
 
 def load_requested(request: Request) -> LoadedSystem:
