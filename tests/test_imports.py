@@ -72,10 +72,12 @@ ALLOWED: dict[str, set[str]] = {
 # The doors join the stages; __init__ holds the version.
 DOORS = {"gapi", "batch", "cli"}
 _PREFIX = "fusesoc_firm"
+# Links to cores and demo systems.
+LIBRARIES = {"library", "demos"}
 
 
 def modules(package: Path) -> Iterator[Path]:
-    return (path for path in sorted(package.rglob("*.py")) if path.relative_to(package).parts[0] != "library")
+    return (path for path in sorted(package.rglob("*.py")) if room_of(path, package) not in LIBRARIES)
 
 
 def room_of(path: Path, package: Path) -> str:

@@ -31,6 +31,8 @@ _FAMILIES = (
 )
 # The instances of the generator that targets ask for.
 _SYSTEM, _SIMULATION = "system", "simulation"
+# The core with the generator `far`, and the one that had it before version 0.2.0.
+_SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
 # A target with the comment above it; blank lines part them.
 _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
@@ -73,6 +75,8 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
     """The text of the `.core` in `path` with the targets of today. Raises `InputError` if it is none of a system."""
     text = path.read_text(encoding="utf-8")
     instances = _instances(path, text)
+    if _GENERATORS in text and _SYSTEM_CORE not in text:
+        fail(f"{path} does not depend on '{_SYSTEM_CORE}', which has the generator 'far'", hint=f"{_GENERATORS} had it")
     if _SYSTEM not in instances:
         fail(f"{path} has no instance '{_SYSTEM}' under 'generate'; without the file, this command writes another one")
     is_simulated = _SIMULATION in instances
