@@ -19,6 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.interrupts import accept_interrupts
 from fusesoc_firm.manifest import note
 from fusesoc_firm.tools import find, ways
 
@@ -59,6 +60,7 @@ def starts_everything() -> bool:
 
 def main(arguments: Sequence[str]) -> int:
     """The same as `firm tool`, which has other commands to get ready; a build starts a dozen programs."""
+    accept_interrupts()
     try:
         return launch(arguments[0], arguments[1:])
     except InputError as error:
