@@ -44,12 +44,24 @@ def launch(program: str, arguments: Sequence[str]) -> int:
 
 def _run(command: Sequence[str]) -> int:
     """The exit status of a command; who ends this process, as make does, ends it."""
-    with subprocess.Popen(command) as program:
-        before = signal.signal(signal.SIGTERM, lambda *_: program.terminate())
-        try:
+    program: subprocess.Popen[bytes] | None = None
+    is_wanted = True
+
+    def end(*_: object) -> None:
+        nonlocal is_wanted
+        is_wanted = False
+        if program:
+            program.terminate()
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        with subprocess.Popen(command) as program:
+            # The signal may have come while it was being started.
+            if not is_wanted:
+                program.terminate()
             return program.wait()
-        finally:
-            signal.signal(signal.SIGTERM, before)
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def starts_everything() -> bool:

@@ -33,13 +33,16 @@ def read(root: str, name: str, most: int) -> bytes | None:
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             handle = os.open(os.path.basename(name), os.O_RDONLY | _FILE, dir_fd=folder)
-        with open(handle, "rb") as file:
+        try:
             status = os.fstat(handle)
             if not stat.S_ISREG(status.st_mode) or status.st_size > most:
                 return None
-            # It appeared whole, so one that still grows is not ours.
-            content = file.read(status.st_size + 1)
+            with open(handle, "rb", closefd=False) as file:
+                # It appeared whole, so one that still grows is not ours.
+                content = file.read(status.st_size + 1)
             return content if len(content) == status.st_size else None
+        finally:
+            os.close(handle)
     except OSError:
         return None
 
@@ -120,7 +123,7 @@ def _open_lock(root: str, name: str) -> int:
         if stat.S_ISREG(os.fstat(handle).st_mode):
             _share(handle, folder)
             return handle
-    os.close(handle)
+        os.close(handle)
     raise OSError(errno.EINVAL, "Not a regular file")
 
 

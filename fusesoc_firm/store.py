@@ -146,9 +146,9 @@ class Store:
         return sum(file.size for file in self._files())
 
     def is_writable(self) -> bool:
-        """Whether this user may add entries; so it is, too, where there is no store yet."""
-        folder = self.root / LAYOUT
-        return os.access(folder, os.W_OK) or not folder.exists()
+        """Whether this user may add entries; True also if the store's folder is missing."""
+        there = next((folder for folder in (self.root / LAYOUT, self.root) if os.access(folder, os.F_OK)), None)
+        return there is None or os.access(there, os.W_OK)
 
     def remove_damaged(self) -> list[Path]:
         """Remove what is damaged, or is no file that a store can have, and name it. Raises `OSError`."""

@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -294,8 +295,8 @@ def test_what_is_gone_while_it_is_read_is_made(tmp_path: Path, monkeypatch: pyte
     obtain(tmp_path)
     real = open
 
-    def open_stale(file: int | str, mode: str) -> object:
-        return Gone(file) if isinstance(file, int) and mode == "rb" else real(file, mode)
+    def open_stale(file: int | str, mode: str, **how: Any) -> object:
+        return Gone(file, **how) if isinstance(file, int) and mode == "rb" else real(file, mode, **how)
 
     with monkeypatch.context() as patch:
         patch.setattr("builtins.open", open_stale)
