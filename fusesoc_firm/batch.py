@@ -22,7 +22,6 @@ from pathlib import Path
 from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.gapi import GENERATORS, MESSAGES, Call, Generator, make_request, obtain, used_before
 from fusesoc_firm.generation import GeneratedCore, GeneratorCall, Request
-from fusesoc_firm.interrupts import accept_interrupts
 from fusesoc_firm.own_code import digests
 from fusesoc_firm.render import forget_rendered
 
@@ -91,7 +90,6 @@ def _request(call: GeneratorCall) -> Request:
 
 def main() -> None:
     """Make the calls on standard input; a byte on standard output for each."""
-    accept_interrupts()
     (name,) = sys.argv[1:]
     code = digests()
     for item in json.load(sys.stdin):
