@@ -19,7 +19,7 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
-from fusesoc_firm.files import write_if_changed
+from fusesoc_firm.files import hide_generated, write_if_changed
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
 from fusesoc_firm.message_runs import mark_run
 from fusesoc_firm.own_code import PACKAGE, digests, used_code
@@ -412,6 +412,7 @@ def _stored_call(request: Request, generator: Generator, path: Path, reads: Read
 
 def _write(files: Files) -> None:
     """Write a core into the current folder, the `.core` last."""
+    hide_generated()
     for name, content in files.items():
         try:
             write_if_changed(Path(name), content)

@@ -25,7 +25,7 @@ import sys
 import time
 from collections.abc import Sequence
 
-from fusesoc_firm.files import read_file, write_if_changed
+from fusesoc_firm.files import hide_generated, read_file, write_if_changed
 from fusesoc_firm.message_runs import mark_run, marked_folders
 from fusesoc_firm.own_code import PACKAGE, all_names
 from fusesoc_firm.store_files import (
@@ -70,6 +70,7 @@ def answer(command: str, arguments: Sequence[str]) -> bool:
         return False
     mark_used(root, stored, noted)
     try:
+        hide_generated()
         for name, content in found[1].items():
             write_if_changed(name, content)
         if note["marks"]:

@@ -21,7 +21,7 @@ def add_why(commands: Any) -> None:
         commands,
         "why",
         "tell which line of a template, of the specification and of a message made a generated line",
-        "firm why build/robot_sys_quat2euler_0.1.0/sim/src/robot_sys_quat2euler-system_0.1.0/quat2euler_system.vhd:80",
+        "firm why build/robot_sys_quat2euler_0.2.0/sim/src/robot_sys_quat2euler-system_0.2.0/quat2euler_system.vhd:80",
         _tell_why,
     )
     why.add_argument("place", metavar="FILE[:LINE]", help="a generated file of a build; without LINE, every line of it")

@@ -28,8 +28,6 @@ SPECS = Path(__file__).resolve().parents[2] / "specs"
 SEED = 20241103
 _PLACE = re.compile(r"(?P<file>.*):(?P<line>\d+):(?P<column>\d+): error: (?P<message>.*)")
 _EXCERPT = re.compile(r" *(?P<line>\d+) \| (?P<text>.*)")
-# Of franka_msgs/FrankaState, which is not ours, what the specification includes.
-_FRANKA_STATE = "float64[7] q\nfloat64[7] q_d\nfloat64[16] O_T_EE\nfloat64[16] O_T_EE_d\n"
 
 
 def specifications() -> list[Path]:
@@ -109,9 +107,6 @@ def checker(
     spec: Path = request.param
     folder = tmp_path / spec.parent.name
     shutil.copytree(spec.parent, folder)
-    state = tmp_path / "franka_msgs/msg/FrankaState.msg"
-    state.parent.mkdir(parents=True)
-    state.write_text(_FRANKA_STATE, encoding="utf-8")
     make = library.libraries
     known: dict[RosVersion, MessageLibrary] = {}
 
@@ -122,8 +117,8 @@ def checker(
         return known
 
     monkeypatch.setattr(library, "libraries", shared)
-    own = [folder / "msg"] if (folder / "msg").is_dir() else []
-    return Checker(folder / spec.name, [*own, state.parent.parent], capsys)
+    own = [path for path in (folder / "msg", folder / "franka_msgs") if path.is_dir()]
+    return Checker(folder / spec.name, own, capsys)
 
 
 every_specification = pytest.mark.parametrize("checker", specifications(), ids=lambda path: path.stem, indirect=True)
