@@ -23,11 +23,13 @@ from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.node.options import remappings
+from fusesoc_firm.interrupts import accept_interrupts
 from fusesoc_firm.library_path import demos_root, library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `firm`; the exit status is 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
+    accept_interrupts()
     arguments = _parsed(argv)
     try:
         arguments.handler(arguments)

@@ -68,9 +68,7 @@ class Installation:
         home = self.environment.parent / "home"
         # Nothing is activated: `python3` is the system's, and knows no package of ours.
         environment = {"PATH": "/usr/bin:/bin", "HOME": str(home), "LANG": "C.UTF-8"}
-        return subprocess.run(
-            command, cwd=cwd, env=environment, text=True, capture_output=True, check=check, timeout=120
-        )
+        return subprocess.run(command, cwd=cwd, env=environment, text=True, capture_output=True, check=check)
 
 
 def copy_source(destination: Path) -> None:
