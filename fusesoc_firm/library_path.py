@@ -13,3 +13,8 @@ from pathlib import Path
 def library_root() -> Path:
     """The folder for `fusesoc library add firm FOLDER`, absolute."""
     return Path(__file__).resolve().parent / "library"
+
+
+def docs_root() -> Path:
+    """The folder of the documentation, absolute; in a wheel as in a checkout."""
+    return Path(__file__).resolve().parent / "docs"

@@ -22,7 +22,7 @@ from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.node.options import remappings
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.library_path import docs_root, library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,13 +59,14 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="firm", description="ROS messages and robot systems as FPGA hardware.")
     parser.add_argument("--version", action="version", version=f"firm {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    command(
+    path = command(
         commands,
         "path",
         "print the folder of the FuseSoC library",
         'fusesoc library add firm "$(firm path)"',
         _print_path,
     )
+    path.add_argument("--docs", action="store_true", help="the folder of the documentation instead")
     add_message(commands)
     add_system(commands)
     add_simulator(commands)
@@ -80,5 +81,5 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _print_path(_: argparse.Namespace) -> None:
-    print(library_root())
+def _print_path(arguments: argparse.Namespace) -> None:
+    print(docs_root() if arguments.docs else library_root())
