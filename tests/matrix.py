@@ -191,7 +191,8 @@ def build_wheel(folder: Path) -> Path:
     ignored = shutil.ignore_patterns(".*", "build", "dist", "tests", "*.egg-info", "__pycache__")
     shutil.copytree(ROOT, folder / "source", symlinks=True, ignore=ignored)
     command = [UV, "build", "--quiet", "--wheel", "--no-python-downloads", "--python", sys.executable]
-    subprocess.run([*command, "--out-dir", folder / "wheel", folder / "source"], check=True)
+    if subprocess.run([*command, "--out-dir", folder / "wheel", folder / "source"], check=False).returncode:
+        sys.exit("The wheel cannot be built; uv says why above.")
     (wheel,) = (folder / "wheel").glob("*.whl")
     return wheel
 
