@@ -190,8 +190,8 @@ def build_wheel(folder: Path) -> Path:
     """This package as a wheel, of a copy, since a build leaves files beside its sources."""
     ignored = shutil.ignore_patterns(".*", "build", "dist", "tests", "*.egg-info", "__pycache__")
     shutil.copytree(ROOT, folder / "source", symlinks=True, ignore=ignored)
-    command = [UV, "build", "--quiet", "--wheel", "--no-python-downloads", "--python", sys.executable]
-    if subprocess.run([*command, "--out-dir", folder / "wheel", folder / "source"], check=False).returncode:
+    options = ("--quiet", "--wheel", "--no-python-downloads", "--python", sys.executable, "--out-dir", folder / "wheel")
+    if subprocess.run([UV, "build", *options, folder / "source"], check=False).returncode:
         sys.exit("The wheel cannot be built; uv says why above.")
     (wheel,) = (folder / "wheel").glob("*.whl")
     return wheel
