@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from fusesoc_firm import __version__
 from fusesoc_firm.cli.build import add_build
@@ -22,7 +23,7 @@ from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.node.options import remappings
-from fusesoc_firm.library_path import docs_root, library_root
+from fusesoc_firm.library_path import demos_root, docs_root, library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -62,11 +63,16 @@ def _parser() -> argparse.ArgumentParser:
     path = command(
         commands,
         "path",
-        "print the folder of the FuseSoC library",
+        "print the folder of the FuseSoC library of reusable cores and generators",
         'fusesoc library add firm "$(firm path)"',
         _print_path,
     )
-    path.add_argument("--docs", action="store_true", help="the folder of the documentation instead")
+    kind = path.add_mutually_exclusive_group()
+    kind.add_argument("--demos", action="store_true", help="the library of demo systems instead")
+    kind.add_argument("--docs", action="store_true", help="the folder of the documentation instead")
+    path.add_argument(
+        "--relative", action="store_true", help="relative to the current folder, for a fusesoc.conf in version control"
+    )
     add_message(commands)
     add_system(commands)
     add_simulator(commands)
@@ -82,4 +88,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _print_path(arguments: argparse.Namespace) -> None:
-    print(docs_root() if arguments.docs else library_root())
+    folder = demos_root() if arguments.demos else docs_root() if arguments.docs else library_root()
+    # Both without links, so that the steps up lead where they seem to.
+    print(os.path.relpath(folder, Path.cwd().resolve()) if arguments.relative else folder)
