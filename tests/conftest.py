@@ -1,4 +1,4 @@
-"""For all tests: a store of their own, busy machines, callers that ignore Ctrl-C, and tests that wait for ever.
+"""For all tests: a store of their own, this Python first on PATH, busy machines, callers that ignore Ctrl-C, and tests that wait for ever.
 
 How long something takes says nothing on a busy machine, so no test is ended for the time it takes. But it fails when it
 and all processes below it have waited for a minute (`waiting_limit`) without doing anything.
@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import tempfile
 import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import psutil
 import pytest
@@ -49,6 +51,8 @@ def pytest_configure(config: pytest.Config) -> None:
         store = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
         config.add_cleanup(store.cleanup)
         os.environ["FUSESOC_FIRM_CACHE"] = store.name
+        # FuseSoC looks up a generator's interpreter there.
+        os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
 
 
