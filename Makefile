@@ -13,7 +13,7 @@ BOARD ?= ulx3s
 FUSESOC_OPTIONS ?=
 # The test bench's seed of random stalls; empty is the one of the system's .core.
 SEED ?=
-# WAVES=1 writes waves.ghw into the build folder.
+# WAVES=1 writes waves.ghw into the build folder and prints its path.
 WAVES ?=
 # Further options for the simulator.
 SIM_OPTIONS ?=
@@ -31,6 +31,8 @@ PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core, which are GHDL's.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
+# Of a failed run, too.
+SAY_WAVES = $(if $(WAVES),trap 'ls -t build/*/sim/waves.ghw | sed -n "1s/^/waves: /p"' EXIT;)
 # A host in Verilog takes its seed from FuseSoC.
 RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 is for GHDL, TARGET=sim))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
 
@@ -48,7 +50,7 @@ help: ## List the targets
 # Without what make and Edalize say about folders, the result is the last line.
 sim: TOOLS = $(if $(filter sim,$(TARGET)),,$(patsubst icarus,iverilog,$(TARGET:sim_%=%)))
 sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED=N, WAVES=1, SIM_OPTIONS='...'
-	@MAKEFLAGS=--no-print-directory PYTHONUNBUFFERED=1 \
+	@$(SAY_WAVES) MAKEFLAGS=--no-print-directory PYTHONUNBUFFERED=1 \
 	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
@@ -66,7 +68,7 @@ corpus: $(if $(HAS_CORPUS),setup) ## Verify the converters of all messages below
 ifeq ($(HAS_CORPUS),)
 	@echo "No corpus: '$(CORPUS)' has no folders ros1 and ros2 of message definitions; CORPUS=DIR names another place"
 else
-	@status=0; \
+	@status=0; mkdir -p build; \
 	for ros in 1 2; do \
 	  $(BIN)/firm message verify --ros $$ros --path "$(CORPUS)/ros$$ros" \
 	    --report build/corpus_ros$$ros.json $(VERIFY_OPTIONS) || status=1; \

@@ -32,19 +32,21 @@ ALLOWED: dict[str, set[str]] = {
     "frame": _MESSAGE,
     "converter": _FRAME | _WRITING | _READING,
     # It knows requesters, not systems.
-    "scheduling": {"diagnostics", "workers"},
-    "system": _CONVERTER | {"prompts", "scheduling"},
+    "scheduling": {"diagnostics", "outputs", "workers"},
+    "system": _CONVERTER | {"outputs", "prompts", "scheduling"},
     # It builds simulators of systems, by FuseSoC and with the library.
-    "host": _SYSTEM | {"files", "library_path", "store_files", "tools"},
+    "host": _SYSTEM | {"files", "library_path", "outputs", "store_files", "tools"},
     "replay": _SYSTEM | {"host"},
     # The cores of its bench lie in the library.
-    "verify": _SYSTEM | {"files", "library_path", "workers"},
+    "verify": _SYSTEM | {"library_path", "outputs", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.
     "netlist": {"launcher", "manifest", "tools"},
     "quoting": set(),
     "render": {"quoting"},
     "own_code": {"render"},
     "files": set(),
+    "outputs": {"diagnostics"},
+    "pictures": {"diagnostics", "outputs"},
     "reads": {"own_code"},
     "store_files": {"files"},
     "message_runs": {"files"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -125,6 +126,30 @@ def test_make_sim_passes_its_variables_on(variables: list[str], arguments: str) 
     command = ["make", "--dry-run", "sim", *variables]
     done = subprocess.run(command, cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
     assert f" .venv/bin/fusesoc run --target=sim {arguments} 2>&1 | " in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize("status", [0, 1])
+def test_make_sim_prints_the_path_of_its_waves(tmp_path: Path, status: int) -> None:
+    """Of a run that fails, too; programs that do nothing stand in for ours."""
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    waves = "build/a_b_c_1/sim/waves.ghw"
+    programs = {
+        ".ci/install-tools": "true",
+        ".venv/bin/python": "true",
+        ".venv/bin/fusesoc": f"mkdir -p {Path(waves).parent}; touch {waves}; echo PASS 1/1; exit {status}",
+    }
+    for name, text in programs.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+        path.chmod(0o755)
+    for name in ("pyproject.toml", ".venv/.installed"):
+        (tmp_path / name).touch()
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    command = ["make", "sim", "SYSTEM=a:b:c", "WAVES=1"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, text=True, capture_output=True, check=False)
+    assert done.stdout.splitlines()[-2:] == ["PASS 1/1", f"waves: {waves}"], done.stderr
+    assert bool(done.returncode) is bool(status)
 
 
 def make_corpus(corpus: Path) -> list[str]:
