@@ -194,7 +194,7 @@ def test_answers_read_well(tmp_path: Path) -> None:
     answers = turner(
         name=["0x10", "turner", "on", "acc", "acc", "a, b", "a, b"],
         sources=["rtl/turn.vhd"],
-        one_more_of_sources=["rtl/part: two.vhd", "rtl/three.vhd"],
+        one_more_of_sources=["007", "rtl/three.vhd"],
         include=["x", "y"],
         fpgaPart=["007"],
         clock=["100 MHz"],
@@ -205,7 +205,7 @@ def test_answers_read_well(tmp_path: Path) -> None:
         'fpgaPart: "007" # the FPGA\'s part number',
         "clock: 100 MHz # frequency",
         "width: 16 # bits",
-        'sources: [rtl/turn.vhd, "rtl/part: two.vhd", rtl/three.vhd] # its source files',
+        'sources: [rtl/turn.vhd, "007", rtl/three.vhd] # its source files',
         "include: x # only these fields",
         "include: y\n",
         '- name: "on"\n',
