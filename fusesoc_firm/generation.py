@@ -12,8 +12,9 @@ from typing import Any
 
 import yaml
 
-from fusesoc_firm.diagnostics import SourceRef
+from fusesoc_firm.diagnostics import SourceRef, fail
 
+_LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None
 """What a generator's parameter can be; None is one that was not given and has no default."""
 
@@ -81,9 +82,20 @@ class GeneratedCore:
 
 
 def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
-    """The files to write for FuseSoC, by path; the `.core` is last, since with it the others are taken to be there."""
-    contents = {path: _encoded(file.content) for path, file in core.files.items()}
+    """The files to write for FuseSoC, by path; the `.core` is last, since with it the others are taken to be there.
+
+    Raises `InputError` for a name that is too long for a file.
+    """
+    contents = {_checked(path): _encoded(file.content) for path, file in core.files.items()}
     return contents | {f"{request.name}.core": core_text(core, request.vlnv).encode()}
+
+
+def _checked(path: str) -> str:
+    """`path`, unless it is longer than file systems have it: entities are called after names that are joined."""
+    for part in path.split("/"):
+        if (size := len(part.encode())) > _LONGEST_FILE_NAME:
+            fail(f"the file '{part[:40]}...' would have a name of {size} bytes; file systems take {_LONGEST_FILE_NAME}")
+    return path
 
 
 def core_text(core: GeneratedCore, vlnv: str) -> str:

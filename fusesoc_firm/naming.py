@@ -1,4 +1,4 @@
-"""ROS names to names that are legal and distinct in VHDL, Verilog and SystemVerilog.
+"""What a name may be, and ROS names to names that are legal and distinct in VHDL, Verilog and SystemVerilog.
 
 A name stays as it is wherever it can. What has to change changes in the same way on every run, and the
 generated code says in a comment which ROS name a port stands for, so the mapping can be read backwards.
@@ -54,8 +54,27 @@ VHDL_PREDEFINED = frozenset(
     shift_left shift_right signed std_match unresolved_signed unresolved_unsigned unsigned""".split()
 )
 
+# The characters of a name or a description.
+LONGEST_TEXT = 200
+# Those of a path, such as of a source, and of the fields on the way into a deeply nested message.
+LONGEST_PATH = 4096
+
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
 _UNDERSCORES = re.compile(r"_{2,}")
+
+
+def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None:
+    """What keeps `text` from being a name or a description, and what is legal; None if nothing does.
+
+    Such a text gets into comments, strings, labels and messages: everywhere it is one line that can be shown. So it
+    has no control characters, Unicode's line ends, lone surrogates, or characters that change the direction of writing.
+    """
+    legal = f"legal is one line of at most {longest} printable characters"
+    if len(text) > longest:
+        return f"has {len(text)} characters", legal
+    if unprintable := next((character for character in text if not character.isprintable()), None):
+        return f"holds the character U+{ord(unprintable):04X}", legal
+    return None
 
 
 def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "field") -> str:

@@ -11,6 +11,7 @@ from typing import Any
 
 from fusesoc_firm.diagnostics import Diagnostics, nearest
 from fusesoc_firm.generation import Plain
+from fusesoc_firm.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.requesting_core import RequestingCore
 
 _TYPES: dict[str, tuple[type, str]] = {
@@ -82,6 +83,9 @@ def _fault(parameter: Parameter, value: object) -> str:
     # Exact types, since to Python a bool is an integer.
     if type(value) is not expected or (isinstance(value, list) and not all(type(item) is str for item in value)):
         return words
+    texts = value if isinstance(value, list) else [value] if isinstance(value, str) else []
+    if any(text_fault(text, LONGEST_PATH) for text in texts):
+        return f"one line of at most {LONGEST_PATH} printable characters"
     if parameter.choices and value not in parameter.choices:
         return f"one of {', '.join(map(str, parameter.choices))}"
     if parameter.bounds and isinstance(value, int) and not parameter.bounds[0] <= value <= parameter.bounds[1]:

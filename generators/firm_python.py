@@ -28,7 +28,7 @@ _TRIED, _LEFT = "_FUSESOC_FIRM_TRIED", "_FUSESOC_FIRM_LEFT"
 
 def run(command: str) -> NoReturn:
     """Answer FuseSoC's call of the generator `command`, in this Python or in another that takes this one's place."""
-    tried, left = (os.environ.pop(name, "").splitlines() for name in (_TRIED, _LEFT))
+    tried, left = ([*filter(None, os.environ.pop(name, "").split("\n"))] for name in (_TRIED, _LEFT))
     chosen = os.environ.get(_CHOSEN)
     try:
         if chosen and not tried and chosen != sys.executable:

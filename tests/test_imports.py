@@ -16,7 +16,7 @@ _WIRE = _WORDS | {"wire"}
 _MESSAGE = _WIRE | {"message"}
 _FRAME = _MESSAGE | {"frame"}
 # What every stage that makes files may use: it knows no stage.
-_WRITING = {"generation", "render"}
+_WRITING = {"generation", "quoting", "render"}
 # What every stage that reads a file of the user may use.
 _READING = {"yaml_text", "yaml_sections"}
 _CONVERTER = _FRAME | _WRITING | _READING | {"converter"}
@@ -40,7 +40,8 @@ ALLOWED: dict[str, set[str]] = {
     "verify": _SYSTEM | {"library_path", "outputs", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.
     "netlist": {"launcher", "manifest", "tools"},
-    "render": set(),
+    "quoting": set(),
+    "render": {"quoting"},
     "own_code": {"render"},
     "files": set(),
     "outputs": {"diagnostics"},
@@ -62,12 +63,12 @@ ALLOWED: dict[str, set[str]] = {
     "manifest": {"tools"},
     "launcher": {"diagnostics", "manifest", "tools"},
     "yaml_text": {"diagnostics"},
-    "yaml_sections": {"diagnostics", "yaml_text"},
+    "yaml_sections": _WORDS | {"yaml_text"},
     "yaml_schema": {"yaml_sections"},
     "prompts": {"diagnostics"},
     "generation": {"diagnostics"},
     "requesting_core": {"diagnostics", "yaml_text"},
-    "parameters": {"diagnostics", "generation", "requesting_core"},
+    "parameters": _WORDS | {"generation", "requesting_core"},
 }
 # The doors join the stages; __init__ holds the version.
 DOORS = {"gapi", "batch", "cli"}

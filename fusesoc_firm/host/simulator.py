@@ -13,6 +13,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -137,7 +138,7 @@ def _write_core(spec: Path, folder: Path, sources: CoreSources) -> Path:
         paths=list(map(str, paths)),
         distro=sources.distro,
     )
-    core = folder / f"{spec.stem}.core"
+    core = folder / f"{_short_name(spec)}.core"
     write_if_changed(core, new_core(system, str(spec), options))
     return core
 
@@ -145,12 +146,17 @@ def _write_core(spec: Path, folder: Path, sources: CoreSources) -> Path:
 def _build_folder(spec: Path, tool: str, root: Path) -> Path:
     """A folder of its own for each specification and tool; the name of its file helps people."""
     digest = hashlib.sha256(str(spec).encode()).hexdigest()[:12]
-    folder = root.absolute() / f"{spec.stem}-{digest}-{tool}"
+    folder = root.absolute() / f"{_short_name(spec)}-{digest}-{tool}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         fail(f"cannot write {folder}: {error.strerror}")
     return folder
+
+
+def _short_name(spec: Path) -> str:
+    """What a specification's file is called, without the characters that make and simulators do not take in a path."""
+    return re.sub(r"[^A-Za-z0-9_.+-]", "_", spec.stem).lstrip("-")[:60]
 
 
 @contextmanager
@@ -212,5 +218,5 @@ def _words(work: Path, tool: str) -> list[str]:
     if tool == VERILATOR:
         return [str(work / f"V{_flow(work)['toplevel']}")]
     # The line of Edalize's makefile has the options of the analysis.
-    steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).splitlines()
+    steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).split("\n")
     return shlex.split([line for line in steps if line.startswith("ghdl -r ")][-1])

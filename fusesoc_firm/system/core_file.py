@@ -14,6 +14,8 @@ from pathlib import Path, PurePosixPath
 import yaml
 
 from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.naming import text_fault
+from fusesoc_firm.quoting import yaml_list, yaml_scalar
 from fusesoc_firm.render import render
 from fusesoc_firm.system.board import FOLDER, QUARTUS, VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived import DerivedSystem
@@ -53,8 +55,10 @@ class CoreOptions:
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
-    """The text of a `.core` that is not there yet, for the specification `spec` beside it."""
-    further = {"paths": _flow(options.paths), "distro": options.distro}
+    """The text of a `.core` that is not there yet, for the specification `spec` beside it. Raises `InputError`."""
+    if fault := text_fault(options.description):
+        fail(f"--description {fault[0]}", hint=fault[1])
+    further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
     head = render(
         HEAD_TEMPLATE,
         {
@@ -65,7 +69,7 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
             "options": [{"name": name, "value": value} for name, value in further.items() if value],
             "stimuli": options.stimuli,
             "model": options.model,
-            "environment": {"files": _flow(options.environment)} if options.environment else None,
+            "environment": {"files": _paths(options.environment)} if options.environment else None,
         },
     )
     return head + _targets(system, is_simulated=True, has_environment=bool(options.environment))
@@ -117,16 +121,16 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
     board = read_board(name, FOLDER)
     if has_kernels and board.flow != VIVADO:
         return None
-    options = {
-        "frontends": "[ghdlsynth]" if board.is_linked else "",
-        "part": str(board.part or ""),
-        "board_part": str(board.board_part or ""),
+    options: dict[str, str | Sequence[str] | None] = {
+        "frontends": ["ghdlsynth"] if board.is_linked else None,
+        "part": board.part,
+        "board_part": board.board_part,
         # A block design refers to modules by name only where Vivado manages the sources.
-        "source_mgmt_mode": "All" if board.flow == VIVADO else "",
-        "yosys_synth_options": _words(board.synth_options),
-        "nextpnr_options": _words(board.nextpnr_options),
-        "device": str(board.device or ""),
-        "family" if board.flow == QUARTUS else "device_family": str(board.device_family or ""),
+        "source_mgmt_mode": "All" if board.flow == VIVADO else None,
+        "yosys_synth_options": board.synth_options,
+        "nextpnr_options": board.nextpnr_options,
+        "device": board.device,
+        "family" if board.flow == QUARTUS else "device_family": board.device_family,
     }
     top = board_entity(system, board)
     product = "Quartus project" if board.flow == QUARTUS else "Bitstream"
@@ -136,14 +140,14 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
         # Of Quartus, Edalize has no flow.
         "is_tool": board.flow == QUARTUS,
         "flow": str(board.flow),
-        "options": [{"name": option, "value": value} for option, value in options.items() if value],
+        "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],
         "toplevel": f"{top}_wrapper" if board.flow == VIVADO else top,
     }
 
 
-def _words(items: Sequence[str]) -> str:
-    """A list of strings on one line; nothing if it is empty."""
-    return yaml.safe_dump([str(item) for item in items], default_flow_style=True, width=10**6).strip() if items else ""
+def _value(value: str | Sequence[str]) -> str:
+    """A word or a list of words in YAML."""
+    return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
 
 
 def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]:
@@ -156,6 +160,6 @@ def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]
     return instances
 
 
-def _flow(items: Sequence[str]) -> str:
+def _paths(items: Sequence[str]) -> str:
     """A list on one line; nothing if it is empty."""
-    return f"[{', '.join(str(PurePosixPath(item)) for item in items)}]" if items else ""
+    return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

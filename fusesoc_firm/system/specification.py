@@ -6,12 +6,15 @@ stand at the field. What the sections say together (names that must be known, co
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.diagnostics import Diagnostics, fail
 from fusesoc_firm.message.model import MIDDLEWARES
+from fusesoc_firm.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
@@ -48,8 +51,21 @@ LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
 
-_INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
-_EXCLUDE = {"form": "texts", "meaning": "none of these fields"}
+# Tools read the names of sources in makefiles, scripts and command lines, where most of them quote nothing.
+_SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}")
+
+
+def source_fault(text: str) -> tuple[str, str] | None:
+    """What keeps `text` from being a source file's name; None if nothing does."""
+    if fault := text_fault(text, LONGEST_PATH):
+        return fault
+    legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
+    return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not take as a file", legal)
+
+
+_FIELDS = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
+_INCLUDE = {**_FIELDS, "meaning": "only these fields, such as pose.position, each with all below it"}
+_EXCLUDE = {**_FIELDS, "meaning": "none of these fields"}
 _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
 
@@ -128,7 +144,11 @@ class Accelerator(Section):
     name: Text = key("the type's name; in VHDL that of the entity, in Verilog of the module", is_required=True)
     type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
     sources: tuple[Text, ...] = key(
-        "its source files, relative to the specification", form="texts", is_required=True, unless=("type", SOFTWARE)
+        "its source files, relative to the specification",
+        form="texts",
+        is_required=True,
+        unless=("type", SOFTWARE),
+        rule=source_fault,
     )
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
     width: int | None = key("bits of its streams; those of the project unless given", form="integer", choices=WIDTHS)

@@ -193,6 +193,8 @@ class _Wizard:
 
     def _fault(self, draft: _Draft, name: str, entry: Key, answer: str) -> str | None:
         """What makes an answer wrong, beyond the grammar's choices."""
+        if answer and (fault := entry.rule(answer)):
+            return f"'{name}' {fault[0]}; {fault[1]}"
         if entry.form == "integer" and not answer.isdecimal():
             return f"'{name}' must be an integer, not '{answer}'"
         if name == "name" and draft.section in (Accelerator, Block):

@@ -35,6 +35,7 @@ OTHER_FAULTS = {
     ("system/board.py", "_check_streams"): "the file of a board",
     ("system/board.py", "check_fits"): "a board that a right specification does not fit on",
     ("system/board.py", "_check_places"): "a board that a right specification does not fit on",
+    ("system/core_file.py", "new_core"): "an option of the command line",
     ("system/core_file.py", "updated_core"): "the file of a core",
     ("system/core_file.py", "_instances"): "the file of a core",
     ("system/timing.py", "tasks_of"): "a question that a right specification does not answer",
