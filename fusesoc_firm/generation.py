@@ -5,7 +5,7 @@ It knows no stage, so `converter` and `system` can return what `gapi` writes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ class Request:
     """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's.
 
     `places` tells where the items of a list parameter stand, as far as that is known; they are no part of the request.
-    `message_folders` are those of the cores that it names as carriers of messages.
+    `message_folders` are those of the cores that it, or its specification, names as carriers of messages.
     """
 
     command: str
@@ -42,12 +42,16 @@ class Request:
     files_root: Path
     parameters: Mapping[str, Plain]
     places: Mapping[str, Sequence[SourceRef]] = field(default_factory=dict, compare=False)
-    message_folders: tuple[Path, ...] = ()
+    message_folders: Mapping[str, Sequence[Path]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         """The new core's name, `<requesting core>-<instance>`."""
         return self.vlnv.split(":")[2]
+
+    def folders_of(self, cores: Iterable[str]) -> list[Path]:
+        """The folders of some of the cores that carry messages."""
+        return [folder for core in cores for folder in self.message_folders[core]]
 
     def listed(self, parameter: str) -> dict[str, SourceRef | None]:
         """The items of a list parameter, each with its place; none where it is not given."""

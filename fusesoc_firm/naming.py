@@ -59,6 +59,11 @@ LONGEST_TEXT = 200
 # Those of a path, such as of a source, and of the fields on the way into a deeply nested message.
 LONGEST_PATH = 4096
 
+PREFIX_RULE = "lower-case letters, digits and single '_' between them, a letter first, at most 100"
+"""What a prefix of design units is made of."""
+
+_PREFIX = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+_LONGEST_PREFIX = 100
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
 _UNDERSCORES = re.compile(r"_{2,}")
 
@@ -117,6 +122,16 @@ def _distinct(bases: Iterable[str], reserved: Iterable[str]) -> list[str]:
         taken.add(candidate.lower())
         chosen.append(candidate)
     return chosen
+
+
+def is_prefix(text: str) -> bool:
+    """Whether a text may stand before the names of design units."""
+    return len(text) <= _LONGEST_PREFIX and _PREFIX.fullmatch(text) is not None
+
+
+def prefixed(prefix: str, name: str) -> str:
+    """`<prefix>_<name>`; the name alone if the prefix is empty."""
+    return f"{prefix}_{name}" if prefix else name
 
 
 def entity_name(package: str, message: str) -> str:

@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "fusesoc_firm"
 _WORDS = {"diagnostics", "naming"}
 # Plain data that says how a middleware serialises.
 _WIRE = _WORDS | {"wire"}
-_MESSAGE = _WIRE | {"message"}
+_MESSAGE = _WIRE | {"message", "reads"}
 _FRAME = _MESSAGE | {"frame"}
 # What every stage that makes files may use: it knows no stage.
 _WRITING = {"generation", "quoting", "render"}
@@ -27,7 +27,8 @@ ALLOWED: dict[str, set[str]] = {
     "diagnostics": set(),
     "naming": set(),
     "wire": set(),
-    "message": _WIRE,
+    # It reads bags in part.
+    "message": _WIRE | {"reads"},
     "frame": _MESSAGE,
     "converter": _FRAME | _WRITING | _READING,
     # It knows requesters, not systems.
@@ -49,7 +50,8 @@ ALLOWED: dict[str, set[str]] = {
     "reads": {"own_code"},
     "store_files": {"files"},
     "message_runs": {"files"},
-    "recall": {"files", "message_runs", "own_code", "store_files"},
+    "design_units": {"files"},
+    "recall": {"design_units", "files", "message_runs", "own_code", "store_files"},
     "message_core": _MESSAGE | {"generation", "message_runs"},
     "why": _SYSTEM,
     "lock": _SYSTEM | {"project", "tools"},

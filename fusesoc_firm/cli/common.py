@@ -6,13 +6,14 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
 if TYPE_CHECKING:
+    from fusesoc_firm.diagnostics import SourceRef
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.system.generator import LoadedSystem
 
@@ -66,8 +67,8 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        metavar="DIR",
-        help="a folder with message definitions; may be given more than once",
+        metavar="PLACE",
+        help="a folder or bag with message definitions; may be given more than once",
     )
     parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
 
@@ -85,14 +86,22 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
 
     Unless it `needs_sources`, those of its accelerators may be missing.
     """
-    from fusesoc_firm.message.library import libraries
-    from fusesoc_firm.system.generator import load_system
+    from fusesoc_firm.system.beside import load_beside
 
-    known = libraries(arguments.path, os.environ, arguments.distro)
-    loaded = load_system(arguments.spec, known, needs_sources=needs_sources)
+    loaded = load_beside(
+        arguments.spec, arguments.path, arguments.distro, needs_sources=needs_sources, core_folders=core_folders
+    )
     for warning in loaded.warnings:
         print(warning, file=sys.stderr)
     return loaded
+
+
+def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
+    """The folders of the messages of cores that FuseSoC knows here. Raises `InputError`."""
+    # FuseSoC is imported for those alone.
+    from fusesoc_firm.cli.project import message_folders
+
+    return message_folders(names) if names else ()
 
 
 def add_picture(parser: argparse.ArgumentParser) -> None:

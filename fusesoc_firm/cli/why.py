@@ -36,7 +36,7 @@ def _tell_why(arguments: argparse.Namespace) -> None:
         fail(f"there is no file {path}", hint="after its name stands a line, or nothing: FILE:LINE")
     call, name = call_file(path)
     command_ = _generator(call)
-    request = read_request(command_, call, GENERATORS[command_].parameters, is_this_run=False)
+    request = read_request(command_, call, GENERATORS[command_], is_this_run=False)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

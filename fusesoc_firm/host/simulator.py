@@ -29,10 +29,10 @@ import yaml
 from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.files import write_if_changed
 from fusesoc_firm.library_path import library_root
-from fusesoc_firm.message.library import libraries
 from fusesoc_firm.store_files import default_root
+from fusesoc_firm.system.beside import core_content, core_of, load_beside
 from fusesoc_firm.system.core_file import CoreOptions, new_core
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.generator import CoreFolders, no_core_folders
 from fusesoc_firm.tools import missing, simulation_programs, ways
 
 GHDL, VERILATOR = "ghdl", "verilator"
@@ -51,6 +51,7 @@ class CoreSources:
     distro: str = ""
     depend: Sequence[str] = ()
     environment: Sequence[Path] = ()
+    core_folders: CoreFolders = no_core_folders
 
 
 @dataclass(frozen=True)
@@ -107,33 +108,14 @@ def build_simulator(
         return BuiltSimulator(tool, work, tuple(_words(work, tool)))
 
 
-def core_of(spec: Path) -> Path | None:
-    """The core beside a specification that makes a system of it and can simulate it; None if there is none."""
-    return next((path for path in sorted(spec.parent.glob("*.core")) if _names(path, spec)), None)
-
-
-def _names(core: Path, spec: Path) -> bool:
-    """Whether a core makes a system of the specification."""
-    parameters = _content(core).get("generate", {}).get("system", {}).get("parameters", {})
-    return bool(parameters.get("spec")) and (core.parent / str(parameters["spec"])).resolve() == spec
-
-
-def _content(core: Path) -> Any:
-    """A core's description; empty if it is none."""
-    try:
-        content = yaml.safe_load(core.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
-        return content if isinstance(content["generate"]["system"]["parameters"], dict) else {}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
-        return {}
-
-
 def _write_core(spec: Path, folder: Path, sources: CoreSources) -> Path:
     """A core for a specification that has none."""
     paths = [path.absolute() for path in sources.paths]
-    system = load_system(spec, libraries(paths, os.environ, sources.distro or None)).system
+    loaded = load_beside(spec, paths, sources.distro or None, core_folders=sources.core_folders)
+    system = loaded.system
     options = CoreOptions(
         name=f"robot:live:{system.name}:0",
-        depend=sources.depend,
+        depend=[*sources.depend, *loaded.specification.message_cores],
         environment=[str(path.absolute()) for path in sources.environment],
         paths=list(map(str, paths)),
         distro=sources.distro,
@@ -169,7 +151,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 def _build(spec: Path, core: Path, tool: str, work: Path) -> None:
     """Have FuseSoC set the target up, and make what it says."""
-    content, target = _content(core), _TARGETS[tool]
+    content, target = core_content(core), _TARGETS[tool]
     if target not in content.get("targets", {}):
         fail(f"{core} has no target '{target}'", hint=f"firm system core {spec}")
     made_with = content["targets"][target].get("flow_options", {}).get("tool", tool)

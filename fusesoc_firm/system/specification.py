@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.message.model import MIDDLEWARES
 from fusesoc_firm.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.yaml_sections import Section, key, read
@@ -50,6 +50,8 @@ AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
+# `vendor:library:name`, maybe with a version.
+_CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
 
 # Tools read the names of sources in makefiles, scripts and command lines, where most of them quote nothing.
 _SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}")
@@ -207,10 +209,24 @@ class Specification(Section):
     """The whole file."""
 
     project: Project = key("what holds for the whole system", form="section", section=Project, is_required=True)
+    paths: tuple[Text, ...] = key(
+        "folders, bags and cores with message definitions, relative to the file, searched before all others",
+        form="texts",
+    )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
     # The file stops being YAML somewhere, so there may be more of everything.
     is_cut: bool = False
+
+    @property
+    def message_cores(self) -> dict[str, SourceRef | None]:
+        """The cores among `paths`, each with its place."""
+        return {str(item): item.source for item in self.paths if is_core(item)}
+
+
+def is_core(path: str) -> bool:
+    """Whether an item of `paths` is the name of a core."""
+    return _CORE.fullmatch(path) is not None
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:

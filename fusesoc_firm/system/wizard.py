@@ -29,11 +29,12 @@ from fusesoc_firm.system.specification import (
     Outgoing,
     Project,
     Specification,
+    is_core,
 )
 from fusesoc_firm.yaml_sections import Key, Section, keys_of
 
-# Names that answers of a key are taken from, by what they are.
-MessageNames = Callable[[], Sequence[str]]
+# All messages that can be named, by the specification's `paths`.
+MessageNames = Callable[[Sequence[str]], Sequence[str]]
 
 _YES, _NO = "yes", "no"
 
@@ -44,7 +45,7 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
     is_new = not path.exists()
     before = "" if is_new else path.read_text(encoding="utf-8")
     content = CommentedMap() if is_new else _style(before).load(before)
-    _Wizard(asker, message_names, content, is_new).run()
+    _Wizard(asker, message_names, content, is_new, path.parent).run()
     text = io.StringIO()
     _style(before).dump(content, text)
     write(path, text.getvalue())
@@ -91,6 +92,7 @@ class _Wizard:
     message_names: MessageNames
     content: Any
     is_new: bool
+    folder: Path
     explained: set[str] = field(default_factory=set)
 
     def run(self) -> None:
@@ -98,11 +100,24 @@ class _Wizard:
         if self.is_new:
             self.asker.tell("project")
             self.content["project"] = self._section(Project)
+            self._ask_paths()
         for name in ("accelerators", "blocks"):
             if added := self._sections(name, _key(Specification, name)):
                 self.content.setdefault(name, []).extend(added)
         if not self.is_new:
             self._connect_blocks()
+
+    def _ask_paths(self) -> None:
+        """Where the messages of a new specification are defined, which decides how messages are completed."""
+        entry = _key(Specification, "paths")
+        question = Question("paths", entry.meaning, check=self._fault_of_path)
+        if found := self._texts(question):
+            self.content["paths"] = found
+            self._explain(self.content, "paths", entry)
+
+    def _fault_of_path(self, answer: str) -> str | None:
+        is_there = is_core(answer) or (self.folder / answer).exists()
+        return None if is_there else f"'{answer}' is neither a folder, a bag nor a core"
 
     def _connect_blocks(self) -> None:
         """Further connections from blocks that the file has."""
@@ -166,7 +181,7 @@ class _Wizard:
     def _texts(self, question: Question) -> Any:
         """One answer after the other, until an empty one."""
         found: list[str] = []
-        further = Question(f"one more of {question.name}", question.meaning, question.words)
+        further = Question(f"one more of {question.name}", question.meaning, question.words, check=question.check)
         while answer := self.asker.ask(further if found else question):
             found.append(answer)
         return _words(found)
@@ -178,7 +193,8 @@ class _Wizard:
         if entry.choices:
             return [str(choice) for choice in entry.choices]
         if name == "message":
-            return self.message_names()
+            paths = self.content.get("paths") or []
+            return self.message_names([paths] if isinstance(paths, str) else [str(item) for item in paths])
         if section is Block and name == "type":
             return self._names("accelerators")
         if section is Block and name == "clock":

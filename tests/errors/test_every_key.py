@@ -17,8 +17,7 @@ import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import nearest
-from fusesoc_firm.message import library
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.specification import Specification
 from fusesoc_firm.yaml_sections import Section, keys_of
@@ -107,7 +106,7 @@ def checker(
     spec: Path = request.param
     folder = tmp_path / spec.parent.name
     shutil.copytree(spec.parent, folder)
-    make = library.libraries
+    make = libraries
     known: dict[RosVersion, MessageLibrary] = {}
 
     def shared(paths: Sequence[Path], _: Mapping[str, str] | None, store: str | None) -> object:
@@ -116,7 +115,7 @@ def checker(
             known.update(make(paths, None, store))
         return known
 
-    monkeypatch.setattr(library, "libraries", shared)
+    monkeypatch.setattr("fusesoc_firm.system.beside.libraries", shared)
     own = [path for path in (folder / "msg", folder / "franka_msgs") if path.is_dir()]
     return Checker(folder / spec.name, own, capsys)
 

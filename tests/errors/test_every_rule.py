@@ -29,7 +29,8 @@ NOTING_METHODS, NOTING_FUNCTIONS = ("error", "_error", "take"), ("fail", "InputE
 OTHER_FAULTS = {
     ("system/diagram.py", "diagram"): "a program or package that is not installed",
     ("message/library.py", "libraries"): "an option of the command line",
-    ("message/library.py", "_check_folders"): "an option of the command line",
+    ("message/library.py", "_bag"): "the file of a bag",
+    ("message/library.py", "_check_equal"): "the file of a bag",
     ("system/board.py", "read_board"): "the file of a board",
     ("system/board.py", "_check_pins"): "the file of a board",
     ("system/board.py", "_check_streams"): "the file of a board",

@@ -15,9 +15,10 @@ from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.bursts import BurstJoiner
-from fusesoc_firm.host.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator, core_of
+from fusesoc_firm.host.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator
 from fusesoc_firm.host.transport.simulator import Simulator
 from fusesoc_firm.host.transport.transport import Burst
+from fusesoc_firm.system.beside import core_of
 from tests.house.test_main_job import ROOT, run
 
 SPECS = ROOT / "specs"

@@ -30,7 +30,7 @@ def build(folder: Path, application: str = "quat2euler", **parameters: object) -
     generator = "far" if "spec" in parameters or not parameters else "firm"
     given = given if generator == "far" else parameters
     root, vlnv = SPECS / application, f"robot:sys:{application}-system:{__version__}"
-    request = make_request(generator, Call(vlnv, root, given), GENERATORS[generator].parameters, no_messages)
+    request = make_request(generator, Call(vlnv, root, given), GENERATORS[generator], no_messages)
     made = folder / "generator_cache" / f"robot_sys_{application}-system_{__version__}-1234"
     for name, content in as_files(GENERATORS[generator].generate(request), request).items():
         (made / name).parent.mkdir(parents=True, exist_ok=True)
@@ -62,7 +62,7 @@ def why(capsys: Captured, path: Path, text: str) -> dict[str, list[str]]:
 def test_every_line_is_that_of_the_template_named(application: str) -> None:
     """The rest of a template's line, without its tags, stands on the line that is made of it."""
     call = Call(f"a:b:{application}-x:1", SPECS / application, {"spec": f"{application}.yaml"})
-    request = make_request("far", call, GENERATORS["far"].parameters, no_messages)
+    request = make_request("far", call, GENERATORS["far"], no_messages)
     with recorded() as renderings:
         GENERATORS["far"].generate(request)
     for text, rendering in renderings.items():
