@@ -62,8 +62,7 @@ class Diagnostic:
 
     def __str__(self) -> str:
         place = f"{self.source}: " if self.source else ""
-        word = "warning" if self.is_warning else "error"
-        lines = [f"{place}{word}: {_readable(self.message)}"]
+        lines = [f"{place}{'warning' if self.is_warning else 'error'}: {_readable(self.message)}"]
         if self.source and (excerpt := self.source.excerpt()):
             lines.append(excerpt)
         if self.hint:
