@@ -1,4 +1,4 @@
-"""For all tests: a store of their own, this Python first on PATH, busy machines, callers that ignore Ctrl-C, and tests that wait for ever.
+"""For all tests: a store of their own, this Python first on PATH, busy machines, an ignored Ctrl-C, and endless waits.
 
 How long something takes says nothing on a busy machine, so no test is ended for the time it takes. But it fails when it
 and all processes below it have waited for a minute (`waiting_limit`) without doing anything.
