@@ -6,6 +6,7 @@ Of Python's library no more is imported than a file needs, as an answer out of t
 from __future__ import annotations
 
 import os
+import stat
 from contextlib import suppress
 
 TEMPORARY = ".new-"
@@ -55,9 +56,15 @@ def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes | None:
-    """The content of a file; None if there is none that can be read."""
+    """The content of a regular file; None if there is none that can be read. A pipe is not waited for."""
     try:
-        with open(path, "rb") as file:
-            return file.read()
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            if not stat.S_ISREG(os.fstat(handle).st_mode):
+                return None
+            with open(handle, "rb", closefd=False) as file:
+                return file.read()
+        finally:
+            os.close(handle)
     except OSError:
         return None

@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail
@@ -65,9 +66,9 @@ def source_fault(text: str) -> tuple[str, str] | None:
     return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not take as a file", legal)
 
 
-_FIELDS = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
-_INCLUDE = {**_FIELDS, "meaning": "only these fields, such as pose.position, each with all below it"}
-_EXCLUDE = {**_FIELDS, "meaning": "none of these fields"}
+_FIELDS: dict[str, Any] = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
+_INCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "only these fields, such as pose.position, each with all below it"}
+_EXCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "none of these fields"}
 _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
 
@@ -184,7 +185,8 @@ class Block(Section):
     mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
     message: Text | None = key("a converter's message", only_of=CONVERTER)
     topic: Text | None = key(
-        "the topic of a converter's messages, such as /arm/left; / and its name unless given", only_of=CONVERTER
+        "the topic of a converter's messages, such as /arm/left or left; the block's name unless given",
+        only_of=CONVERTER,
     )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)

@@ -120,7 +120,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Project:
     kernel, wise = f"HLS {HOSTILE[0]}", f"SW {HOSTILE[2]}"
     copy = {"name": "copy", "type": "VHDL", "sources": "copy.vhd", "interface": sides("geometry_msgs/Point")}
     pins = [{"name": "lamp", "direction": "out"}]
-    specification = {
+    specification: dict[str, Any] = {
         "project": {
             "name": f"robot {HOSTILE[4]}",
             "fpgaPart": HOSTILE[0],

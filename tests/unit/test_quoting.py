@@ -78,7 +78,8 @@ def run(command: Sequence[str | Path], folder: Path, text: str | None = None) ->
     )
     assert done.returncode == 0, done.stderr.decode()
     assert not (folder / "canary").exists()
-    return done.stdout
+    printed: bytes = done.stdout
+    return printed
 
 
 @pytest.mark.parametrize("pieces", [PIECES, (*PIECES, *LINE_ENDS)], ids=["printable", "all"])
