@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from operator import eq, ge, gt, le, lt, ne
 
 from fusesoc_firm.netlist.model import Instance, Modules
@@ -26,42 +26,29 @@ _COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
     "$sge": ge,
 }
 _SHIFTS = {("$lsl", "$lsr"): "$rol", ("$lsr", "$lsl"): "$ror"}
-_SWAPPED = frozenset(
-    {
-        "NUMERIC_STD_SUB_INT_SGN",
-        "STD_LOGIC_ARITH_SUB_INT_SGN_SGN",
-        "STD_LOGIC_ARITH_SUB_INT_SGN_SLV",
-        "STD_LOGIC_SIGNED_SUB_INT_SLV",
-    }
-)
-_RESIZED = frozenset({"NUMERIC_STD_RESIZE_SGN_NAT", "NUMERIC_STD_RESIZE_SGN_SGN"})
-# The functions of IEEE's packages whose calls must be known.
-FUNCTIONS = _SWAPPED | _RESIZED
 
 
-def need_sources(modules: Modules) -> bool:
-    """Whether a netlist has gates that only the sources tell the meaning of."""
-    return any(gate.kind in {"$sub", "$strunc"} for gate in _gates(modules))
+def places_of(modules: Modules, kind: str) -> set[str]:
+    """The places in the VHDL, `file:line:column`, of the gates of a kind."""
+    return {gate.location for module in modules.values() for gate in module.instances if gate.kind == kind} - {""}
 
 
-def correct(modules: Modules, called: Mapping[str, str]) -> None:
-    """Correct a netlist in place; `called` are those of `FUNCTIONS` by the places of their calls."""
+def correct(modules: Modules, swapped: Collection[str], resized: Collection[str]) -> None:
+    """Correct a netlist in place.
+
+    `swapped` are the places of each `integer - signed`, `resized` those of the calls of `resize`.
+    """
     for module in modules.values():
         drivers = {net.number: gate for gate in module.instances for net in gate.outputs}
         for gate in module.instances:
-            function = called.get(gate.location, "")
             if gate.kind == "$or":
                 _correct_rotation(gate, drivers)
             elif gate.kind in _COMPARISONS:
                 _correct_comparison(gate, drivers)
-            elif gate.kind == "$sub" and function in _SWAPPED:
+            elif gate.kind == "$sub" and gate.location in swapped:
                 gate.inputs.reverse()
-            elif gate.kind == "$strunc" and function in _RESIZED:
+            elif gate.kind == "$strunc" and gate.location in resized:
                 gate.kind = "$sresize"
-
-
-def _gates(modules: Modules) -> Iterable[Instance]:
-    return (gate for module in modules.values() for gate in module.instances)
 
 
 def _driver(gate: Instance, index: int, drivers: Mapping[int, Instance]) -> Instance | None:

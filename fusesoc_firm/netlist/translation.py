@@ -11,16 +11,17 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.launcher import starts_everything
 from fusesoc_firm.netlist import dump, verilog
-from fusesoc_firm.netlist.corrections import FUNCTIONS, correct, need_sources
+from fusesoc_firm.netlist.corrections import correct, places_of
 from fusesoc_firm.netlist.model import LostRegisterError, Module, Modules, NetlistError
-from fusesoc_firm.netlist.sources import calls
+from fusesoc_firm.netlist.sources import is_resize, of_signed, subtractions_from_integers
 from fusesoc_firm.tools import explanation, missing
 
 _MODULE = r"^[ \t]*module\s+({name})\b"
@@ -131,7 +132,8 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     components = _components(modules, ghdl.translation.verilog)
     # The dump has all but these.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
-    correct(modules, ghdl.called() if need_sources(modules) else {})
+    resized = {place for place in places_of(modules, "$strunc") if is_resize(place)}
+    correct(modules, ghdl.swapped(places_of(modules, "$sub")), resized)
     return _HEADER + verilog.write(modules, generics) + _FOOTER, _other_warnings(warnings)
 
 
@@ -160,13 +162,25 @@ class _Ghdl:
             raise NetlistError(_errors(printed + done.stderr))
         return printed, done.stderr
 
-    def called(self) -> dict[str, str]:
-        """Functions of IEEE's packages that GHDL has wrong, by the places of their calls in the sources."""
-        found: dict[str, str] = {}
-        for library, files in self.translation.libraries.items():
-            if files:
-                found |= calls(self.run("--file-to-xml", f"--work={library}", *files)[0], FUNCTIONS)
+    def swapped(self, places: Iterable[str]) -> set[str]:
+        """Among places of subtractions, those of `integer - signed`."""
+        files = {place.rsplit(":", 2)[0] for place in places}
+        found: set[str] = set()
+        for library, names in self.translation.libraries.items():
+            analyse = partial(self.messages, "-s", f"--work={library}")
+            for file in sorted(files & set(of_signed(names))):
+                (index,) = self.folder.glob(f"{library}-obj*.cf")
+                text = index.read_text(encoding="latin-1")
+                found.update(subtractions_from_integers(file, text, analyse, self.folder))
         return found
+
+    def messages(self, command: str, *arguments: str | Path) -> str:
+        """The errors that it reports; none if it succeeds."""
+        try:
+            self.run(command, *map(str, arguments))
+        except NetlistError as error:
+            return str(error)
+        return ""
 
     def synthesise(self, language: str) -> tuple[str, str]:
         """The netlist, and what GHDL says about it."""

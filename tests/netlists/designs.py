@@ -19,6 +19,8 @@ INPUT = OUTPUT = 128
 # Widths at which words of 32 bits begin or end.
 _EDGES = (1, 2, 31, 32, 33, 63, 64, 65, 95, 96, 97, 127, 128)
 _LARGEST_INTEGER = 2**31 - 1
+# Left out: decimal numbers that GHDL 2.0 takes for too large.
+_REFUSED_NUMBERS = range(2147483600, 2147483640)
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,8 @@ class Expressions:
         if _is_lost(value, width):
             value |= 1
         signed = value - (value >> width - 1 << width)
+        if abs(signed) in _REFUSED_NUMBERS or value in _REFUSED_NUMBERS:
+            value = signed = 1
         if kind == "signed" and -(2**31) < signed < 2**31 and self.chance(0.4):
             return f"to_signed({signed}, {width})"
         if kind == "unsigned" and value < 2**31 and self.chance(0.4):
@@ -233,7 +237,7 @@ class Expressions:
         value = self.pattern(bits)
         if kind == "signed":
             value -= value >> bits - 1 << bits
-        return value
+        return 0 if abs(value) in _REFUSED_NUMBERS else value
 
     def _product(self, scope: Scope, kind: str, width: int, depth: int) -> str:
         if width == 1:
@@ -385,7 +389,7 @@ class Expressions:
                 found = Integer(f"(-({left.text}))", -left.high, -left.low)
             case _:
                 found = self._divided(left, right, operator)
-        fits = found.low >= -_LARGEST_INTEGER and found.high <= _LARGEST_INTEGER
+        fits = all(abs(end) <= _LARGEST_INTEGER and abs(end) not in _REFUSED_NUMBERS for end in (found.low, found.high))
         return found if fits else left
 
     def _divided(self, left: Integer, right: Integer, operator: str) -> Integer:
@@ -938,8 +942,8 @@ class _Maker(Expressions):
             f"end function {name};",
         ]
         self.signal(result)
-        given = self.typed(self.scope, kind, argument.width, 2)
-        self.statements.append(f"{result.name} <= {name}({given}, {self.below(self.scope, 8, 1)});")
+        given = self.moving(self.scope, kind, argument.width, 2)
+        self.statements.append(f"{result.name} <= {name}({kind}'({given}), {self.below(self.scope, 8, 1)});")
         self.scope.vectors.append(result)
 
     def _enumeration(self) -> None:

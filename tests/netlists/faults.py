@@ -50,6 +50,7 @@ FAULTS = [
     _design("long", 80, 'signed(x(79 downto 0)) + signed\'(X"F0123456789ABCDEF012")'),
     _design("negative", 80, "signed(x(79 downto 0)) - (-3)"),
     _design("subtracted", 16, "100 - s"),
+    _design("subtracted_within", 16, '5 - shift_left("-"(100, s) - (3 - (7 - s)), 1)'),
     _design("rotated", 16, "rotate_left(u, to_integer(unsigned(x(22 downto 16))))"),
     _design("rotated_right", 7, "rotate_right(u(6 downto 0), to_integer(unsigned(x(22 downto 16))))"),
     _design("narrowed", 5, "resize(s, 5)"),
@@ -140,3 +141,4 @@ WITHOUT_MEMORIES = _design(
     f'{_WORDS} signal m : words := (X"01", X"12", X"23", X"34");',
     _clocked(f"if x(0) = '1' then m({_PLACE}) <= x(27 downto 20); end if;"),
 )
+
