@@ -6,19 +6,24 @@ translation where it means that logic is lost.
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 import re
 import shutil
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.launcher import starts_everything
-from fusesoc_firm.netlist import dump, verilog
+from fusesoc_firm.netlist import dump, lost_constants, verilog
 from fusesoc_firm.netlist.corrections import correct, places_of
 from fusesoc_firm.netlist.model import LostRegisterError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.sources import is_resize, of_signed, subtractions_from_integers
@@ -37,6 +42,9 @@ _HEADER = "\n".join(
 _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 # What GHDL says of logic that is not there afterwards; the words are those of its sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
+
+_GULP = 1 << 20
+_PAUSE = 0.005
 
 # GHDL's option for that; it loses registers of which it wanted to make memories.
 _NO_MEMORIES = "-dm"
@@ -132,6 +140,7 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     components = _components(modules, ghdl.translation.verilog)
     # The dump has all but these.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
+    lost_constants.check(modules, chain.from_iterable(ghdl.translation.libraries.values()))
     resized = {place for place in places_of(modules, "$strunc") if is_resize(place)}
     correct(modules, ghdl.swapped(places_of(modules, "$sub")), resized)
     return _HEADER + verilog.write(modules, generics) + _FOOTER, _other_warnings(warnings)
@@ -147,20 +156,18 @@ class _Ghdl:
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
         """What it prints on its two streams."""
         options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
-        # Through a file: GHDL writes a word at a time, which a pipe makes slow.
-        with tempfile.TemporaryFile("w+", encoding="latin-1") as output:
-            done = subprocess.run(
-                ["ghdl", command, *options, *arguments],
-                stdout=output,
-                stderr=subprocess.PIPE,
-                encoding="latin-1",
-                check=False,
-            )
-            output.seek(0)
-            printed = output.read()
-        if done.returncode:
-            raise NetlistError(_errors(printed + done.stderr))
-        return printed, done.stderr
+        with (
+            tempfile.TemporaryFile() as errors,
+            subprocess.Popen(["ghdl", command, *options, *arguments], stdout=subprocess.PIPE, stderr=errors) as process,
+        ):
+            assert process.stdout
+            printed = _gulps(process.stdout.fileno()).decode("latin-1")
+            process.wait()
+            errors.seek(0)
+            said = errors.read().decode("latin-1")
+        if process.returncode:
+            raise NetlistError(_errors(printed + said))
+        return printed, said
 
     def swapped(self, places: Iterable[str]) -> set[str]:
         """Among places of subtractions, those of `integer - signed`."""
@@ -189,6 +196,17 @@ class _Ghdl:
         return self.run(
             "--synth", library, f"--out={language}", *self.translation.options, *generics, self.translation.unit
         )
+
+
+def _gulps(pipe: int) -> bytes:
+    """All that comes through a pipe. GHDL writes a word at a time; to be woken for each takes longer than its work."""
+    with suppress(OSError):
+        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _GULP)
+    parts = []
+    while part := os.read(pipe, _GULP):
+        parts.append(part)
+        time.sleep(_PAUSE)
+    return b"".join(parts)
 
 
 def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:

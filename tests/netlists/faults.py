@@ -48,6 +48,7 @@ FAULTS = [
     _design("shifted", 16, "shift_right(s, to_integer(unsigned(x(20 downto 16))))"),
     _design("absolute", 16, "abs s"),
     _design("long", 80, 'signed(x(79 downto 0)) + signed\'(X"F0123456789ABCDEF012")'),
+    _design("long_zero", 64, 'signed(x(79 downto 16)) xor signed\'(X"0000000000000000")'),
     _design("negative", 80, "signed(x(79 downto 0)) - (-3)"),
     _design("subtracted", 16, "100 - s"),
     _design("subtracted_within", 16, '5 - shift_left("-"(100, s) - (3 - (7 - s)), 1)'),
@@ -142,3 +143,22 @@ WITHOUT_MEMORIES = _design(
     _clocked(f"if x(0) = '1' then m({_PLACE}) <= x(27 downto 20); end if;"),
 )
 
+# Constants that are zero in GHDL's netlist, so that there is none.
+LOST = [
+    _design("digits", 64, 'signed(x(63 downto 0)) xor signed\'(X"8000000000000000")'),
+    _design("named", 96, "signed(x(95 downto 0)) xor K", 'constant K : signed := X"000100000000000000000000";'),
+    _design(
+        "aggregate",
+        64,
+        "r",
+        "signal r : std_logic_vector(63 downto 0) := (63 => '1', others => '0');",
+        _clocked("r <= x(63 downto 0);"),
+    ),
+    _design(
+        "reset",
+        64,
+        "r",
+        "signal r : std_logic_vector(63 downto 0);",
+        _clocked("if rst = '1' then r <= (63 downto 62 => '1', others => '0'); else r <= x(63 downto 0); end if;"),
+    ),
+]

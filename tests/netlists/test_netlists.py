@@ -10,7 +10,7 @@ import pytest
 from tests.netlists import comparison, simulators
 from tests.netlists.comparison import differences
 from tests.netlists.designs import Design
-from tests.netlists.faults import FAULTS, WITHOUT_MEMORIES
+from tests.netlists.faults import FAULTS, LOST, WITHOUT_MEMORIES
 
 SEED = 20260214
 DESIGNS = 200
@@ -37,6 +37,13 @@ def test_a_register_that_ghdl_takes_for_a_memory_is_not_lost(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert not differences([WITHOUT_MEMORIES], ["icarus"])
+
+
+def test_a_constant_that_ghdl_loses_is_refused() -> None:
+    found = {item.design.name: item.message for item in differences(LOST, ["icarus"])}
+    assert found.keys() == {item.name for item in LOST}
+    for message in found.values():
+        assert re.match(r"\S+\.vhd:\d+:\d+: error: GHDL makes zero of a constant of (64|96) bits", message)
 
 
 @pytest.mark.parametrize("judge", ["icarus", "yosys"])
