@@ -704,7 +704,7 @@ class _Maker(Expressions):
 
     def uniform(self, kind: str, width: int) -> str:
         """A constant whose bits are equal."""
-        return f"{kind}'(\"{self.random.choice('01') * width}\")"
+        return f'{kind}\'("{self.random.choice("01") * width}")'
 
     def _if(self, scope: Scope, targets: list[Target], depth: int) -> list[str]:
         lines = [f"if {self.condition(scope, 2)} then", *self._indented(scope, targets, depth)]
