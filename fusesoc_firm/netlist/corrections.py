@@ -8,10 +8,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterator, Mapping
 from operator import eq, ge, gt, le, lt, ne
 
 from fusesoc_firm.netlist.model import Instance, Modules
+from fusesoc_firm.netlist.verilog import constant
 
 _COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
     "$eq": eq,
@@ -49,6 +51,40 @@ def correct(modules: Modules, swapped: Collection[str], resized: Collection[str]
                 gate.inputs.reverse()
             elif gate.kind == "$strunc" and gate.location in resized:
                 gate.kind = "$sresize"
+
+
+def doubts(modules: Modules) -> list[str]:
+    """Warnings of constants whose bits GHDL may have mixed up.
+
+    Where one branch assigns a constant to all of a signal and another assigns parts of it, GHDL 2.0 takes the parts of
+    the constant from the wrong end. The gates are those of a constant that was assigned in parts.
+    """
+    found: dict[str, None] = {}
+    for module in modules.values():
+        drivers = {net.number: gate for gate in module.instances for net in gate.outputs}
+        for gate in module.instances:
+            if gate.kind.startswith("$concat"):
+                found |= dict.fromkeys(_mixed(gate, drivers))
+    return [
+        f"{place}: warning: if one branch assigns a constant to all of a signal, and another assigns parts of it, GHDL "
+        "mixes up the constant's bits; assign it in the same parts"
+        for place in found
+    ]
+
+
+def _mixed(parts: Instance, drivers: Mapping[int, Instance]) -> Iterator[str]:
+    """The places of selections that have different constants for several of these parts on one side."""
+    constants: dict[tuple[str, int, int], list[str]] = defaultdict(list)
+    for index in range(len(parts.inputs)):
+        selection = _driver(parts, index, drivers)
+        if selection and selection.kind == "$mux2":
+            for side in (1, 2):
+                source = _driver(selection, side, drivers)
+                if source and (bits := constant(source)) is not None:
+                    constants[selection.location, selection.input(0).number, side].append(bits)
+    for (place, _, _), bits in constants.items():
+        if len(bits) > 1 and len(set("".join(bits))) > 1:
+            yield place
 
 
 def _driver(gate: Instance, index: int, drivers: Mapping[int, Instance]) -> Instance | None:

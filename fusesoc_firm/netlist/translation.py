@@ -24,7 +24,7 @@ from typing import Any
 
 from fusesoc_firm.launcher import starts_everything
 from fusesoc_firm.netlist import dump, lost_constants, verilog
-from fusesoc_firm.netlist.corrections import correct, places_of
+from fusesoc_firm.netlist.corrections import correct, doubts, places_of
 from fusesoc_firm.netlist.model import LostRegisterError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.sources import is_resize, of_signed, subtractions_from_integers
 from fusesoc_firm.tools import explanation, missing
@@ -143,7 +143,9 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     lost_constants.check(modules, chain.from_iterable(ghdl.translation.libraries.values()))
     resized = {place for place in places_of(modules, "$strunc") if is_resize(place)}
     correct(modules, ghdl.swapped(places_of(modules, "$sub")), resized)
-    return _HEADER + verilog.write(modules, generics) + _FOOTER, _other_warnings(warnings)
+    return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(
+        filter(None, [_other_warnings(warnings), *doubts(modules)])
+    )
 
 
 @dataclass(frozen=True)

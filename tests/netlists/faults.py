@@ -162,3 +162,12 @@ LOST = [
         _clocked("if rst = '1' then r <= (63 downto 62 => '1', others => '0'); else r <= x(63 downto 0); end if;"),
     ),
 ]
+
+# A register whose reset value GHDL's netlist has wrong.
+MIXED = _design(
+    "mixed",
+    8,
+    "r",
+    "signal r : std_logic_vector(7 downto 0);",
+    _clocked("if rst = '1' then r <= X\"82\"; else r(7 downto 3) <= x(7 downto 3); end if;"),
+)
