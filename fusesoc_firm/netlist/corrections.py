@@ -82,8 +82,8 @@ def _mixed(parts: Instance, drivers: Mapping[int, Instance]) -> Iterator[str]:
                 source = _driver(selection, side, drivers)
                 if source and (bits := constant(source)) is not None:
                     constants[selection.location, selection.input(0).number, side].append(bits)
-    for (place, _, _), bits in constants.items():
-        if len(bits) > 1 and len(set("".join(bits))) > 1:
+    for (place, _, _), found in constants.items():
+        if len(found) > 1 and len(set("".join(found))) > 1:
             yield place
 
 
