@@ -12,6 +12,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
+# Of a file that is none of ours at all, each line is a fault.
+_MOST_SHOWN = 200
+
 
 @dataclass(frozen=True)
 class SourceRef:
@@ -66,7 +69,10 @@ class InputError(Exception):
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__("\n".join(str(d) for d in self.diagnostics))
+        lines = [str(diagnostic) for diagnostic in self.diagnostics[:_MOST_SHOWN]]
+        if len(self.diagnostics) > _MOST_SHOWN:
+            lines.append(f"and {len(self.diagnostics) - _MOST_SHOWN} more")
+        super().__init__("\n".join(lines))
 
 
 @dataclass
@@ -74,11 +80,13 @@ class Diagnostics:
     """Collects faults so that a user sees all of them at once."""
 
     found: list[Diagnostic] = field(default_factory=list)
+    _known: set[Diagnostic] = field(default_factory=set, repr=False)
 
     def error(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
         """Note a fault and go on; the same fault at the same place is noted once."""
         diagnostic = Diagnostic(message, source, hint)
-        if diagnostic not in self.found:
+        if diagnostic not in self._known:
+            self._known.add(diagnostic)
             self.found.append(diagnostic)
 
     def take(self, error: InputError, source: SourceRef | None) -> None:

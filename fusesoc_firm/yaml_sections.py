@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, closest, nearest
-from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind
+from fusesoc_firm.yaml_text import Text, YamlText, integer, is_null, items, kind
 
 S = TypeVar("S", bound="Section")
 
@@ -170,7 +171,9 @@ class _Reader:
 
     def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
-            return int(yaml.safe_load(node.value))
+            # The tag may have been written there, of whatever.
+            with suppress(ValueError):
+                return integer(node.value)
         self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
         return None
 

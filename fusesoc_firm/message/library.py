@@ -14,6 +14,8 @@ from functools import cached_property
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail, nearest
+from fusesoc_firm.files import read_regular
+from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files
 from fusesoc_firm.message.middleware import known_suffixes, middleware_of
@@ -66,6 +68,7 @@ class MessageLibrary:
             self._add(found[folder])
         # A definition or None, with the faults of its text: a faulty file is reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
+        self._extents: dict[MessageName, Extent] = {}
 
     def names(self) -> list[MessageName]:
         """Every message there is, sorted."""
@@ -108,7 +111,8 @@ class MessageLibrary:
     def closure(self, name: MessageName, source: SourceRef | None = None) -> dict[MessageName, MessageDefinition]:
         """The message and all messages within it, each behind those that it holds itself.
 
-        Raises `InputError` with every fault in every file, every unknown message and every cycle.
+        Raises `InputError` with every fault in every file, every unknown message and every cycle, and for a message
+        beyond the bounds of `bounds`.
         """
         return self.joint_closure((name,), source)
 
@@ -121,6 +125,7 @@ class MessageLibrary:
         for name in names:
             self._collect(name, source, (), closure, diagnostics)
         diagnostics.raise_if_any()
+        check_extents(closure, self._extents)
         return closure
 
     def origin(self, name: MessageName) -> str:
@@ -130,7 +135,7 @@ class MessageLibrary:
     def content(self, name: MessageName) -> bytes:
         """What defines a known message, as it stands: a file's bytes, or the text that a distribution has."""
         if name in self._sources:
-            return self._sources[name].paths[0].read_bytes()
+            return read_regular(self._sources[name].paths[0], MOST_FILE_BYTES)
         return self._store.text(name).encode()
 
     def files(self, names: Iterable[MessageName]) -> list[Path]:
@@ -190,6 +195,10 @@ class MessageLibrary:
             return
         if name in closure:
             return
+        if len(above) == MOST_LEVELS:
+            hint = f"legal here: up to {MOST_LEVELS} levels of messages within messages"
+            diagnostics.error(f"'{above[0]}' holds '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
+            return
         definition = self.find(name, diagnostics, source)
         if definition is None:
             return
@@ -234,11 +243,18 @@ def libraries(
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
-    """The text of the first file; it is a fault if another one differs, or if it is not UTF-8."""
-    first, *others = paths
-    data = first.read_bytes()
-    for other in others:
-        if other.read_bytes() != data:
+    """The text of the first file; it is a fault if one cannot be read, or another one differs, or is not UTF-8."""
+    contents = []
+    for path in paths:
+        try:
+            contents.append(read_regular(path, MOST_FILE_BYTES))
+        except OSError as error:
+            faults.error(f"cannot read {path}: {error.strerror}", SourceRef(str(path), 1, 1))
+    if faults.found:
+        return ""
+    first, data = paths[0], contents[0]
+    for other, content in zip(paths, contents, strict=True):
+        if content != data:
             faults.error(f"'{name}' differs from {other}", SourceRef(str(first), 1, 1), "name the folder of one")
     try:
         return data.decode("utf-8")

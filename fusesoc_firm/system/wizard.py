@@ -26,6 +26,7 @@ from fusesoc_firm.system.specification import (
     Specification,
 )
 from fusesoc_firm.yaml_sections import Key, Section, keys_of
+from fusesoc_firm.yaml_text import read_yaml
 
 # Names that answers of a key are taken from, by what they are.
 MessageNames = Callable[[], Sequence[str]]
@@ -39,6 +40,8 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
     yaml.indent(sequence=4, offset=2)
     yaml.width = 10**6
     is_new = not path.exists()
+    if not is_new:
+        read_yaml(path)  # reports what is no YAML, at its place
     content = CommentedMap() if is_new else yaml.load(path.read_text(encoding="utf-8"))
     _Wizard(asker, message_names, content, is_new).run()
     with path.open("w", encoding="utf-8") as file:
