@@ -1,7 +1,7 @@
 """How large a message may be. It is checked on the definitions, before any work on what they mean begins.
 
 Each message within another multiplies what a few lines of text can mean. Real messages stay far below: the largest of
-5,900 that were counted have 17 levels, 1,100 fields and 4,500 bytes.
+5,900 that were counted have 17 levels, 1,982 fields and 6,049 bytes.
 """
 
 from __future__ import annotations
