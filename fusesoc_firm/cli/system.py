@@ -77,7 +77,7 @@ def add_system(commands: Any) -> None:
         actions,
         "core",
         "write the FuseSoC core of a system; of one that is there, only the targets are written anew",
-        "firm system core robot.yaml --depend robot:acc:cordic",
+        "firm system core robot.yaml --depend robot:acc:firm_cordic",
         _write_core,
     )
     _add_core_options(core)

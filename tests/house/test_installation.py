@@ -190,7 +190,7 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
         assert files[name]["core"] == "me:proj:robot-pose:1.0"
     # The run-time cores come along with the generators; the simulated host stays out of a target that is not `sim`.
     cores = {file["core"] for file in files.values()}
-    assert "robot:manager:manager:0.1.0" in cores
+    assert "robot:manager:firm_manager:0.1.0" in cores
     assert not any(core.startswith("robot:sim:") for core in cores)
 
 

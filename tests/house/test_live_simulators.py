@@ -111,7 +111,7 @@ def copy_of(application: str, folder: Path, *, has_core: bool) -> Path:
 
 def test_a_specification_without_a_core(tmp_path: Path) -> None:
     spec = copy_of("quat2euler", tmp_path, has_core=False)
-    sources = CoreSources(depend=["robot:acc:cordic", "robot:acc:float64"])
+    sources = CoreSources(depend=["robot:acc:firm_cordic", "robot:acc:firm_float64"])
     built = build_simulator(spec, build_root=tmp_path / "build", sources=sources)
     frame = quaternion()
     assert len(answers(built, [frame], (1, 8))[0]) == 1

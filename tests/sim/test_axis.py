@@ -1,4 +1,4 @@
-"""The parts of robot:axis:axis that a stream passes unchanged, and the synthesis of all of them."""
+"""The parts of robot:axis:firm_axis that a stream passes unchanged, and the synthesis of all of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The byte gearboxes of robot:axis:axis, window and packer, against the bytes that went in."""
+"""The byte gearboxes of robot:axis:firm_axis, window and packer, against the bytes that went in."""
 
 from __future__ import annotations
 

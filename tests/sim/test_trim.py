@@ -1,4 +1,4 @@
-"""The trimmer of robot:axis:axis alone: whatever a frame has, it gets the length that it announces."""
+"""The trimmer of robot:axis:firm_axis alone: whatever a frame has, it gets the length that it announces."""
 
 from __future__ import annotations
 

@@ -224,7 +224,7 @@ def test_a_lock_names_messages_cores_and_tools(project: Path, capsys: Captured) 
     assert size["sha256"] == hashlib.sha256(b"uint8 a\n").hexdigest()
     assert size["signature"].startswith("RIHS01_")
     assert lock["messages"]["geometry_msgs/Point (ROS 2)"]["source"] == "rosbags ros2_jazzy"
-    assert {"me:p:branch:1.0", "robot:axis:axis:0.1.0"} <= lock["cores"].keys()
+    assert {"me:p:branch:1.0", "robot:axis:firm_axis:0.1.0"} <= lock["cores"].keys()
     # The one is for a target that the core has not, the other is the core itself.
     assert not {"me:p:leaf:1.0", "me:p:top:1.0"} & lock["cores"].keys()
     assert lock["tools"]["fusesoc"] == {"version": version("fusesoc")}

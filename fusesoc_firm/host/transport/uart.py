@@ -1,4 +1,4 @@
-"""Hardware at a serial line (cores/board, robot:board:link): frames as they are, 8 bits, no parity, 1 stop bit.
+"""Hardware at a serial line (cores/board, robot:board:firm_link): frames as they are, 8 bits, no parity, 1 stop bit.
 
     with UartTransport("/dev/ttyUSB1") as transport:
         transport.send(pack_frame(0, payload))

@@ -67,7 +67,7 @@ def test_a_new_core_has_all_that_is_given(tmp_path: Path) -> None:
     options = CoreOptions(
         "me:robots:arm:1.0",
         "An arm",
-        ["robot:acc:cordic"],
+        ["robot:acc:firm_cordic"],
         "in.bag",
         "says.py",
         ["tb/a.vhd", "tb/b.vhd"],
@@ -76,7 +76,7 @@ def test_a_new_core_has_all_that_is_given(tmp_path: Path) -> None:
     )
     found = content(new_core(system(tmp_path), "arm.yaml", options))
     assert (found["name"], found["description"]) == ("me:robots:arm:1.0", "An arm")
-    assert found["filesets"]["base"]["depend"] == ["robot:firm:generators", "robot:acc:cordic"]
+    assert found["filesets"]["base"]["depend"] == ["robot:firm:generators", "robot:acc:firm_cordic"]
     common = {"spec": "arm.yaml", "paths": ["msg"], "distro": "noetic"}
     assert found["generate"]["system"]["parameters"] == common
     assert found["generate"]["simulation"]["parameters"] == {
