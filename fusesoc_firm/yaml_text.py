@@ -258,8 +258,8 @@ def yaml_data(text: str) -> Any:
         constructor = yaml.SafeLoader("")
         root = _composed(text, LARGE)
         return None if root is None else constructor.construct_document(root)
-    except (ValueError, TypeError, OverflowError, TooLargeError) as error:
-        # A number of thousands of digits, a date that is none, a key that is a list.
+    except (ValueError, TypeError, LookupError, OverflowError, TooLargeError) as error:
+        # A number of thousands of digits or of none, a date that is none, a key that is a list.
         raise yaml.YAMLError(str(error)) from error
 
 

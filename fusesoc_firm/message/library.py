@@ -196,8 +196,7 @@ class MessageLibrary:
         if name in closure:
             return
         if len(above) == MOST_LEVELS:
-            hint = f"legal here: up to {MOST_LEVELS} levels of messages within messages"
-            diagnostics.error(f"'{above[0]}' holds '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
+            _note_depth(above[0], name, source, diagnostics)
             return
         definition = self.find(name, diagnostics, source)
         if definition is None:
@@ -244,12 +243,7 @@ def libraries(
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
     """The text of the first file; it is a fault if one cannot be read, or another one differs, or is not UTF-8."""
-    contents = []
-    for path in paths:
-        try:
-            contents.append(read_regular(path, MOST_FILE_BYTES))
-        except OSError as error:
-            faults.error(f"cannot read {path}: {error.strerror}", SourceRef(str(path), 1, 1))
+    contents = [_content(path, faults) for path in paths]
     if faults.found:
         return ""
     first, data = paths[0], contents[0]
@@ -261,6 +255,20 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
     except UnicodeDecodeError as fault:
         faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", byte_place(str(first), data, fault.start))
         return ""
+
+
+def _content(path: Path, faults: Diagnostics) -> bytes:
+    """The bytes of a file; nothing, with the fault noted, if it cannot be read."""
+    try:
+        return read_regular(path, MOST_FILE_BYTES)
+    except OSError as error:
+        faults.error(f"cannot read {path}: {error.strerror}", SourceRef(str(path), 1, 1))
+        return b""
+
+
+def _note_depth(top: MessageName, name: MessageName, source: SourceRef | None, faults: Diagnostics) -> None:
+    hint = f"legal here: up to {MOST_LEVELS} levels of messages within messages"
+    faults.error(f"'{top}' holds '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
 
 
 def _check_folders(empty: Iterable[Path]) -> None:

@@ -30,6 +30,8 @@ OTHER_FAULTS = {
     ("system/diagram.py", "diagram"): "a program or package that is not installed",
     ("message/library.py", "libraries"): "an option of the command line",
     ("message/library.py", "_check_folders"): "an option of the command line",
+    ("message/library.py", "_content"): "a message that is no file, in test_hostile_input",
+    ("message/library.py", "_note_depth"): "a message of 65 files, in test_hostile_input",
     ("system/board.py", "read_board"): "the file of a board",
     ("system/board.py", "_check_pins"): "the file of a board",
     ("system/board.py", "_check_streams"): "the file of a board",
