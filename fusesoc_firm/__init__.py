@@ -1,3 +1,3 @@
 """FPGAs for robots: message converters (FIRM) and whole systems (FAR) as FuseSoC cores."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -20,7 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import InputError, fail
-from fusesoc_firm.gapi import GENERATORS, MESSAGES, Call, Generator, make_request, obtain, used_before
+from fusesoc_firm.gapi import GENERATORS, MESSAGES, Call, Generator, MessageCores, make_request, obtain, used_before
 from fusesoc_firm.generation import GeneratedCore, GeneratorCall, Request
 from fusesoc_firm.own_code import digests
 from fusesoc_firm.render import forget_rendered
@@ -83,9 +83,13 @@ def _ours(calls: Iterable[GeneratorCall]) -> list[GeneratorCall]:
     ]
 
 
+def _no_folders(names: MessageCores) -> tuple[Path, ...]:
+    fail(f"there is no run that made the messages of {', '.join(names)}")
+
+
 def _request(call: GeneratorCall) -> Request:
-    known = GENERATORS[call.generator].parameters
-    return make_request(call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), known, lambda _: ())
+    generator = GENERATORS[call.generator]
+    return make_request(call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), generator, _no_folders)
 
 
 def main() -> None:

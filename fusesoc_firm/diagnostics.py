@@ -8,12 +8,16 @@ the file. The two doors (`cli`, `gapi`) print it and exit with 1; nobody else ca
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
 # Of a file that is none of ours at all, each line is a fault.
 _MOST_SHOWN = 200
+# Characters of a line that are shown around a fault, and of a word that is shown whole.
+_WIDEST = 200
+_LONG_WORD = re.compile(r"\S{500,}")
 
 
 @dataclass(frozen=True)
@@ -34,10 +38,12 @@ class SourceRef:
         if not self.text:
             return ""
         number = f"{self.line:5d}"
+        first = max(0, self.column - _WIDEST // 2) if len(self.text) > _WIDEST else 0
+        shown = "".join(c if c.isprintable() or c == "\t" else "?" for c in self.text[first : first + _WIDEST])
         # Tabs keep their width under the caret only if they are repeated there.
-        indent = "".join("\t" if c == "\t" else " " for c in self.text[: self.column - 1])
-        underline = "^" + "~" * (self.width - 1)
-        return f"{number} | {self.text}\n{' ' * len(number)} | {indent}{underline}"
+        indent = "".join("\t" if c == "\t" else " " for c in shown[: self.column - 1 - first])
+        underline = "^" + "~" * (min(self.width, max(1, len(shown) - len(indent))) - 1)
+        return f"{number} | {shown}\n{' ' * len(number)} | {indent}{underline}"
 
 
 def byte_place(file: str, data: bytes, position: int) -> SourceRef:
@@ -56,12 +62,18 @@ class Diagnostic:
 
     def __str__(self) -> str:
         place = f"{self.source}: " if self.source else ""
-        lines = [f"{place}error: {self.message}"]
+        lines = [f"{place}error: {_readable(self.message)}"]
         if self.source and (excerpt := self.source.excerpt()):
             lines.append(excerpt)
         if self.hint:
-            lines.append(f"      = {self.hint}")
+            lines.append(f"      = {_readable(self.hint)}")
         return "\n".join(lines)
+
+
+def _readable(text: str) -> str:
+    """`text` for a terminal: what would steer it is escaped, and a word of any length is shortened."""
+    escaped = "".join(c if c.isprintable() or c in "\t\n" else repr(c)[1:-1] for c in text)
+    return _LONG_WORD.sub(lambda word: f"{word[0][:100]}...{word[0][-20:]}", escaped)
 
 
 class InputError(Exception):

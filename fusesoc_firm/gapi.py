@@ -18,13 +18,15 @@ from typing import Any
 
 import yaml
 
+from fusesoc_firm.design_units import clash, note_units, units_of
 from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
-from fusesoc_firm.files import write_if_changed
+from fusesoc_firm.files import hide_generated, write_if_changed
 from fusesoc_firm.generation import GeneratedCore, Request, as_files
-from fusesoc_firm.message_runs import mark_run
+from fusesoc_firm.message_runs import mark_run, run_of
+from fusesoc_firm.naming import PREFIX_RULE, is_prefix
 from fusesoc_firm.own_code import PACKAGE, digests, used_code
 from fusesoc_firm.parameters import Parameter, check_parameters
-from fusesoc_firm.reads import Reads, noted
+from fusesoc_firm.reads import Input, Reads, noted
 from fusesoc_firm.recall import LOCKED, SEARCHED, Fact, call_digest, facts
 from fusesoc_firm.requesting_core import find_requesting_core
 from fusesoc_firm.store import Call as StoredCall
@@ -60,17 +62,18 @@ class Generator:
 
     `inputs` is cheap, since it is asked on every run; a path in it need not exist. `generate` raises `InputError` for
     what its user did wrong. `programs` are those without which what was made cannot be run. `tools` are the versions
-    of programs that make part of it.
+    of programs that make part of it. `cores` carry messages and are named by the files of a request.
     """
 
     parameters: tuple[Parameter, ...]
-    inputs: Callable[[Request], list[Path]]
+    inputs: Callable[[Request], Sequence[Input]]
     generate: Callable[[Request], GeneratedCore]
     programs: Callable[[Request], Sequence[str]] = lambda _: ()
     tools: Callable[[Request], Mapping[str, str]] = lambda _: {}
+    cores: Callable[[Request], MessageCores] = lambda _: {}
 
 
-def _converter_inputs(request: Request) -> list[Path]:
+def _converter_inputs(request: Request) -> list[Input]:
     from fusesoc_firm.converter import generator
 
     return generator.inputs(request)
@@ -82,7 +85,7 @@ def _generate_converters(request: Request) -> GeneratedCore:
     return generator.generate(request)
 
 
-def _message_inputs(request: Request) -> list[Path]:
+def _message_inputs(request: Request) -> Sequence[Input]:
     from fusesoc_firm import message_core
 
     return message_core.inputs(request)
@@ -94,7 +97,7 @@ def _copy_messages(request: Request) -> GeneratedCore:
     return message_core.generate(request)
 
 
-def _system_inputs(request: Request) -> list[Path]:
+def _system_inputs(request: Request) -> list[Input]:
     from fusesoc_firm.host import node_package, simulation
     from fusesoc_firm.system import generator
 
@@ -130,11 +133,17 @@ def _compiler(request: Request) -> Mapping[str, str]:
     return toolchain()
 
 
+def _cores_of_specification(request: Request) -> MessageCores:
+    from fusesoc_firm.system.generator import message_cores
+
+    return message_cores(request)
+
+
 def _is_simulation(request: Request) -> bool:
     return request.parameters["product"] != "system"
 
 
-_PATHS = Parameter("paths", "list", "folders with message definitions, relative to the core")
+_PATHS = Parameter("paths", "list", "folders and bags with message definitions, relative to the core")
 
 _MESSAGES = Parameter(
     "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
@@ -156,13 +165,19 @@ GENERATORS: Mapping[str, Generator] = {
             Parameter("ros", "int", "the ROS version whose wire format is spoken", is_required=True, choices=(1, 2)),
             Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
             Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter(
+                "name",
+                "str",
+                "what the names of all generated units begin with, such as left; a second core of a message needs one",
+                rule=(PREFIX_RULE, is_prefix),
+            ),
             Parameter("include", "list", "fields that get ports, such as pose.position; all unless given"),
             Parameter("exclude", "list", "fields that get none of these; a publisher sends their defaults"),
             Parameter(
                 "config",
                 "str",
                 "a file that lists messages and the names of their interfaces, relative to the core",
-                replaces=("message", "ros", "direction", "width", "include", "exclude"),
+                replaces=("message", "ros", "direction", "width", "name", "include", "exclude"),
             ),
             _PATHS,
             _MESSAGES,
@@ -197,6 +212,7 @@ GENERATORS: Mapping[str, Generator] = {
         _generate_system,
         _simulator_programs,
         _compiler,
+        _cores_of_specification,
     ),
     MESSAGES: Generator(
         (
@@ -216,12 +232,12 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
         if len(argv) != 1:
             fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
         path = Path(argv[0])
-        request = read_request(command, path, generators[command].parameters)
+        request = read_request(command, path, generators[command])
         absent = missing(generators[command].programs(request))
         is_locked = _check_locked(request)
         # What is locked is compared on every run, and what is missing is said.
         entry = obtain(request, generators[command], None if absent or is_locked else path)
-        _write(entry.files)
+        _write_core(entry.files, request, run_of(os.getppid()))
         if marks := _marks(request):
             mark_run("", marks)
     except InputError as error:
@@ -272,7 +288,7 @@ def _marks(request: Request) -> str:
     return find_requesting_core(request.files_root, request.name).name if request.command == MESSAGES else ""
 
 
-def read_request(command: str, path: Path, parameters: tuple[Parameter, ...], *, is_this_run: bool = True) -> Request:
+def read_request(command: str, path: Path, generator: Generator, *, is_this_run: bool = True) -> Request:
     """The request in FuseSoC's file, with checked parameters; if it `is_this_run`, of the FuseSoC that started us.
 
     Raises `InputError`.
@@ -289,13 +305,13 @@ def read_request(command: str, path: Path, parameters: tuple[Parameter, ...], *,
 
         return folders_of_run(names, path.absolute().parent.parent, is_this_run=is_this_run)
 
-    return make_request(command, Call(vlnv, files_root, given), parameters, beside)
+    return make_request(command, Call(vlnv, files_root, given), generator, beside)
 
 
 def make_request(
     command: str,
     call: Call,
-    parameters: tuple[Parameter, ...],
+    generator: Generator,
     message_folders: Callable[[MessageCores], tuple[Path, ...]],
 ) -> Request:
     """The request of a call, with checked parameters; `message_folders` finds those of the cores that it names.
@@ -303,12 +319,18 @@ def make_request(
     Raises `InputError`.
     """
     origin = find_requesting_core(call.files_root, call.vlnv.split(":")[2])
-    checked = check_parameters(call.given, parameters, origin)
+    checked = check_parameters(call.given, generator.parameters, origin)
     places = {name: origin.items(name) for name, value in checked.items() if isinstance(value, list)}
     request = Request(command, call.vlnv, call.files_root, checked, places)
-    return (
-        replace(request, message_folders=message_folders(names)) if (names := request.listed("messages")) else request
-    )
+    folders: dict[str, tuple[Path, ...]] = {}
+    faults = Diagnostics()
+    for name, source in {**request.listed("messages"), **generator.cores(request)}.items():
+        try:
+            folders[name] = message_folders({name: source})
+        except InputError as error:
+            faults.take(error, source)
+    faults.raise_if_any()
+    return replace(request, message_folders=folders)
 
 
 def obtain(request: Request, generator: Generator, path: Path | None = None) -> Entry:
@@ -348,10 +370,12 @@ def answer_from_store(command: str, path: Path) -> bool:
     generator = GENERATORS[command]
     start = time.monotonic()
     try:
-        request = read_request(command, path, generator.parameters)
+        request = read_request(command, path, generator)
         if missing(generator.programs(request)) or _check_locked(request) or _marks(request):
             return False
-        _write(default_store().obtain(lambda: _key(request, generator, Reads()), refuse).files)
+        files = default_store().obtain(lambda: _key(request, generator, Reads()), refuse).files
+        # This process is FuseSoC itself.
+        _write_core(files, request, run_of(os.getpid()))
     except (InputError, _NotStoredError):
         return False
     print(f"{command}: {request.name} from store in {time.monotonic() - start:.2f} s", flush=True)
@@ -374,9 +398,9 @@ def _key(request: Request, generator: Generator, reads: Reads) -> Key:
         "parameters": {name: value for name, value in request.parameters.items() if name != "locked"},
         "tools": dict(generator.tools(request)),
     }
-    paths = generator.inputs(request)
-    reads.files |= dict.fromkeys(str(path.absolute()) for path in paths)
-    inputs = {_name(path, request): _content(path) for path in paths}
+    given = generator.inputs(request)
+    reads.files |= dict.fromkeys(str(item.absolute()) for item in given if isinstance(item, Path))
+    inputs = dict(_named_content(item, request) for item in given)
     return Key(request_digest(asked, inputs, code), code, {"core": request.vlnv, "generator": request.command})
 
 
@@ -384,8 +408,10 @@ def _check_declared(of_build: Reads, of_key: Reads) -> None:
     """Raise `InputError` if something was read that the key does not cover: an edit of it would never be noticed."""
     faults = Diagnostics()
     known = {os.path.realpath(file) for file in of_key.files}
-    for file in of_build.files:
-        if os.path.realpath(file) not in known and Path(file).is_file():
+    parts = {os.path.realpath(file) for file in of_key.parts}
+    found = [(file, known) for file in of_build.files] + [(file, known | parts) for file in of_build.parts]
+    for file, covered in found:
+        if os.path.realpath(file) not in covered and Path(file).is_file():
             faults.error(f"{file} was read, which is no input", hint="list it under the generator's parameter 'files'")
     faults.raise_if_any()
 
@@ -401,18 +427,33 @@ def _stored_call(request: Request, generator: Generator, path: Path, reads: Read
         generated = str(path.absolute().parent.parent)
         return [
             *facts("file", [*reads.files, *(str(PACKAGE / name) for name in used)]),
+            *facts("part", [*reads.parts]),
             *facts("folder", [*reads.folders, *environment]),
             *facts("code", [""]),
             *facts("program", sorted({*generator.tools(request), *generator.programs(request)})),
-            *facts("messages", [json.dumps([generated, core_name(name)]) for name in request.listed("messages")]),
+            *facts("messages", [json.dumps([generated, core_name(name)]) for name in request.message_folders]),
         ]
 
     digest = call_digest(request.command, path.read_bytes())
-    return StoredCall(digest, facts_of_key, {"name": request.name, "marks": _marks(request)})
+    return StoredCall(digest, facts_of_key, {"name": request.name, "core": request.vlnv, "marks": _marks(request)})
+
+
+def _write_core(files: Files, request: Request, run: str) -> None:
+    """Write a core into the current folder, unless another one of the run defines one of its units otherwise."""
+    units = units_of(files)
+    if found := clash("", units, run):
+        fail(
+            f"{request.vlnv} and {found.core} define the design unit '{found.unit}' in two ways, and a tool keeps one",
+            find_requesting_core(request.files_root, request.name).instance(),
+            "the parameter 'name' of generator 'firm' gives the units of a core names of their own: name: left",
+        )
+    _write(files)
+    note_units("", request.vlnv, units, run)
 
 
 def _write(files: Files) -> None:
     """Write a core into the current folder, the `.core` last."""
+    hide_generated()
     for name, content in files.items():
         try:
             write_if_changed(Path(name), content)
@@ -422,12 +463,20 @@ def _write(files: Files) -> None:
 
 def _name(path: Path, request: Request) -> str:
     """An input's name in the key: the same for copies of a project in different folders."""
-    for root in (request.files_root, *request.message_folders):
+    folders = request.folders_of(request.message_folders)
+    for root in (request.files_root, *folders):
         if path.is_relative_to(root):
-            number = request.message_folders.index(root) if root != request.files_root else None
+            number = folders.index(root) if root != request.files_root else None
             name = str(path.relative_to(root))
             return name if number is None else f"messages/{number}/{name}"
     return str(path)
+
+
+def _named_content(item: Input, request: Request) -> tuple[str, bytes | None]:
+    """An input's name in the key, and what counts of it."""
+    if isinstance(item, Path):
+        return _name(item, request), _content(item)
+    return f"{_name(item.path, request)}:{item.name}", item.content
 
 
 def _content(path: Path) -> bytes | None:

@@ -5,15 +5,16 @@ It knows no stage, so `converter` and `system` can return what `gapi` writes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from fusesoc_firm.diagnostics import SourceRef
+from fusesoc_firm.diagnostics import SourceRef, fail
 
+_LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None
 """What a generator's parameter can be; None is one that was not given and has no default."""
 
@@ -33,7 +34,7 @@ class Request:
     """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's.
 
     `places` tells where the items of a list parameter stand, as far as that is known; they are no part of the request.
-    `message_folders` are those of the cores that it names as carriers of messages.
+    `message_folders` are those of the cores that it, or its specification, names as carriers of messages.
     """
 
     command: str
@@ -41,12 +42,16 @@ class Request:
     files_root: Path
     parameters: Mapping[str, Plain]
     places: Mapping[str, Sequence[SourceRef]] = field(default_factory=dict, compare=False)
-    message_folders: tuple[Path, ...] = ()
+    message_folders: Mapping[str, Sequence[Path]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         """The new core's name, `<requesting core>-<instance>`."""
         return self.vlnv.split(":")[2]
+
+    def folders_of(self, cores: Iterable[str]) -> list[Path]:
+        """The folders of some of the cores that carry messages."""
+        return [folder for core in cores for folder in self.message_folders[core]]
 
     def listed(self, parameter: str) -> dict[str, SourceRef | None]:
         """The items of a list parameter, each with its place; none where it is not given."""
@@ -81,9 +86,20 @@ class GeneratedCore:
 
 
 def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
-    """The files to write for FuseSoC, by path; the `.core` is last, since with it the others are taken to be there."""
-    contents = {path: _encoded(file.content) for path, file in core.files.items()}
+    """The files to write for FuseSoC, by path; the `.core` is last, since with it the others are taken to be there.
+
+    Raises `InputError` for a name that is too long for a file.
+    """
+    contents = {_checked(path): _encoded(file.content) for path, file in core.files.items()}
     return contents | {f"{request.name}.core": core_text(core, request.vlnv).encode()}
+
+
+def _checked(path: str) -> str:
+    """`path`, unless it is longer than file systems have it: entities are called after names that are joined."""
+    for part in path.split("/"):
+        if (size := len(part.encode())) > _LONGEST_FILE_NAME:
+            fail(f"the file '{part[:40]}...' would have a name of {size} bytes; file systems take {_LONGEST_FILE_NAME}")
+    return path
 
 
 def core_text(core: GeneratedCore, vlnv: str) -> str:

@@ -5,12 +5,14 @@ from PyPI, says which package brings one that is missing, and notes in the build
 that fails leaves no output: make, started again, would take it for a good one, such as the layout that nextpnr writes
 before it finds that the clock is too slow.
 
-`generators/launcher.mk` is the GNUmakefile of a build, and names this module as the launcher where there is no other.
+`generators/launcher.mk` is the GNUmakefile of a build. Unless there is another launcher, it names `firm_launcher.sh`
+beside it, which starts this module for the first run of a program in a build.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -24,6 +26,8 @@ from fusesoc_firm.tools import find, ways
 
 # Options that name a program's output.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
+# Set by `firm_launcher.sh`: the file from which it learns that a program was noted, and where that is.
+_NOTED = "FIRM_NOTED"
 
 
 def launch(program: str, arguments: Sequence[str]) -> int:
@@ -51,6 +55,13 @@ def _run(command: Sequence[str]) -> int:
             signal.signal(signal.SIGTERM, before)
 
 
+def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
+    """Let `firm_launcher.sh` start a program from now on, unless a failure of it has to be cleaned up after."""
+    if not any(option in arguments for option in _OUTPUTS) and (path := shutil.which(arguments[0])):
+        noted.parent.mkdir(exist_ok=True)
+        noted.write_text(f"{path}\n", encoding="utf-8")
+
+
 def starts_everything() -> bool:
     """Whether programs of this build are started here, and not by a launcher that may find them elsewhere."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
@@ -59,8 +70,12 @@ def starts_everything() -> bool:
 
 def main(arguments: Sequence[str]) -> int:
     """The same as `firm tool`, which has other commands to get ready; a build starts a dozen programs."""
+    noted = os.environ.pop(_NOTED, "")
     try:
-        return launch(arguments[0], arguments[1:])
+        status = launch(arguments[0], arguments[1:])
+        if noted:
+            _leave_to_the_shell(arguments, Path(noted))
+        return status
     except InputError as error:
         print(error, file=sys.stderr)
         return 1

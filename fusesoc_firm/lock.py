@@ -24,14 +24,15 @@ from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import Definitions, signature
 from fusesoc_firm.project import ProjectCore
+from fusesoc_firm.reads import Input
 from fusesoc_firm.system.generator import load_requested
 from fusesoc_firm.tools import facts_of, installed_programs, packages
 from fusesoc_firm.yaml_text import LARGE, yaml_data
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """By kind (`messages`, `cores`, `tools`) and name: facts by name."""
-Call = tuple[Request, Sequence[Path]]
-"""A request for a generated core, and the files that it is made of."""
+Call = tuple[Request, Sequence[Input]]
+"""A request for a generated core, and what it is made of."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
 _HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
@@ -161,16 +162,25 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
 def _digest_of_core(core: ProjectCore, calls: Sequence[Call]) -> str:
     """The digest of a core's files, and of what is generated for it is made of, by their names from its description."""
     folder = core.files[0].parent
-    made_of = [path.resolve() for _, inputs in calls for path in inputs]
-    return _digest_of({os.path.relpath(path, folder): _digest(path) for path in (*core.files, *made_of)})
+    made_of = [item for _, inputs in calls for item in inputs]
+    return _digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
 
 
 def _digest_of(found: Mapping[str, str | None]) -> str:
     return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
 
 
-def _digest(path: Path) -> str | None:
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None
+def _named(item: Input, folder: Path) -> str:
+    """An input's name, told from a folder."""
+    if isinstance(item, Path):
+        return os.path.relpath(item.resolve(), folder)
+    return f"{os.path.relpath(item.path.resolve(), folder)}:{item.name}"
+
+
+def _digest(item: Input) -> str | None:
+    if not isinstance(item, Path):
+        return hashlib.sha256(item.content).hexdigest()
+    return hashlib.sha256(item.read_bytes()).hexdigest() if item.is_file() else None
 
 
 def _tools() -> dict[str, dict[str, str]]:

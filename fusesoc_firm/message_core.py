@@ -22,7 +22,7 @@ def folders(request: Request) -> list[Path]:
     """Where a core's messages are: its own folders, then those of the cores that it names."""
     paths = request.parameters["paths"] or []
     assert isinstance(paths, list)
-    return [*(request.files_root / path for path in paths), *request.message_folders]
+    return [*(request.files_root / path for path in paths), *request.folders_of(request.listed("messages"))]
 
 
 def inputs(request: Request) -> list[Path]:

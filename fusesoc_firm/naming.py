@@ -1,4 +1,4 @@
-"""ROS names to names that are legal and distinct in VHDL, Verilog and SystemVerilog.
+"""What a name may be, and ROS names to names that are legal and distinct in VHDL, Verilog and SystemVerilog.
 
 A name stays as it is wherever it can. What has to change changes in the same way on every run, and the
 generated code says in a comment which ROS name a port stands for, so the mapping can be read backwards.
@@ -54,8 +54,32 @@ VHDL_PREDEFINED = frozenset(
     shift_left shift_right signed std_match unresolved_signed unresolved_unsigned unsigned""".split()
 )
 
+# The characters of a name or a description.
+LONGEST_TEXT = 200
+# Those of a path, such as of a source, and of the fields on the way into a deeply nested message.
+LONGEST_PATH = 4096
+
+PREFIX_RULE = "lower-case letters, digits and single '_' between them, a letter first, at most 100"
+"""What a prefix of design units is made of."""
+
+_PREFIX = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+_LONGEST_PREFIX = 100
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]")
 _UNDERSCORES = re.compile(r"_{2,}")
+
+
+def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None:
+    """What keeps `text` from being a name or a description, and what is legal; None if nothing does.
+
+    Such a text gets into comments, strings, labels and messages: everywhere it is one line that can be shown. So it
+    has no control characters, Unicode's line ends, lone surrogates, or characters that change the direction of writing.
+    """
+    legal = f"legal is one line of at most {longest} printable characters"
+    if len(text) > longest:
+        return f"has {len(text)} characters", legal
+    if unprintable := next((character for character in text if not character.isprintable()), None):
+        return f"holds the character U+{ord(unprintable):04X}", legal
+    return None
 
 
 def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "field") -> str:
@@ -98,6 +122,16 @@ def _distinct(bases: Iterable[str], reserved: Iterable[str]) -> list[str]:
         taken.add(candidate.lower())
         chosen.append(candidate)
     return chosen
+
+
+def is_prefix(text: str) -> bool:
+    """Whether a text may stand before the names of design units."""
+    return len(text) <= _LONGEST_PREFIX and _PREFIX.fullmatch(text) is not None
+
+
+def prefixed(prefix: str, name: str) -> str:
+    """`<prefix>_<name>`; the name alone if the prefix is empty."""
+    return f"{prefix}_{name}" if prefix else name
 
 
 def entity_name(package: str, message: str) -> str:

@@ -23,7 +23,7 @@ _DIGESTS: dict[Path, tuple[tuple[int, int, int], str]] = {}
 
 
 def digests(package: Path = PACKAGE) -> dict[str, str]:
-    """The SHA-256 of every module, data file and template of a package's folder, its library left out, by name."""
+    """The SHA-256 of every module, data file and template of a package's folder, its libraries left out, by name."""
     return {name: _digest(_path(package, name)) for name in all_names(package)}
 
 
@@ -77,8 +77,8 @@ def all_names(package: Path = PACKAGE) -> list[str]:
     found: list[str] = []
     start = len(str(package)) + 1
     for folder, folders, files in os.walk(package):
-        # In the library lie cores, and links to folders of any size.
-        folders[:] = [name for name in folders if name not in ("library", "__pycache__")]
+        # In the libraries lie cores, and links to folders of any size.
+        folders[:] = [name for name in folders if name not in ("demos", "library", "__pycache__")]
         above = f"{folder}/"[start:]
         found += [f"{above}{name}" for name in files if name.endswith(_COUNTED)]
     return sorted(found)

@@ -5,12 +5,13 @@ A fault is shown where its author wrote it, in the requesting `.core` file.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fusesoc_firm.diagnostics import Diagnostics, nearest
 from fusesoc_firm.generation import Plain
+from fusesoc_firm.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.requesting_core import RequestingCore
 
 _TYPES: dict[str, tuple[type, str]] = {
@@ -24,7 +25,8 @@ _TYPES: dict[str, tuple[type, str]] = {
 class Parameter:
     """A parameter: `type` and `meaning` are words of the generator's usage text, `bounds` its least and greatest value.
 
-    One that is neither given nor required has its `default`. It may say what others would (`replaces`): these are then
+    A text that is no legal value of it breaks a `rule`: what is legal, and a test. One that is neither given nor
+    required has its `default`. It may say what others would (`replaces`): these are then
     not required, and not allowed beside it.
     """
 
@@ -36,6 +38,7 @@ class Parameter:
     choices: tuple[str | int, ...] = ()
     bounds: tuple[int, int] | None = None
     replaces: tuple[str, ...] = ()
+    rule: tuple[str, Callable[[str], bool]] | None = None
 
     def usage(self) -> str:
         """`name (type): text`, as the generator core lists it."""
@@ -82,8 +85,13 @@ def _fault(parameter: Parameter, value: object) -> str:
     # Exact types, since to Python a bool is an integer.
     if type(value) is not expected or (isinstance(value, list) and not all(type(item) is str for item in value)):
         return words
+    texts = value if isinstance(value, list) else [value] if isinstance(value, str) else []
+    if any(text_fault(text, LONGEST_PATH) for text in texts):
+        return f"one line of at most {LONGEST_PATH} printable characters"
     if parameter.choices and value not in parameter.choices:
         return f"one of {', '.join(map(str, parameter.choices))}"
+    if parameter.rule and isinstance(value, str) and not parameter.rule[1](value):
+        return parameter.rule[0]
     if parameter.bounds and isinstance(value, int) and not parameter.bounds[0] <= value <= parameter.bounds[1]:
         return f"{parameter.bounds[0]} to {parameter.bounds[1]}"
     return ""

@@ -134,7 +134,7 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
             )
             generated[made.vlnv] = made.generator
             edges.append((str(item.name), made.vlnv))
-            for source in map(_quoted, inputs_of(made)):
+            for source in inputs_of(made):
                 sources[source] = None
                 edges.append((made.vlnv, source))
     return render(
@@ -146,11 +146,6 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
             "edges": [{"from": start, "to": end} for start, end in edges],
         },
     )
-
-
-def _quoted(name: str) -> str:
-    """A file's name as it stands between quotes."""
-    return name.replace("\\", "\\\\").replace('"', '\\"')
 
 
 def _found(core: str) -> tuple[Any, Any]:

@@ -3,6 +3,9 @@
 What a generator reads has to be among the inputs that its key covers, or an edit would go unnoticed. What Python
 consists of and what its packages hold is left out, as their versions count, and so is this package, whose files are
 counted apart. So is what is the machine's: `/dev`, `/etc`, `/proc`, `/sys`. What other programs read is not seen.
+
+Of a file that is too large to be an input, such as a bag, a reader takes parts and says so (`in_part`). Each `Part` is
+then an input; a repeated call is recalled as long as the file has the same size and time.
 """
 
 from __future__ import annotations
@@ -10,10 +13,11 @@ from __future__ import annotations
 import os
 import sys
 import sysconfig
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 
 from fusesoc_firm.own_code import PACKAGE
 
@@ -27,11 +31,28 @@ _PATHS_OF_PYTHON = ("stdlib", "platstdlib", "purelib", "platlib")
 _PACKAGE_FOLDERS = ("site-packages", "dist-packages")
 
 
+@dataclass(frozen=True)
+class Part:
+    """What was taken of the file or folder at `path`, which is not read as a whole, under a name of its own."""
+
+    path: Path
+    name: str
+    content: bytes
+
+
+Input = Path | Part
+"""What a generator depends on: a whole file, or part of one."""
+
+
 @dataclass
 class Reads:
-    """Absolute paths of what was read, in the order in which it was; `python_path` is where Python finds packages."""
+    """Absolute paths of what was read, in the order in which it was; `python_path` is where Python finds packages.
+
+    `parts` are files that were read in part.
+    """
 
     files: dict[str, None] = field(default_factory=dict)
+    parts: dict[str, None] = field(default_factory=dict)
     folders: dict[str, None] = field(default_factory=dict)
     temporary: list[str] = field(default_factory=list)
     python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
@@ -39,6 +60,8 @@ class Reads:
 
 # Those that are noted now, the innermost last.
 _current: list[Reads] = []
+# Absolute paths of the files that are read in part now.
+_partly: list[set[str]] = []
 
 
 @contextmanager
@@ -52,6 +75,19 @@ def noted(reads: Reads) -> Iterator[None]:
         _current.remove(reads)
 
 
+@contextmanager
+def in_part(files: Iterable[Path]) -> Iterator[None]:
+    """Within it, these files are read in part."""
+    paths = {_absolute(str(file)) for file in files}
+    if _current:
+        _current[-1].parts |= dict.fromkeys(sorted(paths))
+    _partly.append(paths)
+    try:
+        yield
+    finally:
+        _partly.remove(paths)
+
+
 @cache
 def _install_hook() -> None:
     """Once: a hook stays for as long as the process lives."""
@@ -62,7 +98,9 @@ def _hook(event: str, arguments: tuple[object, ...]) -> None:
     if not _current:
         return
     if event in _OF_FILES:
-        if event != "open" or _is_read(*arguments[1:]):
+        if event == "sqlite3.connect":
+            _note(_of_uri(arguments[0]), is_file=True)
+        elif _is_read(*arguments[1:]):
             _note(arguments[0], is_file=True)
     elif event in _OF_FOLDERS:
         # An import lists the folders of Python's path, and never scans one.
@@ -78,11 +116,19 @@ def _is_read(mode: object, flags: object) -> bool:
     return isinstance(flags, int) and flags & os.O_ACCMODE != os.O_WRONLY
 
 
+def _of_uri(name: object) -> object:
+    """The path in a database's name, which may be a URI."""
+    text = os.fsdecode(name) if isinstance(name, str | bytes) else ""
+    return text.removeprefix("file:").partition("?")[0] if text.startswith("file:") else name
+
+
 def _note(path: object, *, is_file: bool) -> None:
     # A number is a file that is open already, and None the current folder.
     if not isinstance(path, str | bytes) or (text := os.fsdecode(path)) == ":memory:":
         return
     absolute, reads = _absolute(text), _current[-1]
+    if any(absolute in paths for paths in _partly):
+        return
     # An archive may be on Python's path, too.
     is_apart = is_file and absolute in reads.python_path
     if not is_apart and not _is_below(absolute, (*_apart(), *reads.temporary)) and not _is_of_package(absolute, reads):

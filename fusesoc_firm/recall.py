@@ -5,6 +5,7 @@ takes longer than all else where nothing has changed. So a call that was answere
 and the facts that it follows from, each with its state at that time. These are
 
     file        each one that was read to make the key, that the key covers, and of our own: its SHA-256
+    part        each file of which a part was read: its size and time
     folder      each one that was searched, and those that the environment names: which names are in it
     code        the names of all our own files
     program     one that makes part of the result, or runs it: the file that the PATH leads to, its size and time
@@ -25,8 +26,9 @@ import sys
 import time
 from collections.abc import Sequence
 
-from fusesoc_firm.files import read_file, write_if_changed
-from fusesoc_firm.message_runs import mark_run, marked_folders
+from fusesoc_firm.design_units import clash, note_units, units_of
+from fusesoc_firm.files import hide_generated, read_file, write_if_changed
+from fusesoc_firm.message_runs import mark_run, marked_folders, run_of
 from fusesoc_firm.own_code import PACKAGE, all_names
 from fusesoc_firm.store_files import (
     CALL,
@@ -69,11 +71,16 @@ def answer(command: str, arguments: Sequence[str]) -> bool:
     if (found := read_entry(stored)) is None:
         return False
     mark_used(stored, noted)
+    units, run = units_of(found[1]), run_of(os.getppid())
+    if clash("", units, run):
+        return False
     try:
+        hide_generated()
         for name, content in found[1].items():
             write_if_changed(name, content)
         if note["marks"]:
             mark_run("", note["marks"])
+        note_units("", note["core"], units, run)
     except OSError:
         return False
     print(f"{command}: {note['name']} from store in {time.monotonic() - start:.2f} s", flush=True)
@@ -92,6 +99,8 @@ def state(kind: str, name: str) -> str | None:
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)
+    if kind == "part":
+        return _part(name)
     if kind == "folder":
         return _folder(name)
     if kind == "code":
@@ -116,6 +125,14 @@ def _folder(path: str) -> str | None:
             return digest_of(sorted([entry.name, entry.is_dir()] for entry in entries))
     except OSError:
         return None
+
+
+def _part(path: str) -> str | None:
+    try:
+        status = os.stat(path)
+    except OSError:
+        return None
+    return f"{status.st_size} {status.st_mtime_ns}"
 
 
 def _program(name: str) -> str | None:

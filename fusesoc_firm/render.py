@@ -4,7 +4,9 @@ Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknow
 scopes if the inner one lacks it. In hardware each of these is a fault that compiles. So chevron only parses the
 templates, and the tree is expanded here, by these rules:
 
-* `{{x}}` prints a string or an integer as it is. Nothing is escaped; a bool or None has no agreed spelling.
+* `{{x}}` prints a string or an integer as it is. A bool or None has no agreed spelling.
+* `{{comment x}}` prints text of a user, quoted for where it stands in the language that the template's name ends with;
+  `quoting` has the ways of each language. A partial is in the language of the template that includes it.
 * A key is looked up in the innermost scope and nowhere else. It must be there, also in a part that is left out.
 * `{{#x}}` takes a bool (part or no part, same scope), a list (the part once an item), or a mapping or None (the part in
   the mapping's scope, or no part). `{{^x}}` is the part for false, an empty list or None.
@@ -22,6 +24,8 @@ from functools import cache
 from pathlib import Path
 
 from chevron.tokenizer import ChevronError, tokenize
+
+from fusesoc_firm.quoting import QUOTES, Quote
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 # Those of them that this process has read: what it made depends on no others.
@@ -66,6 +70,7 @@ class _Literal:
 @dataclass(frozen=True)
 class _Value:
     key: str
+    quote: str = ""
 
 
 @dataclass(frozen=True)
@@ -105,7 +110,8 @@ def render(template_name: str, context: Mapping[str, object], templates: Path = 
     """
     try:
         _require_plain(context, "")
-        text = _Expansion(templates).expand(_parse(template_name, templates), _Scope(context), True)
+        expansion = _Expansion(templates, _quotes(template_name))
+        text = expansion.expand(_parse(template_name, templates), _Scope(context), True)
     except TemplateError as error:
         raise TemplateError(f"template {template_name}: {error}") from error
     for renderings in _RECORDS:
@@ -127,10 +133,11 @@ def recorded() -> Iterator[dict[str, Rendering]]:
 def traced_lines(rendering: Rendering) -> list[TracedLine]:
     """Each line of what `render` makes of it, with where it comes from."""
     name = rendering.template
-    marked = _TracedExpansion(TEMPLATES).expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
+    expansion = _TracedExpansion(TEMPLATES, _quotes(name))
+    marked = expansion.expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
     lines: list[TracedLine] = []
     place = (f"{name}.mustache", 1, "")
-    for text in marked.splitlines():
+    for text in marked.removesuffix("\n").split("\n"):
         # A value may be of several lines, and a blank line has no mark: they belong to the one above.
         if found := _MARK.search(text):
             place = (found["file"], int(found["line"]), found["scope"])
@@ -161,9 +168,10 @@ def forget_rendered() -> None:
 
 @dataclass(frozen=True)
 class _Expansion:
-    """One walk over a parsed template."""
+    """One walk over a parsed template, whose language has `quotes`."""
 
     templates: Path
+    quotes: Mapping[str, Quote]
 
     def expand(self, nodes: tuple[_Node, ...], scope: _Scope, is_taken: bool) -> str:
         """The text of `nodes`; none where they are not taken, but then too every key is looked up."""
@@ -174,9 +182,9 @@ class _Expansion:
         match node:
             case _Literal(text):
                 return self._literal(text, scope)
-            case _Value(key):
+            case _Value(key, quote):
                 value = _look_up(key, scope)
-                return _printed(value, scope.path_to(key)) if is_taken else ""
+                return self._quoted(quote, _printed(value, scope.path_to(key))) if is_taken else ""
             case _Section():
                 return self._section(node, scope, is_taken)
             case _Partial(name, indentation):
@@ -188,6 +196,14 @@ class _Expansion:
 
     def _literal(self, text: str, _: _Scope) -> str:
         return text
+
+    def _quoted(self, quote: str, text: str) -> str:
+        if not quote:
+            return text
+        if quote not in self.quotes:
+            known = ", ".join(sorted(self.quotes)) or "none"
+            raise TemplateError(f"'{quote}' is no way to quote here; the template's language has {known}")
+        return self.quotes[quote](text)
 
     def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
         value = _look_up(section.key, scope)
@@ -235,6 +251,11 @@ def _look_up(key: str, scope: _Scope) -> object:
     return value
 
 
+def _quotes(template_name: str) -> Mapping[str, Quote]:
+    """The ways to quote in a template's language: `vhdl/board.vhd`, or `board/pcf`."""
+    return QUOTES.get(template_name.rpartition("/")[2].rpartition(".")[2], {})
+
+
 def _printed(value: object, path: str) -> str:
     if isinstance(value, bool) or not isinstance(value, str | int):
         raise TemplateError(f"'{path}' is {_kind(value)}; only a string or an integer can be printed")
@@ -247,7 +268,7 @@ def _kind(value: object) -> str:
 
 def _indented(text: str, indentation: str) -> str:
     """Indent every line that is not empty; an empty one would only get blanks at its end."""
-    return "".join(indentation + line if line.strip() else line for line in text.splitlines(keepends=True))
+    return "\n".join(indentation + line if line.strip() else line for line in text.split("\n"))
 
 
 def _require_plain(value: object, path: str) -> None:
@@ -284,14 +305,12 @@ def _parse_once(name: str, templates: Path) -> tuple[_Node, ...]:
 
 def _parse_marked(name: str, templates: Path) -> tuple[_Node, ...]:
     """The tree of a template file in which a mark begins every line that gives one, but for blank ones."""
-    lines = template_text(name, templates).splitlines(keepends=True)
+    lines = template_text(name, templates).split("\n")
     marked = [
-        line
-        if not line.strip() or _STANDALONE.fullmatch(line.rstrip("\n"))
-        else f"\ue000{name}.mustache:{number}:\ue001{line}"
+        line if not line.strip() or _STANDALONE.fullmatch(line) else f"\ue000{name}.mustache:{number}:\ue001{line}"
         for number, line in enumerate(lines, start=1)
     ]
-    return _tree(name, "".join(marked))
+    return _tree(name, "\n".join(marked))
 
 
 def _tree(name: str, text: str) -> tuple[_Node, ...]:
@@ -310,7 +329,8 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
             case "literal":
                 nodes.append(_Literal(key))
             case "variable" | "no escape":
-                nodes.append(_Value(key))
+                quote, _, name = key.rpartition(" ")
+                nodes.append(_Value(name, quote))
             case "section" | "inverted section":
                 nodes.append(_Section(key, kind == "inverted section", _nodes(tokens)))
             case "partial":

@@ -17,6 +17,7 @@ from fusesoc_firm.generation import GeneratedCore
 from fusesoc_firm.message.model import MessageName, nested_message
 from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.reads import Input
 from fusesoc_firm.render import Rendering, TracedLine, recorded, traced_lines
 from fusesoc_firm.system.specification import Specification
 
@@ -46,7 +47,9 @@ class Names:
     messages: Mapping[str, Mapping[str, SourceRef]]
 
 
-def rendering_of(generate: Callable[[], GeneratedCore], name: str, text: str, inputs: Iterable[Path] = ()) -> Rendering:
+def rendering_of(
+    generate: Callable[[], GeneratedCore], name: str, text: str, inputs: Iterable[Input] = ()
+) -> Rendering:
     """What the file `name` of a generated core, which is made of `inputs`, is made of.
 
     Raises `InputError` if no template made it, or not this `text`.
@@ -60,7 +63,11 @@ def rendering_of(generate: Callable[[], GeneratedCore], name: str, text: str, in
     if made != text:
         fail(f"'{name}' is not what would be generated now", hint="generate it again with fusesoc run --setup")
     if made not in renderings:
-        copied = [str(path) for path in inputs if path.is_file() and path.read_bytes() == text.encode()]
+        copied = [
+            str(item)
+            for item in inputs
+            if isinstance(item, Path) and item.is_file() and item.read_bytes() == text.encode()
+        ]
         fail(f"'{name}' is of no template", hint=f"it is a copy of {copied[0]}" if copied else "it is data")
     return renderings[made]
 

@@ -7,11 +7,14 @@ import logging
 import multiprocessing
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from ipaddress import ip_address
+from pathlib import Path
 from typing import Any, TypeVar
 
 from fusesoc_firm import __version__
@@ -21,6 +24,8 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _CONNECT_SECONDS = 10
+# Without proof of who is at the other end.
+_OPEN_PROTOCOLS = ("", "tcp", "ws")
 # Tasks handed out for each worker, so that none waits for the next one.
 _AHEAD = 4
 
@@ -64,7 +69,10 @@ def local_workers(jobs: int | None = None) -> Iterator[Workers]:
 
 @contextmanager
 def cluster_workers(address: str) -> Iterator[Workers]:
-    """The workers of the Dask cluster whose scheduler is at `address`, such as tcp://10.0.0.1:8786.
+    """The workers of the Dask cluster whose scheduler is at `address`, such as tls://10.0.0.1:8786.
+
+    Both ends of a connection run what the other one sends. With tls:// they know each other by certificates, those of
+    Dask's own configuration; without, what is neither of this machine is warned of.
 
     Raises `InputError` if none answers, if it has no workers or its workers cannot do our tasks, and if it is lost.
     """
@@ -75,7 +83,8 @@ def cluster_workers(address: str) -> Iterator[Workers]:
         fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
     # What is lost is told here, once and in a sentence.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
-    with _connected(distributed, address) as client:
+    security = _security(distributed, address)
+    with _connected(distributed, address, security) as client:
         count = sum(client.ncores().values())
         if not count:
             fail(f"the Dask cluster at '{address}' has no workers", hint=f"start some: dask worker {address}")
@@ -91,12 +100,45 @@ def cluster_workers(address: str) -> Iterator[Workers]:
             executor.shutdown(wait=False)
 
 
-def _connected(distributed: Any, address: str) -> Any:
+def _security(distributed: Any, address: str) -> Any:
+    """What a connection to the scheduler is to prove. Raises `InputError` if certificates are missing."""
+    protocol, _, place = address.rpartition("://")
+    if protocol != "tls":
+        if protocol in _OPEN_PROTOCOLS and not _is_here(place):
+            print(
+                f"warning: '{address}' is neither on this machine nor tls://: who has access to that network can run "
+                "programs on all machines of the cluster, this one included",
+                file=sys.stderr,
+            )
+        return distributed.Security()
+    security = distributed.Security(require_encryption=True)
+    files = {"ca-file": security.tls_ca_file, "client.cert": security.tls_client_cert}
+    files |= {"client.key": security.tls_client_key} if security.tls_client_key else {}
+    for name, file in files.items():
+        if not file:
+            hint = "Dask's configuration names the certificates: ca-file, client.cert and client.key (docs/security.md)"
+            fail(f"'{address}' needs distributed.comm.tls.{name}", hint=hint)
+        if not Path(file).is_file():
+            fail(f"there is no file '{file}', which Dask's configuration names as distributed.comm.tls.{name}")
+    return security
+
+
+def _is_here(place: str) -> bool:
+    """Whether the host of `host:port` is this machine's loopback."""
+    host = place.rpartition(":")[0].strip("[]")
+    try:
+        return host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _connected(distributed: Any, address: str, security: Any) -> Any:
     """A client of the scheduler. Raises `InputError` if none answers."""
     try:
-        return distributed.Client(address, timeout=_CONNECT_SECONDS)
-    except (OSError, ValueError) as error:
-        reason = str(error).splitlines()[0]
+        return distributed.Client(address, timeout=_CONNECT_SECONDS, security=security)
+    # The last two: what Dask's configuration refuses.
+    except (OSError, ValueError, RuntimeError, TypeError) as error:
+        reason = str(error).split("\n", 1)[0]
     # What is left of the client ends its loop when it is collected. If that came while another one begins, both would
     # wait for the same lock for ever.
     gc.collect()

@@ -8,7 +8,7 @@ So all faults of a file come at once, and who works on it can tell a fault from 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -16,8 +16,11 @@ from typing import Any, TypeVar
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, closest, nearest
+from fusesoc_firm.naming import text_fault
 from fusesoc_firm.yaml_text import Text, YamlText, integer, is_null, items, kind
 
+# What is wrong with a text, and what is legal; None if nothing is.
+TextRule = Callable[[str], tuple[str, str] | None]
 S = TypeVar("S", bound="Section")
 
 
@@ -42,7 +45,8 @@ class Key:
     `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list), the last two of type
     `section`. `aliases` are other spellings of the key. `choices` are all legal values, if they can be listed.
     A required key may be left out beside another one, by name, with a certain value: `unless`.
-    `only_of` is the kind of thing that may have the key, where its section tells of several kinds.
+    `only_of` is the kind of thing that may have the key, where its section tells of several kinds. A text must keep
+    the `rule`.
     """
 
     meaning: str
@@ -54,6 +58,7 @@ class Key:
     choices: tuple[str | int, ...] = ()
     section: type[Section] | None = None
     only_of: str = ""
+    rule: TextRule = text_fault
 
     def is_needed(self, others: Mapping[str, object]) -> bool:
         """Whether the key must be there beside `others`, given as words."""
@@ -165,6 +170,9 @@ class _Reader:
 
     def _text(self, node: yaml.Node, entry: Key, name: str) -> Text | None:
         if isinstance(node, yaml.ScalarNode) and node.value and not is_null(node):
+            if fault := entry.rule(node.value):
+                self._error(f"'{name}' {fault[0]}", node, fault[1])
+                return None
             return self.file.text(node)
         self._error(f"'{name}' must be a word, not {kind(node)}", node, entry.meaning)
         return None

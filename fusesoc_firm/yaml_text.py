@@ -71,7 +71,7 @@ class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event, before = self.peek_event(), self._nodes
-        self._nodes += self._sizes.get(event.anchor, 1) if isinstance(event, yaml.AliasEvent) else 1
+        self._nodes += self._sizes.get(event.anchor or "", 1) if isinstance(event, yaml.AliasEvent) else 1
         self._level += 1
         if self._level > MOST_LEVELS:
             raise TooLargeError(f"{MOST_LEVELS} levels", event.start_mark)

@@ -2,7 +2,7 @@
 
 FuseSoC starts generators with the `python3` that is first on PATH. That need be neither the one FuseSoC runs in nor the
 one this package was installed for, unless an environment is activated. So a generator first looks for the right one.
-Started itself, by the makefile of a build, this file prints which one that is, or nothing.
+Started itself, by the launcher of a build, this file prints which one that is, or nothing.
 
 This file runs in any Python 3.9 or later.
 """
@@ -28,11 +28,12 @@ _TRIED, _LEFT = "_FUSESOC_FIRM_TRIED", "_FUSESOC_FIRM_LEFT"
 
 def run(command: str) -> NoReturn:
     """Answer FuseSoC's call of the generator `command`, in this Python or in another that takes this one's place."""
-    tried, left = (os.environ.pop(name, "").splitlines() for name in (_TRIED, _LEFT))
+    tried, left = ([*filter(None, os.environ.pop(name, "").split("\n"))] for name in (_TRIED, _LEFT))
     chosen = os.environ.get(_CHOSEN)
     try:
         if chosen and not tried and chosen != sys.executable:
             _start_next(command, [], [chosen])
+        _warn_of_another_version(command)
         if _is_recalled(command):
             sys.exit(0)
         from importlib.util import find_spec
@@ -48,6 +49,29 @@ def run(command: str) -> NoReturn:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         sys.exit(130)
+
+
+def _warn_of_another_version(command: str) -> None:
+    """Warn if the library that this file is in and the package of this Python have different versions.
+
+    The hardware that is generated is made for the cores of the package's own library.
+    """
+    folder = os.path.dirname(os.path.abspath(__file__))
+    try:
+        from fusesoc_firm import __version__
+
+        with open(os.path.join(folder, "generators.core"), encoding="utf-8") as core:
+            name = next((line for line in core if line.startswith("name:")), "")
+    except (ImportError, OSError):
+        return
+    version = name.strip().rpartition(":")[2]
+    if version != __version__:
+        print(
+            f"{command}: warning: the library in {folder} is of version {version}, fusesoc-firm in {sys.prefix} of "
+            f"{__version__}\n      = 'firm path' prints the folder of the installed package's library",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def _is_recalled(command: str) -> bool:
@@ -144,19 +168,24 @@ sys.exit(not all(map(find_spec, {_NEEDED})))
 
 
 def _above_make() -> int:
-    """The process that started the make in whose makefile this one is, maybe by a shell."""
-    from pathlib import Path
-
+    """The process that started the make in whose makefile this one is, maybe below several shells."""
     process = os.getppid()
     for name in ("sh", "make"):
-        try:
-            # Behind the program's name, which may hold anything: its state, its parent.
-            program, _, rest = Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")
-        except OSError:
-            break
-        if program.endswith(name):
-            process = int(rest.split()[1])
+        while (parent := _parent(process, name)) is not None:
+            process = parent
     return process
+
+
+def _parent(process: int, name: str) -> int | None:
+    """The parent of a process if its program's name ends with `name`."""
+    from pathlib import Path
+
+    try:
+        # After the program's name, which may hold anything: its state, its parent.
+        program, _, rest = Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")
+    except OSError:
+        return None
+    return int(rest.split()[1]) if program.endswith(name) else None
 
 
 if __name__ == "__main__":

@@ -1,11 +1,7 @@
-# A build's GNUmakefile, which GNU make reads in place of Edalize's Makefile. Programs of the build are started by `firm
-# tool` unless EDALIZE_LAUNCHER says otherwise: it finds those of PyPI, names the package of a missing one, and notes
-# in manifest.json which one has run.
+# A build's GNUmakefile, which GNU make reads in place of Edalize's Makefile: programs of the build are started by
+# firm_launcher.sh unless EDALIZE_LAUNCHER says otherwise.
 ifeq ($(origin EDALIZE_LAUNCHER),undefined)
-FIRM_PYTHON := $(shell python3 firm_python.py)
-ifneq ($(FIRM_PYTHON),)
-EDALIZE_LAUNCHER := $(FIRM_PYTHON) -m fusesoc_firm.launcher
-endif
+EDALIZE_LAUNCHER := sh firm_launcher.sh
 endif
 
 include Makefile

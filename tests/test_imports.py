@@ -13,10 +13,10 @@ PACKAGE = Path(__file__).resolve().parents[1] / "fusesoc_firm"
 _WORDS = {"diagnostics", "naming"}
 # Plain data that says how a middleware serialises.
 _WIRE = _WORDS | {"wire"}
-_MESSAGE = _WIRE | {"message"}
+_MESSAGE = _WIRE | {"message", "reads"}
 _FRAME = _MESSAGE | {"frame"}
 # What every stage that makes files may use: it knows no stage.
-_WRITING = {"generation", "render"}
+_WRITING = {"generation", "quoting", "render"}
 # What every stage that reads a file of the user may use.
 _READING = {"yaml_text", "yaml_sections"}
 _CONVERTER = _FRAME | _WRITING | _READING | {"converter"}
@@ -27,7 +27,8 @@ ALLOWED: dict[str, set[str]] = {
     "diagnostics": set(),
     "naming": set(),
     "wire": set(),
-    "message": _WIRE | {"files"},
+    # It reads bags in part.
+    "message": _WIRE | {"files", "reads"},
     "frame": _MESSAGE,
     "converter": _FRAME | _WRITING | _READING,
     # It knows requesters, not systems.
@@ -40,13 +41,15 @@ ALLOWED: dict[str, set[str]] = {
     "verify": _SYSTEM | {"files", "library_path", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.
     "netlist": {"launcher", "manifest", "tools"},
-    "render": set(),
+    "quoting": set(),
+    "render": {"quoting"},
     "own_code": {"render"},
     "files": set(),
     "reads": {"own_code"},
     "store_files": {"files"},
     "message_runs": {"files"},
-    "recall": {"files", "message_runs", "own_code", "store_files"},
+    "design_units": {"files"},
+    "recall": {"design_units", "files", "message_runs", "own_code", "store_files"},
     "message_core": _MESSAGE | {"generation", "message_runs"},
     "why": _SYSTEM,
     "lock": _SYSTEM | {"files", "project", "tools"},
@@ -60,20 +63,22 @@ ALLOWED: dict[str, set[str]] = {
     "manifest": {"tools"},
     "launcher": {"diagnostics", "manifest", "tools"},
     "yaml_text": {"diagnostics", "files"},
-    "yaml_sections": {"diagnostics", "yaml_text"},
+    "yaml_sections": _WORDS | {"yaml_text"},
     "yaml_schema": {"yaml_sections"},
     "prompts": {"diagnostics"},
     "generation": {"diagnostics"},
     "requesting_core": {"diagnostics", "yaml_text"},
-    "parameters": {"diagnostics", "generation", "requesting_core"},
+    "parameters": _WORDS | {"generation", "requesting_core"},
 }
 # The doors join the stages; __init__ holds the version.
 DOORS = {"gapi", "batch", "cli"}
 _PREFIX = "fusesoc_firm"
+# Links to cores and demo systems.
+LIBRARIES = {"library", "demos"}
 
 
 def modules(package: Path) -> Iterator[Path]:
-    return (path for path in sorted(package.rglob("*.py")) if path.relative_to(package).parts[0] != "library")
+    return (path for path in sorted(package.rglob("*.py")) if room_of(path, package) not in LIBRARIES)
 
 
 def room_of(path: Path, package: Path) -> str:

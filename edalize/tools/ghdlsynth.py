@@ -9,16 +9,15 @@ What it does stands in `fusesoc_firm.netlist`.
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, ClassVar
 
 from edalize.tools.edatool import Edatool
 from edalize.utils import EdaCommands
 
 from fusesoc_firm.netlist.translation import Translation, translator
+from fusesoc_firm.quoting import make_argument, make_prerequisite
 from fusesoc_firm.tools import programs_of
 
 
@@ -55,9 +54,13 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
         output = self.translation.output
         self.commands = EdaCommands()
         self.commands.add(
-            [shlex.quote(sys.executable), "-m", "fusesoc_firm.netlist", self._request],
+            [make_argument(sys.executable), "-m", "fusesoc_firm.netlist", self._request],
             [output],
-            [self._request, *(file["name"] for file in sources), *map(_prerequisite, translator())],
+            [
+                self._request,
+                *(file["name"] for file in sources),
+                *(make_prerequisite(str(path)) for path in translator()),
+            ],
         )
         self.commands.set_default_target(output)
         netlist = {"name": output, "file_type": "verilogSource"}
@@ -81,8 +84,3 @@ def _programs(edam: dict[str, Any]) -> list[str]:
 def _standard(files: Sequence[dict[str, Any]]) -> str:
     """GHDL reads all files by one standard."""
     return "08" if any(file["file_type"].endswith("-2008") for file in files) else "93"
-
-
-def _prerequisite(path: Path) -> str:
-    """A path in a makefile."""
-    return str(path).replace(" ", "\\ ")

@@ -6,6 +6,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from fusesoc_firm import __version__
 from fusesoc_firm.cli.build import add_build
@@ -22,7 +23,7 @@ from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.node.options import remappings
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.library_path import demos_root, library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -59,12 +60,16 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="firm", description="ROS messages and robot systems as FPGA hardware.")
     parser.add_argument("--version", action="version", version=f"firm {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    command(
+    path = command(
         commands,
         "path",
-        "print the folder of the FuseSoC library",
+        "print the folder of the FuseSoC library of reusable cores and generators",
         'fusesoc library add firm "$(firm path)"',
         _print_path,
+    )
+    path.add_argument("--demos", action="store_true", help="the library of demo systems instead")
+    path.add_argument(
+        "--relative", action="store_true", help="relative to the current folder, for a fusesoc.conf in version control"
     )
     add_message(commands)
     add_system(commands)
@@ -80,5 +85,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _print_path(_: argparse.Namespace) -> None:
-    print(library_root())
+def _print_path(arguments: argparse.Namespace) -> None:
+    folder = demos_root() if arguments.demos else library_root()
+    # Both without links, so that the steps up lead where they seem to.
+    print(os.path.relpath(folder, Path.cwd().resolve()) if arguments.relative else folder)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ import yaml
 from fusesoc_firm.diagnostics import fail
 
 if TYPE_CHECKING:
+    from fusesoc_firm.diagnostics import SourceRef
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.system.generator import LoadedSystem
 
@@ -67,8 +68,8 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        metavar="DIR",
-        help="a folder with message definitions; may be given more than once",
+        metavar="PLACE",
+        help="a folder or bag with message definitions; may be given more than once",
     )
     parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
 
@@ -86,11 +87,19 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
 
     Unless it `needs_sources`, those of its accelerators may be missing.
     """
-    from fusesoc_firm.message.library import libraries
-    from fusesoc_firm.system.generator import load_system
+    from fusesoc_firm.system.beside import load_beside
 
-    known = libraries(arguments.path, os.environ, arguments.distro)
-    return load_system(arguments.spec, known, needs_sources=needs_sources)
+    return load_beside(
+        arguments.spec, arguments.path, arguments.distro, needs_sources=needs_sources, core_folders=core_folders
+    )
+
+
+def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
+    """The folders of the messages of cores that FuseSoC knows here. Raises `InputError`."""
+    # FuseSoC is imported for those alone.
+    from fusesoc_firm.cli.project import message_folders
+
+    return message_folders(names) if names else ()
 
 
 def write(path: Path, text: str) -> None:

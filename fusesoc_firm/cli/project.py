@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fusesoc_firm.generation import Request
     from fusesoc_firm.lock import Lock
     from fusesoc_firm.project import Instance, ProjectCore
+    from fusesoc_firm.reads import Input
 
 
 def add_project(commands: Any) -> None:
@@ -58,7 +59,7 @@ def _draw_cores(arguments: argparse.Namespace) -> None:
     def sources(instance: Instance) -> list[str]:
         request = _request(instance)
         # Told from here, files of one name in two cores are two.
-        return [] if request is None else [*map(shown, _inputs(request))]
+        return [] if request is None else [*map(shown, _input_files(request))]
 
     dot = core_graph(arguments.core, arguments.target, sources)
     picture = dot if arguments.format == "dot" else svg(dot)
@@ -117,12 +118,12 @@ def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
     return lock_of(core, depends, calls)
 
 
-def _calls(core: ProjectCore) -> Iterator[tuple[Request, list[Path]]]:
-    from fusesoc_firm.gapi import MESSAGES
+def _calls(core: ProjectCore) -> Iterator[tuple[Request, Sequence[Input]]]:
+    from fusesoc_firm.gapi import GENERATORS, MESSAGES
 
     for instance in core.instances:
         if instance.generator != MESSAGES and (request := _request(instance)):
-            yield request, _inputs(request)
+            yield request, GENERATORS[request.command].inputs(request)
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
@@ -151,7 +152,7 @@ def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
         request = _request(instance)
         if request is None:
             return set()
-        files = set(_inputs(request))
+        files = set(_input_files(request))
         used = used_before(request, GENERATORS[request.command])
     except InputError:
         # It cannot be made: whatever changed beside it, or in our own files, may be why.
@@ -167,12 +168,12 @@ def _request(instance: Instance) -> Request | None:
 
     if instance.generator not in GENERATORS:
         return None
-    known = GENERATORS[instance.generator].parameters
+    known = GENERATORS[instance.generator]
     call = Call(instance.vlnv, instance.files_root, instance.parameters)
-    return make_request(instance.generator, call, known, _message_folders)
+    return make_request(instance.generator, call, known, message_folders)
 
 
-def _message_folders(names: MessageCores) -> tuple[Path, ...]:
+def message_folders(names: MessageCores) -> tuple[Path, ...]:
     """The folders of cores that carry messages, where these lie: there is no run that copies them."""
     from fusesoc_firm.gapi import MESSAGES
     from fusesoc_firm.message_core import folders
@@ -189,10 +190,12 @@ def _message_folders(names: MessageCores) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def _inputs(request: Request) -> list[Path]:
+def _input_files(request: Request) -> list[Path]:
+    """The files that a request depends on, be it in part."""
     from fusesoc_firm.gapi import GENERATORS
 
-    return [path.resolve() for path in GENERATORS[request.command].inputs(request)]
+    found = (item if isinstance(item, Path) else item.path for item in GENERATORS[request.command].inputs(request))
+    return [*dict.fromkeys(path.resolve() for path in found)]
 
 
 def shown(path: Path) -> str:

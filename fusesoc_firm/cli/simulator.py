@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.cli.common import add_sources, command
+from fusesoc_firm.cli.common import add_sources, command, core_folders
 
 
 def add_simulator(commands: Any) -> None:
@@ -54,7 +54,7 @@ def built_simulator(arguments: argparse.Namespace) -> Any:
     """The `BuiltSimulator` that the arguments ask for."""
     from fusesoc_firm.host.simulator import CoreSources, build_simulator
 
-    sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment)
+    sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)
     return build_simulator(arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources)
 
 

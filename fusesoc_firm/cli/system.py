@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import add_sources, as_yaml, command, library_of, load, write
+from fusesoc_firm.cli.common import add_sources, as_yaml, command, core_folders, load, write
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.model import RosVersion
@@ -24,8 +24,12 @@ def _cpp_package(loaded: LoadedSystem, ros: RosVersion | None, _: argparse.Names
 
 def _python_node(loaded: LoadedSystem, ros: RosVersion | None, arguments: argparse.Namespace) -> Mapping[str, str]:
     from fusesoc_firm.host.node.source import python_node
+    from fusesoc_firm.system.beside import sources_of
 
-    return python_node(loaded, ros, arguments.spec, arguments.output, arguments.path)
+    # The node runs where FuseSoC may not be.
+    own = core_folders(loaded.specification.message_cores)
+    sources = sources_of(arguments.spec, [*own, *arguments.path], core_folders=core_folders)
+    return python_node(loaded, ros, arguments.spec, arguments.output, sources.paths)
 
 
 _Writer = Callable[["LoadedSystem", "RosVersion | None", argparse.Namespace], Mapping[str, str]]
@@ -150,12 +154,16 @@ def _new_system(arguments: argparse.Namespace) -> None:
 
     if arguments.spec.exists():
         _check_system(arguments)
-    extend_specification(arguments.spec, asker(), lambda: _message_names(arguments))
+    extend_specification(arguments.spec, asker(), lambda paths: _message_names(arguments, paths))
     _check_system(arguments)
 
 
-def _message_names(arguments: argparse.Namespace) -> list[str]:
-    return sorted({str(name) for ros in (1, 2) for name in library_of(arguments, ros).names()})
+def _message_names(arguments: argparse.Namespace, own: Sequence[str]) -> list[str]:
+    """The messages that a specification with `own` paths can name."""
+    from fusesoc_firm.system.beside import known_names, sources_of
+
+    sources = sources_of(arguments.spec, arguments.path, arguments.distro, core_folders)
+    return known_names(arguments.spec, own, sources, core_folders)
 
 
 def _write_skeletons(arguments: argparse.Namespace) -> None:
@@ -175,7 +183,8 @@ def _write_core(arguments: argparse.Namespace) -> None:
 
     spec: Path = arguments.spec
     path: Path = arguments.output or spec.with_suffix(".core")
-    system = load(arguments, needs_sources=False).system
+    loaded = load(arguments, needs_sources=False)
+    system = loaded.system
     if path.exists():
         text = updated_core(system, path)
     else:
@@ -183,7 +192,7 @@ def _write_core(arguments: argparse.Namespace) -> None:
         options = CoreOptions(
             arguments.name,
             arguments.description,
-            arguments.depend,
+            [*arguments.depend, *loaded.specification.message_cores],
             arguments.stimuli,
             arguments.model,
             arguments.environment,

@@ -21,7 +21,7 @@ def add_why(commands: Any) -> None:
         commands,
         "why",
         "tell which line of a template, of the specification and of a message made a generated line",
-        "firm why build/robot_sys_quat2euler_0.1.0/sim/src/robot_sys_quat2euler-system_0.1.0/quat2euler_system.vhd:80",
+        "firm why build/robot_sys_quat2euler_0.2.0/sim/src/robot_sys_quat2euler-system_0.2.0/quat2euler_system.vhd:80",
         _tell_why,
     )
     why.add_argument("place", metavar="FILE[:LINE]", help="a generated file of a build; without LINE, every line of it")
@@ -36,7 +36,7 @@ def _tell_why(arguments: argparse.Namespace) -> None:
         fail(f"there is no file {path}", hint="after its name stands a line, or nothing: FILE:LINE")
     call, name = call_file(path)
     command_ = _generator(call)
-    request = read_request(command_, call, GENERATORS[command_].parameters, is_this_run=False)
+    request = read_request(command_, call, GENERATORS[command_], is_this_run=False)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -11,7 +11,7 @@ from pathlib import Path
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.diagnostics import Diagnostics, fail
 from fusesoc_firm.message.model import MIDDLEWARES
-from fusesoc_firm.naming import identifier
+from fusesoc_firm.naming import PREFIX_RULE, identifier, is_prefix
 from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
@@ -31,6 +31,7 @@ class Project(Section):
     name: Text = key("the project's name", is_required=True)
     platform: Platform | None = key("what the hardware is for", form="section", section=Platform)
     width: int = key("bits of the streams", form="integer", choices=WIDTHS, default=8)
+    prefix: Text | None = key("what the names of all generated units but the interfaces begin with, such as left")
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,9 @@ def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
 
 def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
     """Every message has an interface, and every interface a name that an entity can have alone."""
+    prefix = config.project.prefix
+    if prefix is not None and not is_prefix(prefix):
+        faults.error(f"no entity can be called '{prefix}_axis_to_...'", prefix.source, PREFIX_RULE)
     seen: dict[str, Text] = {}
     for message in config.messages:
         names = (*message.subscribers, *message.publishers)

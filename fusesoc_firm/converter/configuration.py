@@ -19,7 +19,7 @@ from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, store
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.defaults import default_payload
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
-from fusesoc_firm.naming import entity_name
+from fusesoc_firm.naming import entity_name, prefixed
 
 Configuration = dict[str, Any]
 
@@ -35,18 +35,18 @@ _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
 
 
-def subscriber_entity(frame: Frame, suffix: str = "") -> str:
-    """`axis_to_<pkg>_<type>`; a suffix tells converters of other fields apart."""
-    return f"axis_to_{entity_name(frame.message.package, frame.message.name)}{suffix}"
+def subscriber_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
+    """`<prefix>_axis_to_<pkg>_<type>`; a suffix tells converters of other fields apart, a prefix those of a core."""
+    return prefixed(prefix, f"axis_to_{entity_name(frame.message.package, frame.message.name)}{suffix}")
 
 
-def publisher_entity(frame: Frame, suffix: str = "") -> str:
-    """`<pkg>_<type>_to_axis`; a suffix tells converters of other fields apart."""
-    return f"{entity_name(frame.message.package, frame.message.name)}_to_axis{suffix}"
+def publisher_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
+    """`<prefix>_<pkg>_<type>_to_axis`; a suffix tells converters of other fields apart, a prefix those of a core."""
+    return prefixed(prefix, f"{entity_name(frame.message.package, frame.message.name)}_to_axis{suffix}")
 
 
-def subscriber_configuration(frame: Frame, width: int, suffix: str = "") -> Configuration:
-    """The configuration of the entity `subscriber_entity` for a stream of `width` bits."""
+def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Configuration:
+    """The configuration of `entity`, or else `subscriber_entity`, for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -56,7 +56,7 @@ def subscriber_configuration(frame: Frame, width: int, suffix: str = "") -> Conf
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
     inputs = ["s_axis_tdata"] + ([] if stream.lanes == 1 else ["s_axis_tkeep"])
     return {
-        **_common(frame, stream, subscriber_entity(frame, suffix), "out"),
+        **_common(frame, stream, entity or subscriber_entity(frame), "out"),
         **store_configuration(stores, _COUNTER),
         **_states(stream.beat(ends[-1])),
         "is_byte_wide": stream.lanes == 1,
@@ -91,8 +91,8 @@ def _states(last_position: int) -> Configuration:
     }
 
 
-def publisher_configuration(frame: Frame, width: int, suffix: str = "") -> Configuration:
-    """The configuration of the entity `publisher_entity` for a stream of `width` bits."""
+def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Configuration:
+    """The configuration of `entity`, or else `publisher_entity`, for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -102,7 +102,7 @@ def publisher_configuration(frame: Frame, width: int, suffix: str = "") -> Confi
     start = _first_position(stream)
     position_bits = max(1, (start + beats - 1).bit_length())
     return {
-        **_common(frame, stream, publisher_entity(frame, suffix), "in"),
+        **_common(frame, stream, entity or publisher_entity(frame), "in"),
         "first_position": start,
         "last_position": start + beats - 1,
         "frame_high": (start + beats) * width - 1,

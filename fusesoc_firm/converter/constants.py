@@ -17,7 +17,7 @@ from fusesoc_firm.frame.model import COUNT_BYTES
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import Constant, MessageName, RosVersion, StringType, nested_message
 from fusesoc_firm.message.signature import Definitions, signature
-from fusesoc_firm.naming import distinct_constants, entity_name
+from fusesoc_firm.naming import distinct_constants, entity_name, prefixed
 from fusesoc_firm.wire import CHARACTER, WIDE_CHARACTER
 
 CONSTANTS_TEMPLATE = "vhdl/constants.vhd"
@@ -50,9 +50,10 @@ class _Placed:
         return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
 
 
-def constants_package(name: MessageName, ros: RosVersion | None = None) -> str:
-    """`<pkg>_<type>_pkg`, or `<pkg>_<type>_ros<N>_pkg` where packages of both versions lie side by side."""
-    return "_".join([entity_name(name.package, name.name), *([] if ros is None else [f"ros{int(ros)}"]), "pkg"])
+def constants_package(name: MessageName, ros: RosVersion | None = None, prefix: str = "") -> str:
+    """`<prefix>_<pkg>_<type>_pkg`, or `..._ros<N>_pkg` where packages of both versions lie side by side."""
+    version = [] if ros is None else [f"ros{int(ros)}"]
+    return prefixed(prefix, "_".join([entity_name(name.package, name.name), *version, "pkg"]))
 
 
 def constants_configuration(name: MessageName, definitions: Definitions, package: str) -> dict[str, Any]:

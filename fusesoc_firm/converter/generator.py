@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
@@ -14,13 +15,14 @@ from fusesoc_firm.converter.constants import (
     constants_package,
 )
 from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_configuration
-from fusesoc_firm.converter.order import ENTITIES, Order, Selection, order_of_config, order_of_message
+from fusesoc_firm.converter.order import Order, Selection, order_of_config, order_of_message
 from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.reads import Input
 from fusesoc_firm.render import render
 
 VHDL = "vhdlSource-93"
@@ -31,11 +33,11 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
-    folders = [*(request.files_root / path for path in paths), *request.message_folders]
+    folders = [*(request.files_root / path for path in paths), *request.folders_of(request.listed("messages"))]
     return folders, os.environ, None if distro is None else str(distro)
 
 
-def inputs(request: Request) -> list[Path]:
+def inputs(request: Request) -> list[Input]:
     """The files that say what is wanted and that hold the definitions; none for those of a type store."""
     return list(order_of_request(request).files)
 
@@ -43,46 +45,46 @@ def inputs(request: Request) -> list[Path]:
 def generate(request: Request) -> GeneratedCore:
     """What the request asks for, in the order in which a tool reads it. Raises `InputError`."""
     order = order_of_request(request)
-    files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages])
+    files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
     interfaces: dict[str, GeneratedFile] = {}
     for wanted in order.messages:
         for direction, files_of in (("subscriber", subscriber_files), ("publisher", publisher_files)):
             if direction in wanted.interfaces:
-                files |= files_of([wanted.frame], order.width)
-                converter = ENTITIES[direction](wanted.frame)
+                files |= files_of([wanted.frame], order.width, order.prefix)
+                converter = order.entity(wanted.frame, direction)
                 vhdl = str(files[f"{converter}.vhd"].content)
                 interfaces |= _interface_files(wanted.interfaces[direction], converter, vhdl, wanted.frame)
     return GeneratedCore(f"Converters of {order.title}", files | interfaces)
 
 
-def constants_files(messages: Sequence[tuple[MessageName, Definitions]]) -> dict[str, GeneratedFile]:
+def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix: str = "") -> dict[str, GeneratedFile]:
     """The package of each message, of which none comes twice; the definitions are of it and all within it."""
     return {
         path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
-        for path, configuration in constants_configurations(messages)
+        for path, configuration in constants_configurations(messages, prefix)
     }
 
 
 def constants_configurations(
-    messages: Sequence[tuple[MessageName, Definitions]],
+    messages: Sequence[tuple[MessageName, Definitions]], prefix: str = ""
 ) -> Iterator[tuple[str, Configuration]]:
     """The file of each message's package, and what it is rendered from."""
     counts = Counter(name for name, _ in messages)
     for name, definitions in messages:
-        package = constants_package(name, definitions[name].ros if counts[name] > 1 else None)
+        package = constants_package(name, definitions[name].ros if counts[name] > 1 else None, prefix)
         yield f"{package}.vhd", constants_configuration(name, definitions, package)
 
 
-def subscriber_files(frames: Iterable[Frame], width: int, suffix: str = "") -> dict[str, GeneratedFile]:
-    """`axis_to_<pkg>_<type><suffix>.vhd` of each frame."""
-    return {
-        f"{subscriber_entity(frame, suffix)}.vhd": _file(subscriber_source(frame, width, suffix)) for frame in frames
-    }
+def subscriber_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
+    """`<prefix>_axis_to_<pkg>_<type>.vhd` of each frame."""
+    entities = {subscriber_entity(frame, prefix=prefix): frame for frame in frames}
+    return {f"{entity}.vhd": _file(subscriber_source(frame, width, entity)) for entity, frame in entities.items()}
 
 
-def publisher_files(frames: Iterable[Frame], width: int, suffix: str = "") -> dict[str, GeneratedFile]:
-    """`<pkg>_<type>_to_axis<suffix>.vhd` of each frame."""
-    return {f"{publisher_entity(frame, suffix)}.vhd": _file(publisher_source(frame, width, suffix)) for frame in frames}
+def publisher_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
+    """`<prefix>_<pkg>_<type>_to_axis.vhd` of each frame."""
+    entities = {publisher_entity(frame, prefix=prefix): frame for frame in frames}
+    return {f"{entity}.vhd": _file(publisher_source(frame, width, entity)) for entity, frame in entities.items()}
 
 
 def _file(source: ConverterSource) -> GeneratedFile:
@@ -98,7 +100,8 @@ def order_of_request(request: Request) -> Order:
     library = MessageLibrary(RosVersion(ros), *library_sources(request))
     message, direction = str(request.parameters["message"]), str(request.parameters["direction"])
     selection = Selection(request.listed("include"), request.listed("exclude"))
-    return order_of_message(message, direction, width, library, selection)
+    order = order_of_message(message, direction, width, library, selection)
+    return replace(order, prefix=str(request.parameters.get("name") or ""))
 
 
 def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:

@@ -28,8 +28,8 @@ def interface_configuration(name: str, converter: str, vhdl: str, message: str) 
         "message": message,
         "label": label,
         "has_generics": bool(generics),
-        "generics": generics.splitlines(),
-        "ports": ports.splitlines(),
+        "generics": generics.removesuffix("\n").split("\n"),
+        "ports": ports.removesuffix("\n").split("\n"),
         "generic_names": _associations(_NAME.findall(generics)),
         "port_names": _associations(port_names),
     }

@@ -20,6 +20,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.reads import Input
 
 # The directions and the entity of a frame's converter in each.
 ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
@@ -49,12 +50,20 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Order:
-    """All that is wanted: each message once, streams of `width` bits, and the `files` that it was read from."""
+    """All that is wanted: each message once, streams of `width` bits, and the `files` that it was read from.
+
+    `prefix` stands before the names of all design units that are not named by the user.
+    """
 
     title: str
     width: int
     messages: tuple[Wanted, ...]
-    files: tuple[Path, ...]
+    files: tuple[Input, ...]
+    prefix: str = ""
+
+    def entity(self, frame: Frame, direction: str) -> str:
+        """The entity of a frame's converter."""
+        return ENTITIES[direction](frame, prefix=self.prefix)
 
 
 @dataclass(frozen=True)
@@ -101,11 +110,12 @@ def order_of_config(path: Path, libraries: Mapping[RosVersion, MessageLibrary]) 
     faults = Diagnostics()
     config = read_config(path, faults)
     found = [(entry, wanted) for entry in config.messages if (wanted := _wanted(entry, libraries, faults))]
-    _check_entities(found, faults)
+    prefix = str(config.project.prefix or "")
+    _check_entities(found, prefix, faults)
     faults.raise_if_any()
     messages = _joined(wanted for _, wanted in found)
     files = [file for wanted in messages for file in libraries[wanted.ros].files(wanted.definitions)]
-    return Order(str(config.project.name), config.project.width, messages, (path, *dict.fromkeys(files)))
+    return Order(str(config.project.name), config.project.width, messages, (path, *dict.fromkeys(files)), prefix)
 
 
 def _wanted(
@@ -139,17 +149,17 @@ def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
     return tuple(joined.values())
 
 
-def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], faults: Diagnostics) -> None:
+def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, faults: Diagnostics) -> None:
     """A tool keeps one entity or package of each name, so none may be needed for two things."""
     owners: dict[str, tuple[str, Frame]] = {}
     for entry, wanted in found:
-        package = constants_package(wanted.message)
+        package = constants_package(wanted.message, prefix=prefix)
         _, twin = owners.setdefault(package, ("package", wanted.frame))
         if twin.message != wanted.message:
             message = f"'{wanted.message}' and '{twin.message}' need the package '{package}'"
             faults.error(message, entry.name.source)
         for direction in wanted.interfaces:
-            entity = ENTITIES[direction](wanted.frame)
+            entity = ENTITIES[direction](wanted.frame, prefix=prefix)
             _, twin = owners.setdefault(entity, (direction, wanted.frame))
             if twin.message == wanted.message and twin.ros is not wanted.ros:
                 message = f"'{wanted.message}' needs the entity '{entity}' for {twin.ros.title} already"

@@ -27,29 +27,29 @@ class ConverterSource(NamedTuple):
     configuration: Configuration
 
 
-def subscriber_source(frame: Frame, width: int, suffix: str = "") -> ConverterSource:
-    """`axis_to_<pkg>_<type><suffix>` on `width` bits. Raises `InputError` for what no converter is made for."""
+def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
+    """`entity`, or else `subscriber_entity`, on `width` bits. Raises `InputError` for what no converter is made for."""
     check_width(width)
     if frame.is_fixed_size:
-        return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, suffix))
+        return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, entity))
     from fusesoc_firm.converter.variable_subscriber import (
         VARIABLE_SUBSCRIBER_TEMPLATE,
         variable_subscriber_configuration,
     )
 
-    configuration = variable_subscriber_configuration(frame, width, subscriber_entity(frame, suffix))
+    configuration = variable_subscriber_configuration(frame, width, entity or subscriber_entity(frame))
     return ConverterSource(VARIABLE_SUBSCRIBER_TEMPLATE, configuration)
 
 
-def publisher_source(frame: Frame, width: int, suffix: str = "") -> ConverterSource:
-    """`<pkg>_<type>_to_axis<suffix>` on `width` bits. Raises `InputError` for what no converter is made for."""
+def publisher_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
+    """`entity`, or else `publisher_entity`, on `width` bits. Raises `InputError` for what no converter is made for."""
     check_width(width)
     if frame.is_fixed_size:
-        return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, suffix))
+        return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, entity))
     from fusesoc_firm.converter.variable_publisher import (
         VARIABLE_PUBLISHER_TEMPLATE,
         variable_publisher_configuration,
     )
 
-    configuration = variable_publisher_configuration(frame, width, publisher_entity(frame, suffix))
+    configuration = variable_publisher_configuration(frame, width, entity or publisher_entity(frame))
     return ConverterSource(VARIABLE_PUBLISHER_TEMPLATE, configuration)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Sequence
 from typing import Any
 
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Path
-from fusesoc_firm.frame.values import CodecError, check_bound, dotted, put, put_leaf, text_of
+from fusesoc_firm.frame.values import CodecError, check_bound, dotted, put, put_leaf, text_of, unpacked
 
 
 def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
@@ -85,7 +84,7 @@ class _Reader:
             self._fail("")
 
     def _numbers(self, leaf: FrameField, count: int) -> Sequence[Any]:
-        return struct.unpack(f"<{count}{leaf.type.code}", self._take(count * leaf.type.size, leaf.names))
+        return unpacked(leaf.type.code, self._take(count * leaf.type.size, leaf.names))
 
     def _align(self, alignment: int) -> None:
         self.position += (len(self._frame.prefix) - self.position) % alignment
@@ -104,7 +103,7 @@ class _Reader:
             raise CodecError(f"'{dotted(node.names)}' does not end with a zero")
         if node.kind is not DataKind.ARRAY:
             return text_of(node, units)
-        return units if node.element.code == "B" else list(struct.unpack(f"<{count}{node.element.code}", units))
+        return units if node.element.code == "B" else [*unpacked(node.element.code, units)]
 
     def _loop(self, node: Loop) -> list[Any]:
         count = self._count(node) if node.count is None else node.count

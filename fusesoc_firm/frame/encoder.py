@@ -14,6 +14,7 @@ from fusesoc_firm.frame.values import (
     check_bound,
     dotted,
     leaf_of,
+    packed,
     part_of,
     reject_unknown,
     shown,
@@ -64,24 +65,24 @@ class _Writer:
             elements = leaf_of(value, leaf, depth)[leaf.first :]
             taken = 0
             for run in leaf.runs:
-                packed = _pack(leaf.type, elements[taken : taken + run.count], leaf.names)
+                data = _pack(leaf.type, elements[taken : taken + run.count], leaf.names)
                 offset = start + run.offset
-                self.payload[offset : offset + len(packed)] = packed
+                self.payload[offset : offset + len(data)] = data
                 taken += run.count
 
     def _align(self, alignment: int) -> None:
         self.payload += bytes((self._prefix_bytes - len(self.payload)) % alignment)
 
     def _data(self, node: Data, value: Any) -> None:
-        packed = _pack_array(node, value) if node.kind is DataKind.ARRAY else units_of(node, value)
-        count = len(packed) // node.element.size
+        data = _pack_array(node, value) if node.kind is DataKind.ARRAY else units_of(node, value)
+        count = len(data) // node.element.size
         check_bound(node, count)
         self._count(count + node.terminator)
         if count and node.padding is None:
             self._align(node.alignment)
         elif count and node.padding:
             self.payload += bytes(node.padding)
-        self.payload += packed
+        self.payload += data
         self.payload += bytes(node.terminator)
 
     def _loop(self, node: Loop, value: Any) -> None:
@@ -123,4 +124,4 @@ def _packed(type_: WireType, values: Sequence[Any]) -> bytes:
     # `struct` takes anything for a bool: the text "False" would be sent as true.
     if type_.code == "?" and any(value not in (False, True) for value in values):
         raise TypeError
-    return struct.pack(f"<{len(values)}{type_.code}", *values)
+    return packed(type_.code, values)

@@ -6,7 +6,7 @@ A text is a `str`. Bytes that are no UTF-8, and UTF-16 units that are no pair, a
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from reprlib import Repr
 from typing import Any
 
@@ -22,6 +22,49 @@ _repr.maxstring = _repr.maxother = _repr.maxlong = 60
 
 class CodecError(ValueError):
     """A value that does not fit its message, or bytes that do not fit their frame."""
+
+
+class SignallingNan(float):
+    """A signalling NaN of a float32, which conversion to a double, Python's float, would make a quiet one.
+
+    It is shown, and calculated with, as any NaN; `bits` are those on the wire.
+    """
+
+    bits: int
+
+    def __new__(cls, bits: int) -> SignallingNan:
+        """The NaN of these 32 bits."""
+        made = super().__new__(cls, "nan")
+        made.bits = bits
+        return made
+
+    def __getnewargs__(self) -> tuple[int]:
+        """How a copy is made."""
+        return (self.bits,)
+
+
+def packed(code: str, values: Sequence[Any]) -> bytes:
+    """Numbers side by side as they are sent; `code` is that of `struct`, whose errors it raises."""
+    data = struct.pack(f"<{len(values)}{code}", *values)
+    if code != "f" or SignallingNan not in {*map(type, values)}:
+        return data
+    words = struct.unpack(f"<{len(values)}I", data)
+    kept = (value.bits if isinstance(value, SignallingNan) else word for value, word in zip(values, words, strict=True))
+    return struct.pack(f"<{len(values)}I", *kept)
+
+
+def unpacked(code: str, data: bytes) -> Sequence[Any]:
+    """The numbers that were sent as `data`: `packed` gives the same bytes for them."""
+    numbers = struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data)
+    if code != "f" or struct.pack(f"<{len(numbers)}f", *numbers) == data:
+        return numbers
+    words = struct.unpack(f"<{len(numbers)}I", data)
+    return [SignallingNan(word) if _is_signalling(word) else n for n, word in zip(numbers, words, strict=True)]
+
+
+def _is_signalling(word: int) -> bool:
+    """Whether the bits of a float32 are all ones in the exponent, and in the fraction not zero with a zero on top."""
+    return word & 0x7FC00000 == 0x7F800000 and word & 0x003FFFFF != 0
 
 
 def shown(value: object) -> str:

@@ -16,7 +16,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
 from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.host.bags import Form
+from fusesoc_firm.message.bags import Form
 from fusesoc_firm.message.joint import joint_text
 from fusesoc_firm.message.signature import Definitions, signature
 

@@ -38,8 +38,9 @@ _FLAGS = (
     "-MMD",
     "-Wno-unknown-pragmas",
 )
-# A file in a rule of make; a blank in its name is escaped.
+# A file in a rule of make, and what is escaped in its name.
 _WORD = re.compile(r"(?:\\ |\S)+")
+_ESCAPED = re.compile(r"\\([ #])|\$(?=\$)")
 _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
 
 
@@ -93,7 +94,7 @@ def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> 
     """Every included file must be a source: a change of one that is not would never be noticed."""
     sources = {(folder / source).resolve() for source in accelerator.accelerator.sources}
     included = {
-        (place / word.replace("\\ ", " ")).resolve()
+        (place / _ESCAPED.sub(r"\1", word)).resolve()
         for rules in place.glob("*.d")
         for word in _WORD.findall(rules.read_text(encoding="utf-8").replace("\\\n", " "))[1:]
     }

@@ -18,6 +18,7 @@ from fusesoc_firm.host.node.description import NodeDescription, NodeTopic, descr
 from fusesoc_firm.host.software_process import software_ports
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.quoting import lines_of
 from fusesoc_firm.render import render
 from fusesoc_firm.system.generator import LoadedSystem
 
@@ -158,13 +159,14 @@ def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
     texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
     for name, text in texts.items():
         if text:
-            first, *lines = text.splitlines()
+            lines = lines_of(text)
             yield {
                 "message": name,
                 "constant": _constant(name),
-                "delimiter": _delimiter(text),
-                "first_line": first,
-                "lines": lines,
+                "lines": [
+                    {"text": line, "end": ";" if number == len(lines) else ""}
+                    for number, line in enumerate(lines, start=1)
+                ],
             }
 
 
@@ -172,14 +174,6 @@ def _constant(message: str) -> str:
     """The name of a definition's text: `kGeometryMsgsQuaternion`."""
     words = re.split("_+", identifier(message))
     return "k" + "".join(f"{word[0].upper()}{word[1:]}" for word in words)
-
-
-def _delimiter(text: str) -> str:
-    """What ends a raw string, and is not in `text`."""
-    delimiter = "msg"
-    while f'){delimiter}"' in text:
-        delimiter += "_"
-    return delimiter
 
 
 def _row(topic: NodeTopic) -> dict[str, Any]:

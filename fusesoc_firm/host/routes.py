@@ -10,8 +10,9 @@ from typing import Any, TypeVar
 
 from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
 from fusesoc_firm.frame.codec import CodecError, decode
-from fusesoc_firm.host.bags import BAGS, Bag, Stream, open_bag
+from fusesoc_firm.message.bags import BAGS, Bag, Stream, open_bag
 from fusesoc_firm.message.joint import signature_of_text
+from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived import Topic
@@ -75,7 +76,7 @@ class _Routing:
         """The topic of a subscriber that no topic is called like; empty if there is none, or no single one."""
         streams = self.bag.streams
         topics = [item.topic for item in streams if not takers[item.topic] and self._fits(item, subscriber)]
-        rivals = [item for item in self.subscribers if item.frame.message == subscriber.frame.message]
+        rivals = [item for item in self.subscribers if _meant(item) == _meant(subscriber)]
         found = list(dict.fromkeys(topics))
         if len(found) == len(rivals) == 1:
             return found[0]
@@ -89,13 +90,18 @@ class _Routing:
         return ""
 
     def _fits(self, stream: Stream, subscriber: Topic) -> bool:
-        return _message(stream) == subscriber.frame.message and self.bag.form.ros == subscriber.frame.ros
+        return self._is_of(stream, subscriber) and self.bag.form.ros == subscriber.frame.ros
+
+    def _is_of(self, stream: Stream, subscriber: Topic) -> bool:
+        """Whether a stream has the subscriber's message by name, in whichever version of ROS."""
+        name = _message(stream)
+        return name is not None and _present(name, self.bag.form.ros) == _meant(subscriber)
 
     def _check_versions(self, takers: Mapping[str, Sequence[Topic]]) -> None:
         """Note each topic of a message that the system takes of the other version of ROS alone."""
         ros = self.bag.form.ros
         for stream in self.bag.streams:
-            fitting = [item for item in self.subscribers if item.frame.message == _message(stream)]
+            fitting = [item for item in self.subscribers if self._is_of(stream, item)]
             wrong = [item for item in takers[stream.topic] or fitting if item.frame.ros != ros]
             if wrong and not any(item.frame.ros == ros for item in fitting):
                 versions = f"is of {ros.title}, but '{wrong[0].block}' speaks {wrong[0].frame.ros.title}"
@@ -105,7 +111,7 @@ class _Routing:
         """Why subscribers cannot take a stream that is theirs by name; empty if they can."""
         for item in subscribers:
             wanted = item.frame.message
-            if _message(stream) != wanted:
+            if not self._is_of(stream, item):
                 return f"it is a {_spelled(stream)}, but '{item.block}' takes {wanted}"
             if item.frame.ros != self.bag.form.ros:
                 return f"it is of {self.bag.form.ros.title}, but '{item.block}' speaks {item.frame.ros.title}"
@@ -128,6 +134,15 @@ def _message(stream: Stream) -> MessageName | None:
         return parse_name(stream.type)
     except InputError:
         return None
+
+
+def _meant(topic: Topic) -> MessageName:
+    return _present(topic.frame.message, topic.frame.ros)
+
+
+def _present(name: MessageName, ros: RosVersion) -> MessageName:
+    """The present name of a message that may have had another one."""
+    return middleware_of(ros).aliases.get(name, name)
 
 
 def _spelled(stream: Stream) -> str:

@@ -18,6 +18,7 @@ from fusesoc_firm.host.kernel import kernel_files
 from fusesoc_firm.host.reference import Response, responses
 from fusesoc_firm.host.software import answered, stimulated, traffic
 from fusesoc_firm.host.stimuli import read_stimuli
+from fusesoc_firm.reads import Input
 from fusesoc_firm.render import render
 from fusesoc_firm.system import generator
 from fusesoc_firm.system.configuration import TEST_BENCH_TEMPLATE, Configuration, test_bench_configuration
@@ -37,10 +38,10 @@ SIMULATORS = (GHDL, "icarus", "verilator")
 _BENCH_TAGS = ("simulation",)
 
 
-def inputs(request: Request) -> list[Path]:
+def inputs(request: Request) -> list[Input]:
     """What the system depends on, the stimuli, the model, the environment, and what else code of the user reads."""
     stimuli, model = _path(request, "stimuli"), _path(request, "model")
-    return [*generator.inputs(request), *_bag_files(stimuli), model, *_environment(request), *_files(request)]
+    return [*generator.inputs(request), *_stimuli_files(stimuli), model, *_environment(request), *_files(request)]
 
 
 def generate(request: Request) -> GeneratedCore:
@@ -69,7 +70,7 @@ def generate(request: Request) -> GeneratedCore:
     return GeneratedCore(f"Simulation of system {system.name}", files)
 
 
-def live_inputs(request: Request) -> list[Path]:
+def live_inputs(request: Request) -> list[Input]:
     """What the system depends on, and the environment."""
     return [*generator.inputs(request), *_environment(request)]
 
@@ -164,6 +165,16 @@ def _path(request: Request, parameter: str) -> Path:
     return request.files_root / str(value)
 
 
+def _stimuli_files(path: Path) -> list[Path]:
+    """The files of stimuli, of which a bag may be a folder."""
+    if path.is_file():
+        return [path]
+    # A call that the store answers does without what the import of rosbags' readers costs.
+    from fusesoc_firm.message.bags import bag_files
+
+    return bag_files(path)
+
+
 def _environment(request: Request) -> dict[Path, SourceRef | None]:
     """The files of the environment, each with its place in the requesting core."""
     return {request.files_root / file: source for file, source in request.listed("environment").items()}
@@ -171,8 +182,3 @@ def _environment(request: Request) -> dict[Path, SourceRef | None]:
 
 def _files(request: Request) -> list[Path]:
     return [request.files_root / file for file in request.listed("files")]
-
-
-def _bag_files(path: Path) -> list[Path]:
-    """The files of a bag, which may be a folder (ROS 2), or the file itself."""
-    return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]

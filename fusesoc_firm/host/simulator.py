@@ -13,6 +13,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -28,10 +29,10 @@ import yaml
 from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.files import write_if_changed
 from fusesoc_firm.library_path import library_root
-from fusesoc_firm.message.library import libraries
 from fusesoc_firm.store_files import default_root
+from fusesoc_firm.system.beside import core_content, core_of, load_beside
 from fusesoc_firm.system.core_file import CoreOptions, new_core
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.generator import CoreFolders, no_core_folders
 from fusesoc_firm.tools import missing, simulation_programs, ways
 
 GHDL, VERILATOR = "ghdl", "verilator"
@@ -50,6 +51,7 @@ class CoreSources:
     distro: str = ""
     depend: Sequence[str] = ()
     environment: Sequence[Path] = ()
+    core_folders: CoreFolders = no_core_folders
 
 
 @dataclass(frozen=True)
@@ -106,38 +108,19 @@ def build_simulator(
         return BuiltSimulator(tool, work, tuple(_words(work, tool)))
 
 
-def core_of(spec: Path) -> Path | None:
-    """The core beside a specification that makes a system of it and can simulate it; None if there is none."""
-    return next((path for path in sorted(spec.parent.glob("*.core")) if _names(path, spec)), None)
-
-
-def _names(core: Path, spec: Path) -> bool:
-    """Whether a core makes a system of the specification."""
-    parameters = _content(core).get("generate", {}).get("system", {}).get("parameters", {})
-    return bool(parameters.get("spec")) and (core.parent / str(parameters["spec"])).resolve() == spec
-
-
-def _content(core: Path) -> Any:
-    """A core's description; empty if it is none."""
-    try:
-        content = yaml.safe_load(core.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
-        return content if isinstance(content["generate"]["system"]["parameters"], dict) else {}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
-        return {}
-
-
 def _write_core(spec: Path, folder: Path, sources: CoreSources) -> Path:
     """A core for a specification that has none."""
     paths = [path.absolute() for path in sources.paths]
-    system = load_system(spec, libraries(paths, os.environ, sources.distro or None)).system
+    loaded = load_beside(spec, paths, sources.distro or None, core_folders=sources.core_folders)
+    system = loaded.system
     options = CoreOptions(
         name=f"robot:live:{system.name}:0",
-        depend=sources.depend,
+        depend=[*sources.depend, *loaded.specification.message_cores],
         environment=[str(path.absolute()) for path in sources.environment],
         paths=list(map(str, paths)),
         distro=sources.distro,
     )
-    core = folder / f"{spec.stem}.core"
+    core = folder / f"{_short_name(spec)}.core"
     write_if_changed(core, new_core(system, str(spec), options))
     return core
 
@@ -145,12 +128,17 @@ def _write_core(spec: Path, folder: Path, sources: CoreSources) -> Path:
 def _build_folder(spec: Path, tool: str, root: Path) -> Path:
     """A folder of its own for each specification and tool; the name of its file helps people."""
     digest = hashlib.sha256(str(spec).encode()).hexdigest()[:12]
-    folder = root.absolute() / f"{spec.stem}-{digest}-{tool}"
+    folder = root.absolute() / f"{_short_name(spec)}-{digest}-{tool}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         fail(f"cannot write {folder}: {error.strerror}")
     return folder
+
+
+def _short_name(spec: Path) -> str:
+    """What a specification's file is called, without the characters that make and simulators do not take in a path."""
+    return re.sub(r"[^A-Za-z0-9_.+-]", "_", spec.stem).lstrip("-")[:60]
 
 
 @contextmanager
@@ -163,7 +151,7 @@ def _alone_in(folder: Path) -> Iterator[None]:
 
 def _build(spec: Path, core: Path, tool: str, work: Path) -> None:
     """Have FuseSoC set the target up, and make what it says."""
-    content, target = _content(core), _TARGETS[tool]
+    content, target = core_content(core), _TARGETS[tool]
     if target not in content.get("targets", {}):
         fail(f"{core} has no target '{target}'", hint=f"firm system core {spec}")
     made_with = content["targets"][target].get("flow_options", {}).get("tool", tool)
@@ -212,5 +200,5 @@ def _words(work: Path, tool: str) -> list[str]:
     if tool == VERILATOR:
         return [str(work / f"V{_flow(work)['toplevel']}")]
     # The line of Edalize's makefile has the options of the analysis.
-    steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).splitlines()
+    steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).split("\n")
     return shlex.split([line for line in steps if line.startswith("ghdl -r ")][-1])

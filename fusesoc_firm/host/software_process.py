@@ -22,9 +22,8 @@ from fusesoc_firm.frame.codec import CodecError, decode, pack_frame
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.host.functions import Functions, Message, importable_sources
-from fusesoc_firm.message.library import libraries
+from fusesoc_firm.system.beside import load_beside
 from fusesoc_firm.system.derived import DerivedSystem, End, Topic
-from fusesoc_firm.system.generator import load_system
 
 _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
@@ -106,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     frames = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     try:
-        loaded = load_system(given.spec, libraries(given.path, os.environ, given.distro))
+        loaded = load_beside(given.spec, given.path, given.distro)
         serve(loaded.system, loaded.folder, sys.stdin.buffer, frames)
     except InputError as error:
         print(error, file=sys.stderr)

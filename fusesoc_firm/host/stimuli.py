@@ -43,8 +43,8 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
         stimuli = _from_yaml(path, subscribers)
     else:
         # A call that the store answers does without what the import of rosbags' readers costs.
-        from fusesoc_firm.host.bags import BAGS
         from fusesoc_firm.host.routes import read_bag
+        from fusesoc_firm.message.bags import BAGS
 
         hint = f"stimuli are YAML (.yaml, .yml) or a bag; {BAGS}"
         stimuli = [Stimulus(*recorded) for recorded in read_bag(path, subscribers, hint)]

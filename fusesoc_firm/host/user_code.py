@@ -84,5 +84,5 @@ def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: 
 
 
 def _place(path: Path, line: int, column: int = 1) -> SourceRef:
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = path.read_text(encoding="utf-8").split("\n")
     return SourceRef(str(path), line, column, lines[line - 1] if line <= len(lines) else "")

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.naming import LONGEST_TEXT
 
 LARGEST_SIZE = 2**32 - 1  # the wire counts elements and characters in a uint32
 
@@ -25,10 +26,12 @@ class NameRule:
 
     def accepts(self, name: str) -> bool:
         """Whether all of `name` is legal."""
-        return self.pattern.fullmatch(name) is not None
+        return len(name) <= LONGEST_TEXT and self.pattern.fullmatch(name) is not None
 
     def fault(self, name: str, ros: RosVersion) -> str:
         """What is wrong with a name that is not accepted."""
+        if len(name) > LONGEST_TEXT:
+            return f"a {self.kind} has at most {LONGEST_TEXT} characters, not {len(name)}"
         return f"'{name}' is not a legal {self.kind} in {ros.title}" if name else f"the {self.kind} is missing"
 
     @property

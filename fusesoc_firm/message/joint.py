@@ -28,13 +28,19 @@ def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefin
     return f"{_LINE}\n".join(parts)
 
 
+def separate_texts(name: MessageName, text: str) -> dict[MessageName, str]:
+    """The text of each message in such a text, which defines the message `name`. Raises `InputError` for a bad name."""
+    first, *others = _PARTING.split(text)
+    pairs = zip(others[::2], others[1::2], strict=True)
+    return {name: first} | {parse_name(word): part for word, part in pairs}
+
+
 def signature_of_text(name: MessageName, text: str, ros: RosVersion) -> str | None:
     """The signature of a message that is defined by such a text; None if that is faulty, or not all is there."""
-    first, *others = _PARTING.split(text)
     faults = Diagnostics()
     parse = middleware_of(ros).parse
     try:
-        texts = {name: first} | {parse_name(word): part for word, part in zip(others[::2], others[1::2], strict=True)}
+        texts = separate_texts(name, text)
         definitions = {each: parse(part, each, ros, str(each), faults) for each, part in texts.items()}
         faults.raise_if_any()
         check_extents({each: definitions[each] for each in _inner_first(definitions)}, {})

@@ -6,6 +6,7 @@ the same arguments and files give the same definitions.
 
 from __future__ import annotations
 
+import copy
 import difflib
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail, nearest
+from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.files import read_regular
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
@@ -26,26 +27,35 @@ from fusesoc_firm.message.model import (
     RosVersion,
     nested_message,
 )
+from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.unsupported import unsupported_word
+from fusesoc_firm.reads import Input, Part
 
+# Where users name further places.
+_FURTHER = "; further places: 'paths' of the specification or core, --path"
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
 
 @dataclass(frozen=True)
 class _Source:
-    """The files that define a message (more than one must be equal), and the service or action they are of, if any."""
+    """The files that define a message (more than one must be equal), and the service or action they are of, if any.
+
+    If it is a bag that does, `texts` are its definitions; more than one must mean the same.
+    """
 
     paths: tuple[Path, ...]
     interface: Interface | None = None
+    texts: tuple[str, ...] = ()
 
 
 class MessageLibrary:
     """All messages that one middleware can name, those of services and actions included.
 
-    `paths` are folders in order of precedence. `environment` is a mapping like `os.environ`; None leaves an installed
-    ROS aside. `store` names the distribution behind all others (`noetic`, `jazzy`, ...). A message is taken from the
-    first place that has it; in one place a `.msg` file goes before what a `.srv` or `.action` file implies. Raises
-    `InputError` for a folder that is missing or holds no file that any middleware knows.
+    `paths` are folders and bags in order of precedence. `environment` is a mapping like `os.environ`; None leaves an
+    installed ROS aside. `store` names the distribution behind all others (`noetic`, `jazzy`, ...). A message is taken
+    from the first place that has it; in one place a `.msg` file goes before what a `.srv` or `.action` file implies.
+    Raises `InputError` for a folder that is missing or holds no file that any middleware knows, and for a bag without
+    definitions.
     """
 
     def __init__(
@@ -58,17 +68,25 @@ class MessageLibrary:
         self.ros = ros
         self._middleware = middleware_of(ros)
         self._store = self._middleware.store(store)
-        self._folders = [*paths, *(self._middleware.folders(environment) if environment is not None else ())]
-        found = {folder: interface_files(folder, self._middleware.suffixes) for folder in self._folders}
-        _check_folders(path for path in paths if not any(found[path].values()))
+        self._places: list[Path] = []
         self._sources: dict[MessageName, _Source] = {}
         self._interfaces: dict[Interface, Path] = {}
-        self._messages = {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
-        for folder in reversed(self._folders):
-            self._add(found[folder])
+        self._messages: set[MessageName] = set()
         # A definition or None, with the faults of its text: a faulty file is reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
         self._extents: dict[MessageName, Extent] = {}
+        self._put_before(dict.fromkeys(paths), self._middleware.folders(environment) if environment is not None else [])
+
+    def before(self, paths: Mapping[Path, SourceRef | None]) -> MessageLibrary:
+        """The same library with further folders and bags, each with its place, which go before all others.
+
+        Raises `InputError` as the constructor does.
+        """
+        if not paths:
+            return self
+        other = copy.copy(self)
+        other._put_before(paths)  # noqa: SLF001 - it is of this class
+        return other
 
     def names(self) -> list[MessageName]:
         """Every message there is, sorted."""
@@ -133,15 +151,19 @@ class MessageLibrary:
         return str(self._sources[name].paths[0]) if name in self._sources else self._store.title
 
     def content(self, name: MessageName) -> bytes:
-        """What defines a known message, as it stands: a file's bytes, or the text that a distribution has."""
-        if name in self._sources:
-            return read_regular(self._sources[name].paths[0], MOST_FILE_BYTES)
+        """What defines a known message, as it stands: a file's bytes, or the text that a bag or distribution has."""
+        if source := self._sources.get(name):
+            return source.texts[0].encode() if source.texts else read_regular(source.paths[0], MOST_FILE_BYTES)
         return self._store.text(name).encode()
 
-    def files(self, names: Iterable[MessageName]) -> list[Path]:
-        """The files that these messages are read from, in the order of names; messages of a distribution have none."""
-        paths = [self._sources[name].paths[0] for name in sorted(set(names)) if name in self._sources]
-        return list(dict.fromkeys(paths))  # the messages of a service share its file
+    def files(self, names: Iterable[MessageName]) -> list[Input]:
+        """The files that these messages are read from, in the order of names; messages of a distribution have none.
+
+        Of a bag it is the part that defines the message.
+        """
+        known = [(name, self._sources[name]) for name in sorted(set(names)) if name in self._sources]
+        found = [_part(name, source) if source.texts else source.paths[0] for name, source in known]
+        return list(dict.fromkeys(found))  # the messages of a service share its file
 
     @cached_property
     def _has_events(self) -> bool:
@@ -150,6 +172,41 @@ class MessageLibrary:
 
     def _is_message(self, name: MessageName) -> bool:
         return name in self._sources or name in self._store.names
+
+    def _put_before(self, paths: Mapping[Path, SourceRef | None], installed: Sequence[Path] = ()) -> None:
+        """Take in what folders and bags hold; the user's `paths` go before `installed` ones, both before all else."""
+        faults = Diagnostics()
+        places = [*paths, *installed]
+        found = {place: interface_files(place, self._middleware.suffixes) for place in places}
+        # New ones, since a copy of this library may have these.
+        self._sources, self._interfaces, self._parsed = dict(self._sources), dict(self._interfaces), {}
+        self._extents = {}
+        self._messages = self._messages | {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
+        bags = {place: self._bag(place, paths[place], faults) for place in paths if not any(found[place].values())}
+        faults.raise_if_any()
+        for place in reversed(places):
+            self._add(found[place])
+            self._sources |= bags.get(place, {})
+        self._places = [*places, *self._places]
+
+    def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> dict[MessageName, _Source]:
+        """What a bag defines; a path that is none must give another library something."""
+        # Imported for bags alone, as rosbags' readers take a while.
+        from fusesoc_firm.message.bags import definitions_in, is_bag
+
+        if not is_bag(path):
+            _check_folder(path, source, faults)
+            return {}
+        try:
+            bag = definitions_in(path)
+        except InputError as error:
+            faults.take(error, source)
+            return {}
+        if not bag.texts:
+            faults.error(
+                f"message path '{path}' is a bag without definitions", source, "name the folder of its messages"
+            )
+        return {name: _Source((path,), None, texts) for name, texts in bag.texts.items()} if bag.ros == self.ros else {}
 
     def _add(self, files: InterfaceFiles) -> None:
         """Take in what a folder holds; it goes before what is there."""
@@ -165,7 +222,10 @@ class MessageLibrary:
         faults = Diagnostics()
         source = self._sources.get(name)
         interface = source.interface if source else None
-        if source:
+        if source and source.texts:
+            file, text = f"<{source.paths[0]}>/{name}", source.texts[0]
+            self._check_equal(name, source, file, faults)
+        elif source:
             file, text = str(source.paths[0]), _read(str(interface or name), source.paths, faults)
         else:
             file, text = self._store.file(name), self._store.text(name)
@@ -179,6 +239,12 @@ class MessageLibrary:
             # One of a service's messages may come from a `.msg` file, which goes before the service.
             if self._sources.get(each) is source:
                 self._parsed[each] = (found.get(each), faults)
+
+    def _check_equal(self, name: MessageName, source: _Source, file: str, faults: Diagnostics) -> None:
+        """Note it if a bag's definitions of a message differ in what they mean."""
+        parsed = (self._middleware.parse(text, name, self.ros, file, Diagnostics()) for text in source.texts)
+        if len({to_text(definition) for definition in parsed}) > 1:
+            faults.error(f"'{name}' is defined in several ways", SourceRef(file, 1, 1), "name the folder of one")
 
     def _collect(
         self,
@@ -209,11 +275,11 @@ class MessageLibrary:
     def _hint(self, name: MessageName) -> str:
         if interface := self.interface(name):
             return f"it is a {_WORDS[interface.kind]}; its messages are {', '.join(map(str, interface.messages))}"
-        places = ", ".join([*(str(folder) for folder in self._folders), self._store.title])
+        places = ", ".join([*map(str, self._places), self._store.title])
         if feature := unsupported_word(name.name):
             return f"looked in: {places}; {feature.fault}: {feature.hint}"
         nearest = self._nearest(name)
-        return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}"
+        return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}{_FURTHER}"
 
     def _nearest(self, name: MessageName) -> str:
         """The likeliest meaning: the same type of another package, a primitive misspelt, or a similar name."""
@@ -271,14 +337,17 @@ def _note_depth(top: MessageName, name: MessageName, source: SourceRef | None, f
     faults.error(f"'{top}' holds '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
 
 
-def _check_folders(empty: Iterable[Path]) -> None:
-    """Raise `InputError` that names every one of the user's folders that gave nothing, nor would to another library."""
-    diagnostics = Diagnostics()
+def _part(name: MessageName, source: _Source) -> Part:
+    return Part(source.paths[0], str(name), source.texts[0].encode())
+
+
+def _check_folder(path: Path, source: SourceRef | None, faults: Diagnostics) -> None:
+    """Note it if one of the user's folders would give nothing to any library."""
     suffixes = known_suffixes()
+    if any(interface_files(path, suffixes).values()):
+        return
     *others, last = (f".{suffix}" for suffix in suffixes)
-    for path in empty:
-        if any(interface_files(path, suffixes).values()):
-            continue
-        reason = f"holds no {', '.join(others)} or {last} file" if path.is_dir() else "is not a folder"
-        diagnostics.error(f"message path '{path}' {reason}", hint="give a package, a workspace or a folder of packages")
-    diagnostics.raise_if_any()
+    reason = f"holds no {', '.join(others)} or {last} file" if path.is_dir() else "is neither a folder nor a bag"
+    faults.error(
+        f"message path '{path}' {reason}", source, "give a package, a workspace, a folder of packages or a bag"
+    )

@@ -7,7 +7,7 @@ docs/middlewares.md shows how a third one is added.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -60,7 +60,7 @@ class Middleware:
     `words` are what the files of users call it. `suffixes` are those of the files that define its messages, without the
     dot, and `folders` the places where an environment has such files. `store` gives the definitions of one of
     `distributions`, of a default for None; it raises `InputError` for any other. `builtin_types` are the types that are
-    no message, for hints.
+    no message, for hints. `aliases` are former names of messages, each with the present one: both are the same message.
     """
 
     ros: RosVersion
@@ -73,6 +73,7 @@ class Middleware:
     folders: Callable[[Mapping[str, str]], list[Path]]
     distributions: Callable[[], list[str]]
     store: Callable[[str | None], Store]
+    aliases: Mapping[MessageName, MessageName] = field(default_factory=dict)
 
 
 _registered: dict[RosVersion, Middleware] = {}

@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from fusesoc_firm.message import dialect, folders, parser, signature, stores
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import InterfaceKind, RosVersion
+from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
 from fusesoc_firm.wire import INTEGER_AND_FLOAT, WireRules
 
 _uint32, _int32 = INTEGER_AND_FLOAT["uint32"], INTEGER_AND_FLOAT["int32"]
@@ -40,4 +40,5 @@ MIDDLEWARE = Middleware(
     folders=partial(folders.environment_folders, RosVersion.ROS1),
     distributions=partial(stores.distributions, RosVersion.ROS1),
     store=partial(stores.DistributionStore, RosVersion.ROS1),
+    aliases=MappingProxyType({MessageName("tf", "tfMessage"): MessageName("tf2_msgs", "TFMessage")}),
 )

@@ -13,6 +13,14 @@ from fusesoc_firm.message.parser import parse_name
 
 # The newest distributions with long-term support that FIRM's round trips are tested against.
 _DEFAULTS = {RosVersion.ROS1: "noetic", RosVersion.ROS2: "jazzy"}
+_TRANSFORMS = "geometry_msgs/TransformStamped[] transforms\n"
+# What rosbags' tables lack of a version: messages of tf2 and tf, which every robot's bags hold.
+_ADDED = {
+    RosVersion.ROS1: {
+        MessageName("tf2_msgs", "TFMessage"): _TRANSFORMS,
+        MessageName("tf", "tfMessage"): _TRANSFORMS,
+    }
+}
 # rosbags parts a message's own text from those of its nested types by this line.
 _NEXT_DEFINITION = "=" * 80
 
@@ -30,7 +38,7 @@ class DistributionStore:
     """The definitions of one distribution.
 
     Its texts come from rosbags' tables: names, types, bounds and constants are the distribution's, but comments and
-    default values are lost, and ROS 1's `Header` is written in full.
+    default values are lost, and ROS 1's `Header` is written in full. What the tables lack (`_ADDED`) is here, too.
     """
 
     def __init__(self, ros: RosVersion, distribution: str | None = None) -> None:
@@ -49,12 +57,18 @@ class DistributionStore:
     @cached_property
     def names(self) -> frozenset[MessageName]:
         """All messages of the distribution."""
-        names = (parse_name(name) for name in self._typestore.fielddefs)
+        names = {parse_name(name) for name in self._typestore.fielddefs} | self._added.keys()
         # rosbags keeps ROS 1's primitives `time` and `duration` as messages of ROS 2.
         return frozenset(name for name in names if self._ros is RosVersion.ROS2 or name.package != "builtin_interfaces")
 
+    @property
+    def _added(self) -> dict[MessageName, str]:
+        return _ADDED.get(self._ros, {})
+
     def text(self, name: MessageName) -> str:
         """The definition of one of `names` as `.msg` text."""
+        if name in self._added:
+            return self._added[name]
         text, _ = self._typestore.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=int(self._ros))
         return text.partition(_NEXT_DEFINITION)[0]
 

@@ -6,6 +6,7 @@ a processor has pins, and a link to the host. One with a processor has the syste
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any
 
 from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
-from fusesoc_firm.naming import identifier
+from fusesoc_firm.naming import identifier, text_fault
 from fusesoc_firm.system.configuration import top_level_pins
 from fusesoc_firm.system.derived import DerivedSystem, LinkKind
 from fusesoc_firm.system.interconnect import LINK_PINS
@@ -41,13 +42,25 @@ _PORTS = (
 _OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq"}
 
 
+# What FPGAs, families and pins are called: scripts and constraints have such words without quotes.
+_WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.,:+/()-]*")
+
+
+def word_fault(text: str) -> tuple[str, str] | None:
+    """What keeps `text` from being what tools call an FPGA, a family or a pin; None if nothing does."""
+    if fault := text_fault(text):
+        return fault
+    legal = "legal are letters, digits, blanks and '_.,:+/()-', a letter or digit first"
+    return None if _WORD.fullmatch(text) else (f"cannot be '{text}'", legal)
+
+
 @dataclass(frozen=True)
 class BoardPin(Section):
     """A pin of the FPGA that the top level uses."""
 
     port: Text = key("what is connected there: a port of the board's, or a pin of an accelerator", is_required=True)
-    site: Text = key("the pin, as the FPGA's maker calls it", is_required=True)
-    standard: Text | None = key("its electrical standard, if it is not the board's")
+    site: Text = key("the pin, as the FPGA's maker calls it", is_required=True, rule=word_fault)
+    standard: Text | None = key("its electrical standard, if it is not the board's", rule=word_fault)
 
 
 @dataclass(frozen=True)
@@ -58,14 +71,14 @@ class Board(Section):
     flow: Text = key("what of Edalize builds for it", is_required=True, choices=(*FLOWS, *_NEEDED))
     clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
     interconnect: Text = key("how the host is connected", is_required=True, choices=(AXI_STREAM, *LINKS))
-    part: Text | None = key("the FPGA as Vivado calls it")
+    part: Text | None = key("the FPGA as Vivado calls it", rule=word_fault)
     board_part: Text | None = key(
-        "the board as Vivado calls it, if Vivado is to set up the processor", name="boardPart"
+        "the board as Vivado calls it, if Vivado is to set up the processor", name="boardPart", rule=word_fault
     )
     processor: Text | None = key("the FPGA's processor", choices=tuple(PROCESSORS))
-    standard: Text | None = key("electrical standard of the pins, where the flow wants one")
-    device: Text | None = key("the device, for flows that ask for one")
-    device_family: Text | None = key("its family, for flows that ask for one", name="deviceFamily")
+    standard: Text | None = key("electrical standard of the pins, where the flow wants one", rule=word_fault)
+    device: Text | None = key("the device, for flows that ask for one", rule=word_fault)
+    device_family: Text | None = key("its family, for flows that ask for one", name="deviceFamily", rule=word_fault)
     synth_options: tuple[Text, ...] = key("options of Yosys' synth command", name="synthOptions", form="texts")
     nextpnr_options: tuple[Text, ...] = key("options of nextpnr", name="nextpnrOptions", form="texts")
     pins: tuple[BoardPin, ...] = key("the pins that are used", form="sections", section=BoardPin)

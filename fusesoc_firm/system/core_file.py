@@ -14,6 +14,8 @@ from pathlib import Path, PurePosixPath
 import yaml
 
 from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.naming import text_fault
+from fusesoc_firm.quoting import yaml_list, yaml_scalar
 from fusesoc_firm.render import render
 from fusesoc_firm.system.board import FOLDER, QUARTUS, VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived import DerivedSystem
@@ -32,6 +34,8 @@ _FAMILIES = (
 )
 # The instances of the generator that targets ask for.
 _SYSTEM, _SIMULATION = "system", "simulation"
+# The core with the generator `far`, and the one that had it before version 0.2.0.
+_SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
 # A target with the comment above it; blank lines part them.
 _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
@@ -52,8 +56,10 @@ class CoreOptions:
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
-    """The text of a `.core` that is not there yet, for the specification `spec` beside it."""
-    further = {"paths": _flow(options.paths), "distro": options.distro}
+    """The text of a `.core` that is not there yet, for the specification `spec` beside it. Raises `InputError`."""
+    if fault := text_fault(options.description):
+        fail(f"--description {fault[0]}", hint=fault[1])
+    further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
     head = render(
         HEAD_TEMPLATE,
         {
@@ -64,7 +70,7 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
             "options": [{"name": name, "value": value} for name, value in further.items() if value],
             "stimuli": options.stimuli,
             "model": options.model,
-            "environment": {"files": _flow(options.environment)} if options.environment else None,
+            "environment": {"files": _paths(options.environment)} if options.environment else None,
         },
     )
     return head + _targets(system, is_simulated=True, has_environment=bool(options.environment))
@@ -74,6 +80,8 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
     """The text of the `.core` in `path` with the targets of today. Raises `InputError` if it is none of a system."""
     text = path.read_text(encoding="utf-8")
     instances = _instances(path, text)
+    if _GENERATORS in text and _SYSTEM_CORE not in text:
+        fail(f"{path} does not depend on '{_SYSTEM_CORE}', which has the generator 'far'", hint=f"{_GENERATORS} had it")
     if _SYSTEM not in instances:
         fail(f"{path} has no instance '{_SYSTEM}' under 'generate'; without the file, this command writes another one")
     is_simulated = _SIMULATION in instances
@@ -114,16 +122,16 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
     board = read_board(name, FOLDER)
     if has_kernels and board.flow != VIVADO:
         return None
-    options = {
-        "frontends": "[ghdlsynth]" if board.is_linked else "",
-        "part": str(board.part or ""),
-        "board_part": str(board.board_part or ""),
+    options: dict[str, str | Sequence[str] | None] = {
+        "frontends": ["ghdlsynth"] if board.is_linked else None,
+        "part": board.part,
+        "board_part": board.board_part,
         # A block design refers to modules by name only where Vivado manages the sources.
-        "source_mgmt_mode": "All" if board.flow == VIVADO else "",
-        "yosys_synth_options": _words(board.synth_options),
-        "nextpnr_options": _words(board.nextpnr_options),
-        "device": str(board.device or ""),
-        "family" if board.flow == QUARTUS else "device_family": str(board.device_family or ""),
+        "source_mgmt_mode": "All" if board.flow == VIVADO else None,
+        "yosys_synth_options": board.synth_options,
+        "nextpnr_options": board.nextpnr_options,
+        "device": board.device,
+        "family" if board.flow == QUARTUS else "device_family": board.device_family,
     }
     top = board_entity(system, board)
     product = "Quartus project" if board.flow == QUARTUS else "Bitstream"
@@ -133,14 +141,14 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
         # Of Quartus, Edalize has no flow.
         "is_tool": board.flow == QUARTUS,
         "flow": str(board.flow),
-        "options": [{"name": option, "value": value} for option, value in options.items() if value],
+        "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],
         "toplevel": f"{top}_wrapper" if board.flow == VIVADO else top,
     }
 
 
-def _words(items: Sequence[str]) -> str:
-    """A list of strings on one line; nothing if it is empty."""
-    return yaml.safe_dump([str(item) for item in items], default_flow_style=True, width=10**6).strip() if items else ""
+def _value(value: str | Sequence[str]) -> str:
+    """A word or a list of words in YAML."""
+    return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
 
 
 def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]:
@@ -153,6 +161,6 @@ def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]
     return instances
 
 
-def _flow(items: Sequence[str]) -> str:
+def _paths(items: Sequence[str]) -> str:
     """A list on one line; nothing if it is empty."""
-    return f"[{', '.join(str(PurePosixPath(item)) for item in items)}]" if items else ""
+    return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.quoting import dot_text
 from fusesoc_firm.system.crossings import crossings
 from fusesoc_firm.system.derived import AcceleratorBlock, Connection, DerivedSystem
 from fusesoc_firm.system.sides import side_ports
@@ -52,7 +54,7 @@ def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
     graph.node(f"{_MANAGER}_in", "Manager", shape="box")
     graph.node(f"{_MANAGER}_out", f"Manager\n{system.scheduling.policy}", shape="box")
     for converter in (*system.subscribers, *system.publishers):
-        label = f"{converter.block}\n{converter.frame.message}\n{converter.frame.ros.title}"
+        label = f"{dot_text(converter.block)}\n{converter.frame.message}\n{converter.frame.ros.title}"
         graph.node(_node(converter.block), label, **_CONVERTER)
     for block in system.accelerators:
         graph.node(_node(block.block), _accelerator(block) + _differences(system, block), **_ACCELERATOR)
@@ -60,7 +62,7 @@ def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
 
 def _accelerator(block: AcceleratorBlock) -> str:
     accelerator = block.type.accelerator
-    return f"{block.block}\n{accelerator.name} ({accelerator.type})"
+    return f"{dot_text(block.block)}\n{dot_text(accelerator.name)} ({accelerator.type})"
 
 
 def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
@@ -86,7 +88,7 @@ def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
     for connection in system.software.connections:
         source = connection.source.block
         for sink, frame in zip(connection.sinks, connection.frames, strict=True):
-            names = [name for name in (source, sink.block) if name not in blocks]
+            names = [dot_text(name) for name in (source, sink.block) if name not in blocks]
             start, end = starts.get(source, f"{_HOST}_out"), ends.get(sink.block, f"{_HOST}_in")
             graph.edge(start, end, label="\n".join([*names, str(frame.message)]))
 
@@ -119,5 +121,5 @@ def _with(streams: Iterable[str]) -> str:
 
 
 def _node(block: str) -> str:
-    """A block's node: none of these is called like the host's or the Manager's."""
-    return f"block {block}"
+    """A block's node: none of these is called like the host's or the Manager's, and no colon names a port of it."""
+    return f"block {quote(block, safe=' ')}"

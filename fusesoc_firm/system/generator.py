@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
@@ -14,12 +14,13 @@ from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.generator import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.diagnostics import Diagnostics
+from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.reads import Input
 from fusesoc_firm.render import render
 from fusesoc_firm.system.analysis import derive, source_files
 from fusesoc_firm.system.block_design import (
@@ -43,8 +44,11 @@ from fusesoc_firm.system.board import (
 from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hls import WRAPPER_TEMPLATE, function_name, wrapper_configuration
-from fusesoc_firm.system.specification import Accelerator, Specification, read_specification
+from fusesoc_firm.system.specification import Accelerator, Specification, is_core, read_specification
 from fusesoc_firm.system.timing_constraints import clocks_configuration
+
+CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
+"""Finds the folders of the messages of cores, given by name and place. Raises `InputError` for an unknown one."""
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {
@@ -58,6 +62,13 @@ _FILE_TYPES = {
 _INCLUDE_SUFFIXES = (".vh", ".svh")
 
 
+def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
+    """Where no core can be looked up."""
+    for name, source in names.items():
+        fail(f"core '{name}' cannot be looked up here", source, "name the folder of its messages")
+    return ()
+
+
 @dataclass(frozen=True)
 class LoadedSystem:
     """A specification, the folder its paths are relative to, the board if one is given, and the system derived."""
@@ -68,9 +79,9 @@ class LoadedSystem:
     system: DerivedSystem
     board: Board | None = None
 
-    def inputs(self) -> list[Path]:
+    def inputs(self) -> list[Input]:
         """The accelerators' sources and the files of all messages."""
-        return source_files(self.specification, self.folder) + self._message_files()
+        return [*source_files(self.specification, self.folder), *self._message_files()]
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
         """Every message of a converter once, whichever of its fields are used, with all definitions within it."""
@@ -84,7 +95,7 @@ class LoadedSystem:
         frames = dict.fromkeys((*self.system.frames, *sides))
         return [(self.libraries[frame.ros], self.libraries[frame.ros].closure(frame.message)) for frame in frames]
 
-    def _message_files(self) -> list[Path]:
+    def _message_files(self) -> list[Input]:
         found = [path for library, definitions in self.definitions() for path in library.files(definitions)]
         return list(dict.fromkeys(found))
 
@@ -95,22 +106,72 @@ def load_system(
     *,
     needs_sources: bool = True,
     board: Board | None = None,
+    core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
     """Read and derive the system of a specification, on a board if one is given. Raises `InputError` with all faults.
 
-    Unless it `needs_sources`, those of accelerators may be missing.
+    Unless it `needs_sources`, those of accelerators may be missing. What the specification names under `paths` goes
+    before what the `libraries` know.
     """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
     if board:
         specification = on_board(specification, board)
+    own = {str(item): item.source for item in specification.paths}
+    libraries = with_paths(libraries, own, path.parent, core_folders, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system, board)
 
 
+def with_paths(
+    known: dict[RosVersion, MessageLibrary],
+    paths: Mapping[str, SourceRef | None],
+    folder: Path,
+    core_folders: CoreFolders,
+    faults: Diagnostics,
+) -> dict[RosVersion, MessageLibrary]:
+    """The libraries with the `paths` of a specification in `folder` before all else.
+
+    Raises `InputError` with all `faults` if one of these paths is wrong, since unknown messages would follow from it.
+    """
+    before = len(faults.found)
+    places: dict[Path, SourceRef | None] = {}
+    for item, source in paths.items():
+        try:
+            places |= dict.fromkeys(core_folders({item: source}) if is_core(item) else [folder / item], source)
+        except InputError as error:
+            faults.take(error, source)
+    own = dict(known)
+    for ros, library in known.items():
+        try:
+            own[ros] = library.before(places)
+        except InputError as error:
+            faults.take(error, None)
+    if len(faults.found) > before:
+        faults.raise_if_any()
+    return own
+
+
+def message_cores(request: Request) -> dict[str, SourceRef | None]:
+    """The cores that the specification of a generator call names; none where it cannot be read."""
+    path = specification_path(request)
+    try:
+        # Most name none, and are spared a second reading.
+        if "paths" not in path.read_text(encoding="utf-8"):
+            return {}
+        return read_specification(path, str(path), Diagnostics()).message_cores
+    except (OSError, UnicodeDecodeError, InputError):
+        return {}
+
+
 def load_requested(request: Request) -> LoadedSystem:
     """The system of a generator call."""
-    return load_system(specification_path(request), libraries(*library_sources(request)), board=_board(request))
+    return load_system(
+        specification_path(request),
+        libraries(*library_sources(request)),
+        board=_board(request),
+        core_folders=request.folders_of,
+    )
 
 
 def specification_path(request: Request) -> Path:
@@ -118,7 +179,7 @@ def specification_path(request: Request) -> Path:
     return request.files_root / str(request.parameters["spec"])
 
 
-def inputs(request: Request) -> list[Path]:
+def inputs(request: Request) -> list[Input]:
     """The specification and every file that it leads to. Raises `InputError`."""
     board = [_board_path(request)] if request.parameters.get("board") else []
     return [specification_path(request), *board, *load_requested(request).inputs()]
@@ -166,11 +227,11 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     for path, configuration in constants_configurations(loaded.messages()):
         yield Artifact(path, Part.CONVERTERS, CONSTANTS_TEMPLATE, configuration)
     for item in system.subscribers:
-        source = subscriber_source(item.frame, system.width, item.suffix)
-        yield Artifact(f"{subscriber_entity(item.frame, item.suffix)}.vhd", Part.CONVERTERS, *source)
+        entity = subscriber_entity(item.frame, item.suffix)
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity))
     for item in system.publishers:
-        source = publisher_source(item.frame, system.width, item.suffix)
-        yield Artifact(f"{publisher_entity(item.frame, item.suffix)}.vhd", Part.CONVERTERS, *source)
+        entity = publisher_entity(item.frame, item.suffix)
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *publisher_source(item.frame, system.width, entity))
     for frame, suffix in system.computed_lengths.items():
         configuration = payload_length_configuration(frame, suffix)
         yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)

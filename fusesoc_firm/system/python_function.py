@@ -81,7 +81,7 @@ class _File:
 
     def place(self, line: int, column: int) -> SourceRef:
         """A place in it."""
-        lines = self.text.splitlines()
+        lines = self.text.split("\n")
         return SourceRef(self.name, line, column, lines[line - 1] if line <= len(lines) else "")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -10,6 +10,7 @@ from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node, Path
 from fusesoc_firm.frame.select import used_part, with_names_in_use
+from fusesoc_firm.quoting import python_string
 from fusesoc_firm.system.derived import AcceleratorType
 from fusesoc_firm.system.python_function import function_name, parameter_names
 
@@ -77,12 +78,15 @@ def _values(frame: Frame) -> list[Configuration]:
 
 
 def _literal(value: Any) -> str:
-    """A value as Python writes it, with the quotes of JSON."""
+    """A value as Python writes it."""
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{json.dumps(name)}: {_literal(inner)}' for name, inner in value.items())}}}"
+        return f"{{{', '.join(f'{python_string(name)}: {_literal(inner)}' for name, inner in value.items())}}}"
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
         same = len(value) > 1 and all(inner == value[0] for inner in value)
         if same and not isinstance(value[0], Mapping | list):
             return f"[{_literal(value[0])}] * {len(value)}"
         return f"[{', '.join(map(_literal, value))}]"
-    return json.dumps(value) if isinstance(value, str) else repr(value)
+    if isinstance(value, str):
+        return python_string(value)
+    is_finite = not isinstance(value, float) or math.isfinite(value)
+    return repr(value) if is_finite else f'float("{value}")'

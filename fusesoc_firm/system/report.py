@@ -79,4 +79,4 @@ def _software(loaded: LoadedSystem) -> list[Path]:
 
 
 def _lines_of_code(text: str, comment: str) -> int:
-    return sum(bool(line.strip()) and not line.lstrip().startswith(comment) for line in text.splitlines())
+    return sum(bool(line.strip()) and not line.lstrip().startswith(comment) for line in text.split("\n"))

@@ -6,12 +6,15 @@ stand at the field. What the sections say together (names that must be known, co
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.message.model import MIDDLEWARES
+from fusesoc_firm.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.yaml_sections import Section, key, read
 from fusesoc_firm.yaml_text import Text, is_null, read_yaml
 
@@ -47,9 +50,24 @@ AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
+# `vendor:library:name`, maybe with a version.
+_CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
 
-_INCLUDE = {"form": "texts", "meaning": "only these fields, such as pose.position, each with all below it"}
-_EXCLUDE = {"form": "texts", "meaning": "none of these fields"}
+# Tools read the names of sources in makefiles, scripts and command lines, where most of them quote nothing.
+_SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}")
+
+
+def source_fault(text: str) -> tuple[str, str] | None:
+    """What keeps `text` from being a source file's name; None if nothing does."""
+    if fault := text_fault(text, LONGEST_PATH):
+        return fault
+    legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
+    return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not take as a file", legal)
+
+
+_FIELDS = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
+_INCLUDE = {**_FIELDS, "meaning": "only these fields, such as pose.position, each with all below it"}
+_EXCLUDE = {**_FIELDS, "meaning": "none of these fields"}
 _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
 
@@ -128,7 +146,11 @@ class Accelerator(Section):
     name: Text = key("the type's name; in VHDL that of the entity, in Verilog of the module", is_required=True)
     type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
     sources: tuple[Text, ...] = key(
-        "its source files, relative to the specification", form="texts", is_required=True, unless=("type", SOFTWARE)
+        "its source files, relative to the specification",
+        form="texts",
+        is_required=True,
+        unless=("type", SOFTWARE),
+        rule=source_fault,
     )
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
     width: int | None = key("bits of its streams; those of the project unless given", form="integer", choices=WIDTHS)
@@ -186,10 +208,24 @@ class Specification(Section):
     """The whole file."""
 
     project: Project = key("what holds for the whole system", form="section", section=Project, is_required=True)
+    paths: tuple[Text, ...] = key(
+        "folders, bags and cores with message definitions, relative to the file, searched before all others",
+        form="texts",
+    )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
     # The file stops being YAML somewhere, so there may be more of everything.
     is_cut: bool = False
+
+    @property
+    def message_cores(self) -> dict[str, SourceRef | None]:
+        """The cores among `paths`, each with its place."""
+        return {str(item): item.source for item in self.paths if is_core(item)}
+
+
+def is_core(path: str) -> bool:
+    """Whether an item of `paths` is the name of a core."""
+    return _CORE.fullmatch(path) is not None
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:

@@ -24,12 +24,13 @@ from fusesoc_firm.system.specification import (
     Outgoing,
     Project,
     Specification,
+    is_core,
 )
 from fusesoc_firm.yaml_sections import Key, Section, keys_of
 from fusesoc_firm.yaml_text import read_yaml
 
-# Names that answers of a key are taken from, by what they are.
-MessageNames = Callable[[], Sequence[str]]
+# All messages that can be named, by the specification's `paths`.
+MessageNames = Callable[[Sequence[str]], Sequence[str]]
 
 _YES, _NO = "yes", "no"
 
@@ -43,7 +44,7 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
     if not is_new:
         read_yaml(path)  # reports what is no YAML, at its place
     content = CommentedMap() if is_new else yaml.load(path.read_text(encoding="utf-8"))
-    _Wizard(asker, message_names, content, is_new).run()
+    _Wizard(asker, message_names, content, is_new, path.parent).run()
     with path.open("w", encoding="utf-8") as file:
         yaml.dump(content, file)
 
@@ -56,6 +57,7 @@ class _Wizard:
     message_names: MessageNames
     content: Any
     is_new: bool
+    folder: Path
     explained: set[str] = field(default_factory=set)
 
     def run(self) -> None:
@@ -63,11 +65,24 @@ class _Wizard:
         if self.is_new:
             self.asker.tell("project")
             self.content["project"] = self._section(Project)
+            self._ask_paths()
         for name in ("accelerators", "blocks"):
             if added := self._sections(name, _key(Specification, name)):
                 self.content.setdefault(name, []).extend(added)
         if not self.is_new:
             self._connect_blocks()
+
+    def _ask_paths(self) -> None:
+        """Where the messages of a new specification are defined, which decides how messages are completed."""
+        entry = _key(Specification, "paths")
+        question = Question("paths", entry.meaning, check=self._fault_of_path)
+        if found := self._texts(question):
+            self.content["paths"] = found
+            self._explain(self.content, "paths", entry)
+
+    def _fault_of_path(self, answer: str) -> str | None:
+        is_there = is_core(answer) or (self.folder / answer).exists()
+        return None if is_there else f"'{answer}' is neither a folder, a bag nor a core"
 
     def _connect_blocks(self) -> None:
         """Further connections from blocks that the file has."""
@@ -134,7 +149,7 @@ class _Wizard:
         found: list[str] = []
         while answer := self.asker.ask(question):
             found.append(answer)
-            question = Question(f"one more of {question.name}", question.meaning, question.words)
+            question = Question(f"one more of {question.name}", question.meaning, question.words, check=question.check)
         return found
 
     # --- answers ---------------------------------------------------------------------------------------------------
@@ -144,7 +159,8 @@ class _Wizard:
         if entry.choices:
             return [str(choice) for choice in entry.choices]
         if name == "message":
-            return self.message_names()
+            paths = self.content.get("paths") or []
+            return self.message_names([paths] if isinstance(paths, str) else [str(item) for item in paths])
         if section is Block and name == "type":
             return self._names("accelerators")
         if section is Block and name == "clock":
@@ -159,6 +175,8 @@ class _Wizard:
 
     def _fault(self, draft: _Draft, name: str, entry: Key, answer: str) -> str | None:
         """What makes an answer wrong, beyond the grammar's choices."""
+        if answer and (fault := entry.rule(answer)):
+            return f"'{name}' {fault[0]}; {fault[1]}"
         if entry.form == "integer" and not answer.isdecimal():
             return f"'{name}' must be an integer, not '{answer}'"
         if name == "name" and draft.section in (Accelerator, Block):

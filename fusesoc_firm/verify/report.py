@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import json
 import platform
 from collections import Counter
@@ -116,7 +115,7 @@ def as_html(report: Report) -> str:
             "stall_percent": STALL_PERCENT,
             "seed": settings.seed,
             "seconds": f"{report.seconds:g}",
-            "tools": html.escape(", ".join(f"{name} {version}" for name, version in report.tools.items())),
+            "tools": ", ".join(f"{name} {version}" for name, version in report.tools.items()),
             "verdicts": [{"verdict": str(verdict)} for verdict in Verdict],
             "totals": [_total(row, entries) for row, entries in _groups(report.entries, versions_of_ros)],
             "figures": [figure for ros in versions_of_ros for figure in _figures(report.entries, ros)],
@@ -153,10 +152,10 @@ def _table(title: str, verdict: Verdict, entries: Sequence[Entry]) -> dict[str, 
             same = f" (as {entry.same_as})" if entry.same_as else ""
             rows.append(
                 {
-                    "name": html.escape(f"{entry.name}{same}"),
+                    "name": f"{entry.name}{same}",
                     "ros": int(entry.ros),
                     "level": int(entry.statistics.level) if entry.statistics else "",
-                    "detail": html.escape(entry.result.detail),
+                    "detail": entry.result.detail,
                 }
             )
     return {"title": title, "rows": rows}
@@ -214,7 +213,7 @@ def _figure(title: str, found: Histogram, known: Sequence[Statistics]) -> dict[s
         )
     beyond = f"; {found.beyond} beyond the figure" if found.beyond else ""
     return {
-        "title": html.escape(title),
+        "title": title,
         "caption": f"{len(known)} messages{beyond}",
         "view_width": _MARGIN + len(found.counts) * pitch,
         "view_height": _HEIGHT + 20,

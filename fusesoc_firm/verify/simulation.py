@@ -26,7 +26,15 @@ STALL_PERCENT = 30
 TIMEOUT = 300
 
 # What the bench is made of, each behind what it depends on.
-_CORES = ("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host", "sim/parts")
+_CORES = (
+    "axis/package",
+    "axis/axis",
+    "sched/package",
+    "sched/fixed_priority",
+    "manager/manager",
+    "sim/host",
+    "sim/parts",
+)
 _OPTIONS = ("--std=93",)
 _CYCLES = re.compile(r"^\d+ frames in, \d+ frames out, (\d+) cycles", re.MULTILINE)
 _REPORT = re.compile(r"^[^ ]*:@\d+[a-z]+:\(([a-z ]+)\): ")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,19 +15,19 @@ from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from tests.sim.ghdl import Library, core_files
+from tests.sim.ghdl import REPOSITORY, Library, core_files
 
 SUBSCRIBER, PUBLISHER = "subscriber", "publisher"
-CORES = ("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager")
-# A folder of ros1/<package>/msg/*.msg and ros2/..., for messages that no distribution holds.
-CORPUS = "CORPUS"
+CORES = ("axis/package", "axis/axis", "sched/package", "sched/fixed_priority", "manager/manager")
+# Definitions of ROS 1 that no distribution holds.
+_FURTHER = REPOSITORY / "specs" / "robotic_arm" / "franka_msgs"
 
 _PORT = re.compile(r"^ +(\w+) *: (in|out) +std_logic(?:_vector\((\d+) downto 0\))?", re.MULTILINE)
 _PORTS = re.compile(r"^  port \((.*?)^  \);", re.MULTILINE | re.DOTALL)
 
 
 class NotConvertedError(Exception):
-    """A message that no converter is made of, or whose definition is not at hand; the text says which."""
+    """A message that no converter is made of; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +59,9 @@ class Converter:
         return f"{self.message}{used}, {self.direction}"
 
     def frame(self) -> Frame:
-        """The message's frame; raises `NotConvertedError` where its definition is not at hand."""
+        """The message's frame."""
         ros, name = RosVersion(self.ros), parse_name(self.message)
-        folder = Path(os.environ[CORPUS], f"ros{self.ros}") if os.environ.get(CORPUS) else None
-        library = MessageLibrary(ros, [folder] if folder and folder.is_dir() else [])
-        if name not in library.names():
-            raise NotConvertedError(f"no definition; {CORPUS} may name a folder with one")
+        library = MessageLibrary(ros, [_FURTHER] if ros is RosVersion.ROS1 else [])
         frame = frame_of(name, library.closure(name))
         return select(frame, dict.fromkeys(self.include)) if self.include else frame
 

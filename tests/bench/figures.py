@@ -77,8 +77,7 @@ _METHODS = {
 }
 _INTRODUCTION = """
     Written by `make bench`; `make bench BENCH='area'` measures a part anew ({parts}). 'not converted' is a message that
-    no converter is made of yet, or, for FrankaState, whose definition is not at hand: `CORPUS=DIR` names a folder of
-    `ros1/<package>/msg/*.msg`. 'met' and 'MISSED' tell how a row stands to its bar.
+    no converter is made of yet. 'met' and 'MISSED' tell how a row stands to its bar.
     """
 
 

@@ -18,7 +18,7 @@ from tests.sim.images import SPECS, filtered, load_model
 
 TITLE = "Accelerators for images, 1920 x 1080"
 WIDTHS = (8, 64, 128)
-CORES = ("axis/axis", "acc/image/image")
+CORES = ("axis/package", "axis/axis", "acc/image/image")
 # Rows and columns.
 FULL_HD = (1080, 1920)
 

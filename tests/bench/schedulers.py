@@ -38,7 +38,7 @@ def combined(folder: Path, policies: Sequence[str], requesters: int) -> tuple[Li
 def _wrapped(folder: Path, entity: str, requesters: int, generics: Mapping[str, str]) -> tuple[Library, str]:
     firm, work = Library("firm", folder), Library("work", folder)
     cores = (*POLICY_CORES, "by_policy", "combined")
-    firm.analyse(core_files("axis/axis", "sched/package", *(f"sched/{core}" for core in cores)))
+    firm.analyse(core_files("axis/package", "axis/axis", "sched/package", *(f"sched/{core}" for core in cores)))
     file = folder / f"{_ENTITY}.vhd"
     file.write_text(wrapper(_ENTITY, entity, requesters, generics), encoding="ascii")
     work.analyse([file])

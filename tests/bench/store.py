@@ -226,7 +226,7 @@ def edit_rows(share: int = 1) -> Iterator[tuple[str, ...]]:
 
 def write_project(folder: Path, share: int) -> dict[str, str]:
     """A copy of our code, messages, and a core that calls a generator for each: their kinds by name."""
-    left_out = shutil.ignore_patterns("library", "__pycache__")
+    left_out = shutil.ignore_patterns("demos", "library", "__pycache__")
     shutil.copytree(PACKAGE, folder / "code" / "fusesoc_firm", ignore=left_out)
     shutil.copytree(REPOSITORY / "generators", folder / "code" / "generators", ignore=left_out)
     messages = folder / "msgs" / "msg"

@@ -110,7 +110,7 @@ def _scheduler(policy: str) -> Make:
 
 def _manager(folder: Path, channels: int) -> Subject:
     library = Library("firm", folder)
-    library.analyse(core_files("axis/axis", "manager/manager"))
+    library.analyse(core_files("axis/package", "axis/axis", "manager/manager"))
     generics = {"WIDTH": MANAGER_WIDTH, "SUBSCRIBERS": channels, "PUBLISHERS": channels}
     return Subject(library, "firm_manager", generics)
 

@@ -17,8 +17,7 @@ import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import nearest
-from fusesoc_firm.message import library
-from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.specification import Specification
 from fusesoc_firm.yaml_sections import Section, keys_of
@@ -28,8 +27,6 @@ SPECS = Path(__file__).resolve().parents[2] / "specs"
 SEED = 20241103
 _PLACE = re.compile(r"(?P<file>.*):(?P<line>\d+):(?P<column>\d+): error: (?P<message>.*)")
 _EXCERPT = re.compile(r" *(?P<line>\d+) \| (?P<text>.*)")
-# Of franka_msgs/FrankaState, which is not ours, what the specification includes.
-_FRANKA_STATE = "float64[7] q\nfloat64[7] q_d\nfloat64[16] O_T_EE\nfloat64[16] O_T_EE_d\n"
 
 
 def specifications() -> list[Path]:
@@ -109,10 +106,7 @@ def checker(
     spec: Path = request.param
     folder = tmp_path / spec.parent.name
     shutil.copytree(spec.parent, folder)
-    state = tmp_path / "franka_msgs/msg/FrankaState.msg"
-    state.parent.mkdir(parents=True)
-    state.write_text(_FRANKA_STATE, encoding="utf-8")
-    make = library.libraries
+    make = libraries
     known: dict[RosVersion, MessageLibrary] = {}
 
     def shared(paths: Sequence[Path], _: Mapping[str, str] | None, store: str | None) -> object:
@@ -121,9 +115,9 @@ def checker(
             known.update(make(paths, None, store))
         return known
 
-    monkeypatch.setattr(library, "libraries", shared)
-    own = [folder / "msg"] if (folder / "msg").is_dir() else []
-    return Checker(folder / spec.name, [*own, state.parent.parent], capsys)
+    monkeypatch.setattr("fusesoc_firm.system.beside.libraries", shared)
+    own = [path for path in (folder / "msg", folder / "franka_msgs") if path.is_dir()]
+    return Checker(folder / spec.name, own, capsys)
 
 
 every_specification = pytest.mark.parametrize("checker", specifications(), ids=lambda path: path.stem, indirect=True)

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm import __version__
+
 GENERATORS = Path(__file__).resolve().parents[2] / "generators"
 # Stands in for the package: it says who answers, and with what.
 GAPI = "import sys\ndef main(command, argv):\n    print(command, *argv, 'in', sys.prefix)\n    return 3\n"
@@ -112,6 +114,18 @@ def test_a_chosen_python_is_used_and_no_other(tmp_path: Path, bare: Path, owner:
     failed = call(owner, generator, "input.yml", FUSESOC_FIRM_PYTHON=str(bare))
     assert failed.returncode == 1
     assert f"These were tried:\n  {bare}\nInstall" in failed.stderr
+
+
+@pytest.mark.parametrize("version", [__version__, "7.8.9"])
+def test_a_library_of_another_version_is_reported(tmp_path: Path, owner: Path, version: str) -> None:
+    (package,) = owner.parents[1].glob("lib/python3*/site-packages/fusesoc_firm")
+    (package / "__init__.py").write_text(f'__version__ = "{version}"\n')
+    generator = put_generators(tmp_path / "library" / "generators")
+    done = call(owner, generator, "input.yml")
+    assert (done.stdout, done.returncode) == answer(owner)
+    warning = f"far: warning: the library in {generator.parent} is of version {__version__}, fusesoc-firm in "
+    assert done.stderr.startswith(warning) if version != __version__ else done.stderr == ""
+    assert "7.8.9\n      = 'firm path' prints the folder" in done.stderr or version == __version__
 
 
 def test_where_there_is_none_the_message_says_what_to_do(tmp_path: Path, bare: Path) -> None:

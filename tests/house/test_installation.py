@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fusesoc_firm import __version__
+
 ROOT = Path(__file__).resolve().parents[2]
 ROBOT = Path(__file__).parent / "data" / "robot"
 # One worker does them all, so that each kind is installed once.
@@ -58,8 +60,9 @@ class Installation:
     def fusesoc(self, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         return self._run(self.environment / "bin" / "fusesoc", *arguments, cwd=cwd, check=False)
 
-    def library(self) -> Path:
-        return Path(self._run(self.environment / "bin" / "firm", "path", cwd=self.environment).stdout.strip())
+    def library(self, *options: str, cwd: Path | None = None) -> Path:
+        firm = self.environment / "bin" / "firm"
+        return Path(self._run(firm, "path", *options, cwd=cwd or self.environment).stdout.strip())
 
     def _run(self, *command: str | Path, cwd: Path, check: bool = True) -> subprocess.CompletedProcess[str]:
         home = self.environment.parent / "home"
@@ -131,8 +134,8 @@ def project(installation: Installation, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def files_below(library: Path) -> set[str]:
-    paths = [path for room in ("cores", "generators", "specs") for path in (library / room).rglob("*")]
+def files_below(library: Path, *rooms: str) -> set[str]:
+    paths = [path for room in rooms for path in (library / room).rglob("*")]
     files = {path.relative_to(library).as_posix() for path in paths if path.is_file()}
     return {name for name in files if "__pycache__" not in name}
 
@@ -140,32 +143,62 @@ def files_below(library: Path) -> set[str]:
 def test_the_library_is_installed_whole(installation: Installation) -> None:
     library = installation.library()
     assert library.is_relative_to(installation.environment) or library.is_relative_to(installation.source)
-    assert "generators/generators.core" in files_below(library)
-    assert files_below(library) == files_below(installation.source)
-    assert {path.name for path in library.iterdir()} <= {"cores", "generators", "specs"}
+    rooms = ("cores", "generators")
+    assert "generators/generators.core" in files_below(library, *rooms)
+    assert files_below(library, *rooms) == files_below(installation.source, *rooms)
+    assert {path.name for path in library.iterdir()} == {*rooms}
+    demos = installation.library("--demos")
+    assert files_below(demos, "") == files_below(installation.source / "specs", "")
+    assert "obstacle/obstacle.core" in files_below(demos, "")
 
 
 def test_another_project_sees_each_core_once(installation: Installation, project: Path) -> None:
     done = installation.fusesoc("core", "list", cwd=project)
-    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert f"robot:firm:generators:{__version__}" in done.stdout
     assert "left-behind" not in done.stdout
     assert "Replacing" not in done.stderr
     assert "Parse error" not in done.stderr
+    # Of its own cores, and those it may use.
+    assert "robot:sys:" not in done.stdout
     shown = installation.fusesoc("gen", "show", "far", cwd=project)
     assert "spec (str): " in shown.stdout
+
+
+def test_a_project_that_is_committed_has_relative_libraries(installation: Installation, tmp_path: Path) -> None:
+    libraries = {"firm": [], "firm_demos": ["--demos"]}
+    sections = {name: installation.library("--relative", *options, cwd=tmp_path) for name, options in libraries.items()}
+    assert not any(location.is_absolute() for location in sections.values())
+    (tmp_path / "fusesoc.conf").write_text(
+        "".join(f"[library.{name}]\nlocation = {location}\n" for name, location in sections.items())
+    )
+    done = installation.fusesoc("core", "list", cwd=tmp_path)
+    assert f"robot:firm:generators:{__version__}" in done.stdout
+    assert f"robot:sys:obstacle:{__version__}" in done.stdout
+    assert "Replacing" not in done.stderr
+
+
+def test_an_environment_in_a_library_has_no_cores(installation: Installation, tmp_path: Path) -> None:
+    libraries = {"own": installation.environment, "firm": installation.library()}
+    (tmp_path / "fusesoc.conf").write_text(
+        "".join(f"[library.{name}]\nlocation = {location}\n" for name, location in libraries.items())
+    )
+    done = installation.fusesoc("core", "list", cwd=tmp_path)
+    assert f"robot:firm:generators:{__version__}" in done.stdout
+    assert "Replacing" not in done.stderr
+    assert "robot:sys:" not in done.stdout
 
 
 def test_a_whole_checkout_can_be_the_library(installation: Installation, tmp_path: Path) -> None:
     (tmp_path / "fusesoc.conf").write_text(f"[library.firm]\nlocation = {installation.source}\n")
     done = installation.fusesoc("core", "list", cwd=tmp_path)
-    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert f"robot:firm:generators:{__version__}" in done.stdout
     assert "left-behind" not in done.stdout
     assert "Replacing" not in done.stderr
 
 
 def test_the_checkout_itself_is_a_project(installation: Installation) -> None:
     done = installation.fusesoc("core", "list", cwd=installation.source)
-    assert "robot:firm:generators:0.1.0" in done.stdout
+    assert f"robot:firm:generators:{__version__}" in done.stdout
     assert "left-behind" not in done.stdout
     assert "Replacing" not in done.stderr
 
@@ -188,10 +221,12 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
     for name in ("axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"):
         assert files[name]["file_type"] == "vhdlSource-93"
         assert files[name]["core"] == "me:proj:robot-pose:1.0"
-    # The run-time cores come along with the generators; the simulated host stays out of a target that is not `sim`.
-    cores = {file["core"] for file in files.values()}
-    assert "robot:manager:firm_manager:0.1.0" in cores
-    assert not any(core.startswith("robot:sim:") for core in cores)
+    # A converter brings what it instantiates: no Manager, no schedulers, no links, no launcher.
+    assert {file["core"] for file in files.values()} == {
+        "me:proj:robot-pose:1.0",
+        f"robot:axis:firm_axis:{__version__}",
+        f"robot:axis:firm_axis_package:{__version__}",
+    }
 
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")

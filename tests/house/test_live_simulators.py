@@ -11,12 +11,14 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.bursts import BurstJoiner
-from fusesoc_firm.host.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator, core_of
+from fusesoc_firm.host.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator
 from fusesoc_firm.host.transport.simulator import Simulator
 from fusesoc_firm.host.transport.transport import Burst
+from fusesoc_firm.system.beside import core_of
 from tests.house.test_main_job import ROOT, run
 
 SPECS = ROOT / "specs"
@@ -35,7 +37,7 @@ def recorded(request: pytest.FixtureRequest, build_root: Path) -> tuple[str, Pat
     """A system, and the folder with the files of a run of its bench."""
     done = run(request.param, build_root)
     assert done.returncode == 0, done.stdout
-    return request.param, build_root / f"robot_sys_{request.param}_0.1.0" / "sim"
+    return request.param, build_root / f"robot_sys_{request.param}_{__version__}" / "sim"
 
 
 def frames_of(file: Path) -> list[bytes]:

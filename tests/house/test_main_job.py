@@ -12,7 +12,7 @@ from types import MappingProxyType
 
 import pytest
 
-from fusesoc_firm import manifest
+from fusesoc_firm import __version__, manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 FUSESOC = Path(sys.executable).parent / "fusesoc"
@@ -60,7 +60,14 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("name", "messages"), [("image_pipeline", 7), ("image_pipeline_software", 14), ("sobel", 7), ("multi_type", 19)]
+    ("name", "messages"),
+    [
+        ("image_pipeline", 7),
+        ("image_pipeline_software", 14),
+        ("sobel", 7),
+        ("multi_type", 19),
+        ("robotic_arm_franka", 3),
+    ],
 )
 def test_every_other_application_passes(tmp_path: Path, name: str, messages: int) -> None:
     done = run(name, tmp_path / "build")
@@ -70,7 +77,7 @@ def test_every_other_application_passes(tmp_path: Path, name: str, messages: int
 
 
 def work_folder(build_root: Path, core: str) -> Path:
-    return build_root / f"robot_sys_{core}_0.1.0" / "sim"
+    return build_root / f"robot_sys_{core}_{__version__}" / "sim"
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +92,7 @@ def project(tmp_path: Path) -> Path:
 
 
 def copy_project(destination: Path) -> Path:
-    ignored = shutil.ignore_patterns("__pycache__", "library")
+    ignored = shutil.ignore_patterns("__pycache__", "demos", "library")
     for folder in ("fusesoc_firm", "cores", "generators", "specs"):
         shutil.copytree(ROOT / folder, destination / folder, ignore=ignored)
     shutil.copy(ROOT / "fusesoc.conf", destination)

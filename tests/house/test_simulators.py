@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import manifest
+from fusesoc_firm import __version__, manifest
 from tests.house.test_main_job import run
 
 pytestmark = pytest.mark.skipif(
@@ -37,7 +37,7 @@ def test_all_simulators_receive_the_same(system: str, tmp_path: Path) -> None:
         print(done.stdout)
         assert done.returncode == 0
         reports.append(report(done))
-        work = tmp_path / "build" / f"robot_sys_{system}_0.1.0" / target
+        work = tmp_path / "build" / f"robot_sys_{system}_{__version__}" / target
         received.append((work / "received.txt").read_bytes())
         assert PROGRAMS[target] <= manifest.read(work).keys()
     assert reports[0][-1] == f"PASS {SYSTEMS[system]}/{SYSTEMS[system]}"
@@ -60,7 +60,7 @@ def test_another_seed(build_root: Path) -> None:
 
 
 def test_a_wrong_answer_fails_by_exit_status(build_root: Path, tmp_path: Path) -> None:
-    expected = build_root / "robot_sys_sobel_0.1.0" / "sim_icarus" / "expected.txt"
+    expected = build_root / f"robot_sys_sobel_{__version__}" / "sim_icarus" / "expected.txt"
     assert run("sobel", build_root, target="sim_icarus").returncode == 0
     text = expected.read_text()
     frame = text.index("\n  ") + len("\n  00 ")

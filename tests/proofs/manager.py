@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.proofs.proof import Mutation, Proof, Size
 
-_CORES = ("axis/axis", "manager/manager")
+_CORES = ("axis/package", "axis/axis", "manager/manager")
 _ENTITY = "firm_manager"
 
 _SLICE = "firm_axis_register_slice.vhd"

@@ -39,7 +39,7 @@ def _proofs(
         Proof(
             harness,
             entity,
-            cores=("axis/axis", "sched/package", *cores, f"sched/{policy}"),
+            cores=("axis/package", "axis/axis", "sched/package", *cores, f"sched/{policy}"),
             sizes=sizes if harness in _OF_ANY_NUMBER else tuple(size for size in sizes if size["REQUESTERS"] != 3),
             depth=4,
             mutations=found,

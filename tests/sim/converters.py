@@ -64,7 +64,9 @@ class ConverterBench:
 
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(
-            core_files("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host")
+            core_files(
+                "axis/package", "axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host"
+            )
         )
 
     def pair(self, ros: RosVersion, name: str, width: int = 8, selection: Selection = EVERYTHING) -> Pair:

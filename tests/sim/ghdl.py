@@ -1,7 +1,7 @@
 """GHDL for tests: analyse VHDL-93, simulate, synthesise to a netlist, find latches, simulate the netlist instead.
 
     work = Library("firm", tmp_path)
-    work.analyse(core_files("axis/axis", "manager/manager"))
+    work.analyse(core_files("axis/package", "axis/axis", "manager/manager"))
     result = work.run("some_tb", generics={"SEED": 7})
     assert result.exit_code == 0, result.output
     work.replace_by_netlist("firm_manager", {"WIDTH": 8})      # from here on, benches see the netlist
@@ -133,7 +133,7 @@ def _is_complete(case: str) -> bool:
 
 
 def core_files(*cores: str, fileset: str = "rtl") -> list[Path]:
-    """The files that the .core files name in `fileset`, in order: `core_files("axis/axis", "manager/manager")`."""
+    """The files that the .core files name in `fileset`, in order: `core_files("axis/package", "axis/axis")`."""
     files = []
     for core in cores:
         description = CORES / f"{core}.core"

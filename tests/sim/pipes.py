@@ -57,7 +57,7 @@ def _options(mark: str, generics: dict[str, Generic]) -> list[str]:
 @cache
 def _analysed(folder: Path) -> None:
     library = Library("firm", folder)
-    library.analyse(core_files("axis/axis", "sim/host", "sim/pipe"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/pipe"))
     library.analyse(core_files("sim/pipe", fileset="tb"))
 
 

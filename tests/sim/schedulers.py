@@ -14,7 +14,7 @@ BENCH = "firm_sched_trace_tb"
 POLICY_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources", "edf_latency", "lst")
 SEED = 20240503
 
-_WITHOUT_POLICIES = ("axis/axis", "sched/package")
+_WITHOUT_POLICIES = ("axis/package", "axis/axis", "sim/host", "sched/package")
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from tests.sim.schedulers import POLICY_CORES
 
 DATA = Path(__file__).parent / "data"
 RUNTIME = (
+    "axis/package",
     "axis/axis",
     "sim/sync",
     "cdc/cdc",

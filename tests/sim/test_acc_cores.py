@@ -21,7 +21,9 @@ PI = Fraction("3.14159265358979323846264338327950288")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     """The library with the benches, beside `firm` in the same directory."""
     directory = tmp_path_factory.mktemp("acc")
-    Library("firm", directory).analyse(core_files("acc/cordic/cordic", "acc/float64/float64"))
+    Library("firm", directory).analyse(
+        core_files("axis/package", "sim/host", "acc/cordic/cordic", "acc/float64/float64")
+    )
     work = Library("work", directory)
     work.analyse(sorted(ACC.glob("*/tb/*.vhd")))
     return work
@@ -202,3 +204,28 @@ def test_float64(library: Library, tmp_path: Path, count: int, block_fraction: i
     fixed_results = (tmp_path / "fixed_results.txt").read_text().splitlines()
     # Python rounds int / int to nearest, ties to even; all results are normal numbers.
     assert fixed_results == [float_bits(value / 2**fixed_fraction) for value in fixed]
+
+
+def own_data(core: str, name: str) -> list[list[str]]:
+    """The words of each line of a file of a core's own bench."""
+    return [line.split() for line in (ACC / core / "tb" / "data" / f"{name}.txt").read_text().splitlines()]
+
+
+def test_the_results_that_the_cores_own_benches_expect_are_right() -> None:
+    turns = zip(own_data("cordic", "angles"), own_data("cordic", "angles_expected"), strict=True)
+    for (angle,), (cosine, sine) in turns:
+        turned = signed(angle) / 2**29
+        assert abs(signed(cosine) / 2**29 - math.cos(turned)) < 2**-27
+        assert abs(signed(sine) / 2**29 - math.sin(turned)) < 2**-27
+    gain = math.prod(math.sqrt(1 + 4.0**-i) for i in range(35))
+    vectors = zip(own_data("cordic", "vectors"), own_data("cordic", "vectors_expected"), strict=True)
+    for (x, y), (magnitude, angle) in vectors:
+        assert abs(signed(magnitude) - math.hypot(signed(x), signed(y)) * gain) <= 2**-33 * 2**60 + 70
+        expected = math.atan2(signed(y), signed(x))
+        assert abs(signed(angle) / 2**60 - expected) < 2**-32
+    blocks = zip(own_data("float64", "block_vectors"), own_data("float64", "block_expected"), strict=True)
+    for (numbers,), (digits, exponent, undefined, zero) in blocks:
+        values = [struct.unpack(">d", int(numbers[k : k + 64], 2).to_bytes(8))[0] for k in (192, 128, 64, 0)]
+        expected_block, largest, is_undefined, is_zero = block_of(values, 60)
+        assert (int(exponent, 2), undefined == "1", zero == "1") == (largest, is_undefined, is_zero)
+        assert is_undefined or [signed(digits[k : k + 61]) for k in (183, 122, 61, 0)] == expected_block

@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores
 
 from fusesoc_firm.converter.generator import constants_files
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from tests.sim.ghdl import Library, core_files
+from tests.typestores import typestore
 from tests.unit.frame import genpy_oracle
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
@@ -170,7 +171,7 @@ def written(folder: Path, library: MessageLibrary, names: list[MessageName]) -> 
 
 def analysed(folder: Path, files: list[Path]) -> Library:
     """The packages in a library, beside that of the project."""
-    Library("firm", folder).analyse(core_files("axis/axis", "sim/host"))
+    Library("firm", folder).analyse(core_files("axis/package", "axis/axis", "sim/host"))
     work = Library("work", folder)
     work.analyse(files)
     return work
@@ -204,7 +205,7 @@ def known_constants(table: Mapping[str, Any], long_name: str, seen: list[str]) -
 def test_every_message_of_the_distributions(ros: RosVersion, tmp_path: Path) -> None:
     """Each has a package; rosbags says which constants are in it and what they are."""
     library = MessageLibrary(ros)
-    table = get_typestore(STORES[ros]).fielddefs
+    table = typestore(STORES[ros]).fielddefs
     files = written(tmp_path, library, library.names())
     packages: dict[str, list[Expected]] = {}
     for name in library.names():

@@ -180,7 +180,7 @@ def test_many_types_side_by_side(tmp_path: Path, width: int) -> None:
 )
 def test_illegal_generics(tmp_path: Path, generics: dict[str, int], text: str) -> None:
     library = Library("firm", tmp_path)
-    library.analyse(core_files("axis/axis", "acc/image/image"))
+    library.analyse(core_files("axis/package", "axis/axis", "acc/image/image"))
     result = library.run("firm_image_header", generics, options=["--stop-time=1ns"])
     assert result.exit_code != 0
     assert text in result.output

@@ -27,7 +27,16 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
     library.analyse(
-        core_files("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host", "sim/parts")
+        core_files(
+            "axis/package",
+            "axis/axis",
+            "sched/package",
+            "sched/fixed_priority",
+            "manager/manager",
+            "sim/host",
+            "sim/parts",
+            "sim/echo",
+        )
     )
     library.analyse(core_files("manager/manager", fileset="tb"))
     return library

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.host.bursts import BurstJoiner
-from tests.sim.ghdl import Generic, Library, core_files
+from tests.sim.ghdl import CORES, Generic, Library, core_files
 
 BENCH = "firm_manager_burst_tb"
 WIDTHS = [8, 64, 512]
@@ -31,7 +31,16 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
     library.analyse(
-        core_files("axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host", "sim/parts")
+        core_files(
+            "axis/package",
+            "axis/axis",
+            "sched/package",
+            "sched/fixed_priority",
+            "manager/manager",
+            "sim/host",
+            "sim/parts",
+            "sim/echo",
+        )
     )
     library.analyse(core_files("manager/manager", fileset="tb"))
     return library
@@ -51,15 +60,18 @@ def _run(library: Library, directory: Path, generics: dict[str, Generic]) -> Out
     print(f"seed {SEED}")
     result = library.run(BENCH, {"SEED": SEED, "LONGEST": LONGEST, **generics}, directory=directory)
     assert result.exit_code == 0, result.output
-    lines = (directory / "bursts.txt").read_text(encoding="ascii").splitlines()
-    bursts = [(int(tid, 16), bytes.fromhex(burst)) for tid, burst in (line.split() for line in lines)]
-    return Outcome(bursts, *map(int, result.output.splitlines()[-1].split()))
+    return Outcome(_read(directory / "bursts.txt"), *map(int, result.output.splitlines()[-1].split()))
 
 
-def _payload(publisher: int, frame: int) -> bytes:
+def _read(path: Path) -> list[tuple[int, bytes]]:
+    lines = path.read_text(encoding="ascii").splitlines()
+    return [(int(tid, 16), bytes.fromhex(burst)) for tid, burst in (line.split() for line in lines)]
+
+
+def _payload(publisher: int, frame: int, longest: int = LONGEST) -> bytes:
     """What the bench's publishers send."""
     return bytes(
-        (publisher + 31 * frame + 7 * place) % 256 for place in range((17 * publisher + 29 * frame) % (LONGEST + 1))
+        (publisher + 31 * frame + 7 * place) % 256 for place in range((17 * publisher + 29 * frame) % (longest + 1))
     )
 
 
@@ -188,3 +200,14 @@ def test_illegal_generics_are_named(library: Library, generic: str, value: int, 
     result = library.run("firm_axis_burst", {generic: value})
     assert result.exit_code != 0
     assert f" is {value}; legal: {legal}" in result.output
+
+
+def test_the_bursts_that_the_cores_own_bench_expects_are_right() -> None:
+    # The bench's own numbers of publishers, of their frames, and the longest payload.
+    bursts = _read(CORES / "manager" / "tb" / "data" / "bursts_expected.txt")
+    joiner = BurstJoiner(2, 8)
+    frames = [frame for tid, burst in bursts if (frame := joiner.push(burst, tid))]
+    joiner.close()
+    for publisher in range(2):
+        payloads = [frame.payload for frame in frames if frame.id == publisher]
+        assert payloads == [_payload(publisher, number, longest=100) for number in range(10)]

@@ -17,6 +17,7 @@ from tests.sim.pass_through import QUIET, PassThrough, received, systems_of_all
 from tests.sim.quaternions import quaternion_bag, worst_error
 from tests.sim.systems import DATA
 from tests.unit.frame.oracle import Oracle
+from tests.unit.message.test_bag_definitions import POINT, TEXT, record
 from tests.unit.replay.replays import Item, read, write
 
 SEED = 20261121
@@ -141,3 +142,16 @@ def test_a_system_answers_the_same_wherever_a_block_is(tmp_path: Path, builds: P
     ]
     assert answers[0] == answers[1]
     assert [(topic, stamp) for topic, _, stamp, _ in answers[0]] == [("/sums", number * 10**8) for number in range(4)]
+
+
+def test_messages_that_only_the_bag_defines(tmp_path: Path, builds: Path) -> None:
+    """The specification names the bag: simulator and replay find the same messages."""
+    bag = record(tmp_path, "ros1", {"odd_msgs/msg/Odd": TEXT + POINT}, count=3, size=28)
+    message = "middleware: ROS, message: odd_msgs/Odd"
+    blocks = f"""
+  - {{name: t0, mode: subscriber, {message}, outgoing: [{{name: b}}]}}
+  - {{name: b, mode: publisher, {message}}}
+"""
+    (tmp_path / "robot.yaml").write_text(f"project: {{name: robot}}\npaths: drive.bag\nblocks:{blocks}")
+    found = replay(tmp_path / "robot.yaml", bag, tmp_path / "answers.bag", builds)
+    assert [(topic, payload) for topic, _, _, payload in found] == [("/b", bytes(28))] * 3

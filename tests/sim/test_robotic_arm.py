@@ -14,7 +14,6 @@ from fusesoc_firm.generation import Plain
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
-from tests import corpus
 from tests.sim.applications import SPECS, for_ros2, simulation
 from tests.sim.ghdl import Library, core_files
 
@@ -89,9 +88,8 @@ def test_the_netlist_answers_alike(tmp_path: Path) -> None:
 def test_the_state_as_franka_ros_publishes_it(tmp_path: Path) -> None:
     """The same answers to franka_msgs/FrankaState: our states within messages whose other fields are at random."""
     print(f"seed {SEED}")
-    definitions = str(corpus.definitions("ros1", "franka_msgs"))
     name = MessageName("franka_msgs", "FrankaState")
-    closure = MessageLibrary(RosVersion.ROS1, [Path(definitions)]).closure(name)
+    closure = MessageLibrary(RosVersion.ROS1, [ARM / "franka_msgs"]).closure(name)
     draw = Stimuli(closure, RosVersion.ROS1, random.Random(SEED))
     messages = []
     for stimulus in states(6):
@@ -100,6 +98,6 @@ def test_the_state_as_franka_ros_publishes_it(tmp_path: Path) -> None:
         messages.append({"state": draw.message(name, TYPICAL) | ours})
     stimuli = tmp_path / "stimuli.yaml"
     stimuli.write_text(yaml.safe_dump(messages))
-    changes: dict[str, Plain] = {"spec": "robotic_arm_franka.yaml", "paths": ["msg", definitions]}
+    changes: dict[str, Plain] = {"spec": "robotic_arm_franka.yaml", "paths": ["msg", "franka_msgs"]}
     system = simulation(ARM, tmp_path / "system", *CORES, stimuli=str(stimuli), **changes)
     assert system.passes(SEED=7)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.sim.ghdl import Library
-from tests.sim.sched_trace import Trace, first_difference
+from tests.sim.ghdl import CORES, Library
+from tests.sim.sched_trace import Trace, first_difference, read_trace
 from tests.sim.schedulers import (
     ENTITIES,
     aggregate,
@@ -111,3 +111,8 @@ def _put(library: Library, name: str, entity: str, requesters: int, generics: Ma
     file.write_text(wrapper(name, entity, requesters, generics))
     library.analyse([file])
     return file
+
+
+def test_the_trace_that_the_cores_own_bench_expects_is_right() -> None:
+    trace = read_trace(CORES / "sched" / "tb" / "data" / "trace_expected.txt")
+    assert first_difference(trace, model_of(trace, "round_robin", "01")) == ""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.sim.ghdl import Generic, Library, core_files
+from tests.sim.ghdl import CORES, Generic, Library, core_files
 
 ITEMS = [1, 2, 3, 5, 8, 32, 100, 256]
 KEY_BITS = 10
@@ -70,7 +70,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/axis", "sched/queue"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sched/queue"))
     library.analyse(core_files("sched/queue", fileset="tb"))
     return library
 
@@ -91,6 +91,10 @@ def _cycles(
     }
     result = library.run(BENCH, generics)
     assert result.exit_code == 0, f"{generics}\n{result.output}"
+    yield from _segments(trace)
+
+
+def _segments(trace: Path) -> Iterator[list[Cycle]]:
     for segment in trace.read_text(encoding="ascii").split("reset\n"):
         if segment:
             yield [_parse(line) for line in segment.splitlines()]
@@ -163,3 +167,9 @@ def test_the_netlist_does_the_same(tmp_path: Path, is_sorted: bool, items: int) 
 @pytest.mark.parametrize("is_sorted", ENTITIES)
 def test_it_is_latch_free(library: Library, is_sorted: bool, items: int) -> None:
     assert library.latches(ENTITIES[is_sorted], {"ITEMS": items, "KEY_BITS": KEY_BITS}) == []
+
+
+@pytest.mark.parametrize(("name", "is_sorted"), [("queue", False), ("sorted", True)])
+def test_the_trace_that_the_cores_own_bench_expects_is_right(name: str, is_sorted: bool) -> None:
+    segments = list(_segments(CORES / "sched" / "tb" / "data" / f"{name}_expected.txt"))
+    assert all(_judge(cycles, is_sorted)[0] > 10 for cycles in segments)

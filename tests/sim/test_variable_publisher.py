@@ -262,7 +262,7 @@ def test_every_message_of_the_distributions_is_analysed(
 ) -> None:
     oracle = bench.oracles[ros]
     library = Library("work", tmp_path)
-    Library("firm", tmp_path).analyse(core_files("axis/axis"))
+    Library("firm", tmp_path).analyse(core_files("axis/package", "axis/axis"))
     files = []
     for name in oracle.messages():
         frame = oracle.frame(name)

@@ -14,7 +14,7 @@ import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.cli.message import STAGES
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.library_path import demos_root, library_root
 
 ROOT = Path(__file__).resolve().parents[2]
 SPEC = ROOT / "specs" / "quat2euler" / "quat2euler.yaml"
@@ -40,6 +40,22 @@ def error(capsys: Captured, *arguments: str) -> str:
 def test_path_is_the_library(capsys: Captured) -> None:
     assert Path(out(capsys, "path").strip()) == library_root()
     assert (library_root() / "generators" / "generators.core").is_file()
+    demos = Path(out(capsys, "path", "--demos").strip())
+    assert demos == demos_root()
+    assert (demos / "obstacle" / "obstacle.core").is_file()
+
+
+@pytest.mark.parametrize("option", [[], ["--demos"]])
+def test_a_relative_path_leads_to_the_same_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Captured, option: list[str]
+) -> None:
+    absolute = Path(out(capsys, "path", *option).strip())
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("a/b")
+    monkeypatch.chdir(tmp_path / "link")
+    path = Path(out(capsys, "path", "--relative", *option).strip())
+    assert not path.is_absolute()
+    assert (tmp_path / "a" / "b" / path).resolve() == absolute.resolve()
 
 
 @pytest.mark.parametrize(
@@ -303,7 +319,7 @@ def test_a_reader_that_leaves_early_is_no_fault() -> None:
 def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec, picture = tmp_path / "robot.yaml", tmp_path / "robot.dot"
     point = "geometry_msgs/Point"
-    answers = ["robot", *[""] * 7, "no", "sub", "", "ROS", "subscriber", point, *[""] * 3, "yes", "pub", "", "", "no"]
+    answers = ["robot", *[""] * 8, "no", "sub", "", "ROS", "subscriber", point, *[""] * 3, "yes", "pub", "", "", "no"]
     answers += ["yes", "pub", "", "ROS", "publisher", point, *[""] * 7, "no", "no"]
     monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
     assert f"{spec}: robot is right: 1 subscriber" in out(capsys, "system", "new", str(spec))

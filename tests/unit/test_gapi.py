@@ -74,6 +74,7 @@ class Bench:
             Parameter("spec", "str", "a path", is_required=True),
             Parameter("width", "int", "bits", 8, choices=(8, 16)),
             Parameter("seed", "int", "a seed", 1, bounds=(1, 99)),
+            Parameter("word", "str", "a word", rule=("lower case", str.islower)),
             Parameter("paths", "list", "folders"),
             Parameter("file", "str", "a file that says it all", replaces=("spec", "width")),
         )
@@ -214,6 +215,7 @@ def test_a_fault_of_the_input_is_printed_without_traceback(bench: Bench, capsys:
         ({"width": "8", "spec": "b"}, 10, "10:14: error: parameter 'width' is '8', but must be an integer\n"),
         ({"width": True, "spec": "b"}, 10, "10:14: error: parameter 'width' is True, but must be an integer\n"),
         ({"width": 12, "spec": "b"}, 10, "10:14: error: parameter 'width' is 12, but must be one of 8, 16\n"),
+        ({"spec": "b", "word": "B"}, 10, "10:13: error: parameter 'word' is 'B', but must be lower case\n"),
         ({"seed": 0, "spec": "b"}, 9, "9:13: error: parameter 'seed' is 0, but must be 1 to 99\n"),
         ({"paths": "a", "spec": "b"}, 9, "9:14: error: parameter 'paths' is 'a', but must be a list of strings\n"),
         ({"paths": [1], "spec": "b"}, 10, "10:7: error: parameter 'paths' is [1], but must be a list of strings\n"),

@@ -95,9 +95,7 @@ def instances() -> Iterator[Instance]:
 
 
 def _is_taken(application: str, parameters: Mapping[str, object]) -> bool:
-    # The definitions of one are not ours to ship, and another one's Verilog is nothing for GHDL.
-    if application == "robotic_arm_franka":
-        return False
+    # GHDL simulates no Verilog.
     if application == "multi_type_verilog" and "product" in parameters:
         return parameters.get("simulator") == "icarus"
     return application == "quat2euler" or not {"board", "simulator"} & parameters.keys()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import launcher, tools
+from fusesoc_firm import launcher, manifest, tools
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from tests.sim.ghdl import REPOSITORY
@@ -114,3 +115,68 @@ def test_who_ends_the_launcher_ends_the_program(alone: Path, tmp_path: Path) -> 
         assert started.wait(timeout=30) == 128 + signal.SIGTERM
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "started").read_text()), 0)
+
+
+# A Python that counts its starts, and hands a program to the launcher.
+PYTHON = """\
+echo "$*" >> starts
+if [ "$1" = firm_python.py ]; then echo "$0"; else shift 2; exec {python} -m fusesoc_firm.launcher "$@"; fi
+"""
+
+
+@pytest.fixture
+def build(alone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The work folder of a build, whose Python counts its starts in the file `starts`."""
+    folder = tmp_path / "build"
+    folder.mkdir()
+    shutil.copy(REPOSITORY / "generators" / "firm_launcher.sh", folder)
+    (folder / "Makefile").write_text("")
+    program(alone, "python3", PYTHON.format(python=f"{sys.base_prefix}/bin/python3"))
+    (alone / "find").symlink_to("/usr/bin/find")
+    monkeypatch.setenv("PYTHONPATH", ":".join([str(REPOSITORY), *sys.path]))
+    return folder
+
+
+def start(build: Path, *command: str) -> tuple[int, str, int]:
+    """Start a program as the makefile does: its status, what it printed, and how often Python was started."""
+    done = subprocess.run(
+        ["/bin/sh", "firm_launcher.sh", *command], cwd=build, capture_output=True, text=True, check=False
+    )
+    print(done.stderr)
+    starts = build / "starts"
+    count = len(starts.read_text().splitlines()) if starts.exists() else 0
+    starts.unlink(missing_ok=True)
+    return done.returncode, done.stdout, count
+
+
+def test_python_is_started_for_the_first_run_of_a_program_in_a_build(alone: Path, build: Path) -> None:
+    program(alone, "icepack", 'echo "$1|$2"; exit 5')
+    assert start(build, "icepack", "a b", "") == (5, "a b|\n", 2)
+    assert "icepack" in manifest.read(build)
+    assert start(build, "icepack", "c  d", "*") == (5, "c  d|*\n", 0)
+    # FuseSoC has written the makefile again, then the program is another one.
+    os.utime(build / "Makefile", (time.time() + 60, time.time() + 60))
+    assert start(build, "icepack")[2] == 2
+    os.utime(build / "Makefile", (1, 1))
+    assert start(build, "icepack")[2] == 0
+    program(alone, "icepack", "echo new")
+    os.utime(alone / "icepack", (1, 1))
+    assert start(build, "icepack") == (0, "new\n", 2)
+
+
+def test_python_is_started_where_a_failure_has_to_be_cleaned_up_after(alone: Path, build: Path) -> None:
+    program(alone, "nextpnr-ice40", 'echo layout > "$2"; exit 3')
+    for _ in range(2):
+        assert start(build, "nextpnr-ice40", "--asc", "system.asc") == (3, "", 2)
+        assert not (build / "system.asc").exists()
+
+
+def test_what_was_built_is_started_by_the_shell(build: Path) -> None:
+    program(build, "Vtop", "exit 4")
+    assert start(build, "./Vtop") == (4, "", 0)
+
+
+def test_without_a_python_that_has_the_package_programs_are_started_all_the_same(alone: Path, build: Path) -> None:
+    program(alone, "python3", "true")
+    program(alone, "icepack", "exit 6")
+    assert start(build, "icepack") == (6, "", 0)

@@ -82,7 +82,9 @@ class Project:
         """What was generated, and what came from the store."""
         done = self.set_up()
         assert done.returncode == 0, done.stderr
-        lines = [line.split() for line in done.stdout.splitlines() if line.startswith(("firm: ", "firm_messages: "))]
+        lines = [
+            line.split() for line in done.stdout.splitlines() if line.startswith(("firm: ", "far: ", "firm_messages: "))
+        ]
         return {words[1]: words[2] for words in lines}
 
     def converter(self) -> str:
@@ -160,3 +162,51 @@ def test_without_a_run_they_are_found_where_they_lie(
     capsys.readouterr()
     assert main(["lock", "me:p:top"]) == 1
     assert "'me:p:top' is no core with messages that FuseSoC knows here" in capsys.readouterr().err
+
+
+# --- by a specification -------------------------------------------------------------------------------------------
+
+SPECIFICATION = """\
+project: {name: robot}
+paths: ["me:msgs:arm"]
+blocks:
+  - {name: a, middleware: ROS2, mode: subscriber, message: arm_msgs/Pose, outgoing: [{name: b}]}
+  - {name: b, middleware: ROS2, mode: publisher, message: arm_msgs/Pose}
+"""
+SYSTEM = TOP.replace("robot:firm:generators", "robot:firm:firm_system").replace(
+    "pose: {generator: firm, parameters: {message: arm_msgs/Pose, ros: 2, messages: [me:msgs:arm]}}",
+    "pose: {generator: far, parameters: {spec: robot.yaml}}",
+)
+
+
+def test_a_specification_names_cores_for_the_build_and_for_commands(
+    project: Project, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project.write("top/robot.yaml", SPECIFICATION)
+    project.write("top/top.core", SYSTEM)
+    made = {"base-messages": "generated", "arm-messages": "generated", "top-pose": "generated"}
+    assert project.origins() == made
+    assert "elbow_milliradians : out std_logic_vector(15 downto 0)" in " ".join(project.converter().split())
+    assert project.origins() == dict.fromkeys(made, "from")
+    project.write("base/msg/base_msgs/msg/Angle.msg", "uint32 milliradians\n")
+    assert project.origins() == made
+    # Without a run, FuseSoC's libraries are searched.
+    monkeypatch.chdir(project.root)
+    monkeypatch.setenv("HOME", str(project.root.parent))
+    spec = project.root / "top/robot.yaml"
+    assert main(["system", "check", str(spec)]) == 0
+    assert main(["lock", "me:p:top"]) == 0
+    lock = yaml.safe_load((project.root / "top/top.lock").read_text())
+    assert list(lock["messages"]) == ["arm_msgs/Pose (ROS 2)", "base_msgs/Angle (ROS 2)"]
+    capsys.readouterr()
+    assert main(["system", "core", str(spec), "-o", str(project.root / "new.core")]) == 0
+    assert "me:msgs:arm" in (project.root / "new.core").read_text()
+    # The system's core does not depend on it.
+    project.write("top/top.core", SYSTEM.replace(', "me:msgs:arm"', ""))
+    done = project.set_up()
+    assert done.returncode != 0
+    assert f"{spec}:2:9: error: there are no messages of core 'me:msgs:arm'" in done.stderr + done.stdout
+    spec.write_text(SPECIFICATION.replace("me:msgs:arm", "me:msgs:none"))
+    capsys.readouterr()
+    assert main(["system", "check", str(spec)]) == 1
+    assert f"{spec}:2:9: error: 'me:msgs:none' is no core with messages" in capsys.readouterr().err

@@ -48,7 +48,7 @@ class Project:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.package = folder / "code" / "fusesoc_firm"
-        left_out = shutil.ignore_patterns("library", "__pycache__")
+        left_out = shutil.ignore_patterns("demos", "library", "__pycache__")
         shutil.copytree(PACKAGE, self.package, ignore=left_out)
         (folder / "msgs" / "my_msgs" / "msg").mkdir(parents=True)
         self.message = folder / "msgs" / "my_msgs" / "msg" / "Size.msg"

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
 from fusesoc_firm.gapi import main as generate
 from fusesoc_firm.library_path import library_root
@@ -154,7 +155,7 @@ def test_files_of_all_targets_and_flags_are_found(project: Path) -> None:
         "nothing",
         "geometry_msgs/Point",
     ]
-    assert "far_generator.py" in {path.name for path in cores["generators"].files}
+    assert "firm_generator.py" in {path.name for path in cores["generators"].files}
 
 
 def test_graph(project: Path, capsys: Captured) -> None:
@@ -224,7 +225,7 @@ def test_a_lock_names_messages_cores_and_tools(project: Path, capsys: Captured) 
     assert size["sha256"] == hashlib.sha256(b"uint8 a\n").hexdigest()
     assert size["signature"].startswith("RIHS01_")
     assert lock["messages"]["geometry_msgs/Point (ROS 2)"]["source"] == "rosbags ros2_jazzy"
-    assert {"me:p:branch:1.0", "robot:axis:firm_axis:0.1.0"} <= lock["cores"].keys()
+    assert {"me:p:branch:1.0", f"robot:axis:firm_axis:{__version__}"} <= lock["cores"].keys()
     # The one is for a target that the core has not, the other is the core itself.
     assert not {"me:p:leaf:1.0", "me:p:top:1.0"} & lock["cores"].keys()
     assert lock["tools"]["fusesoc"] == {"version": version("fusesoc")}

@@ -12,9 +12,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.signature import md5
+from tests import corpus
 
 SPEC = Path(__file__).parents[2] / "specs" / "robotic_arm"
 SEED = 20240817
+STATE = MessageName("franka_msgs", "FrankaState")
+# The sum that ROS 1 has for franka_msgs/FrankaState of franka_ros 0.10.
+STATE_MD5 = "431567d5df6caf4e4dd7385f25cb71ee"
 # Of the Panda's joints in rad, and its parameters: quarter turns about x, a, d; the hand is the eighth.
 LIMITS = [
     (-2.8973, 2.8973),
@@ -142,3 +151,19 @@ def test_the_model_and_the_hardware_have_the_same_parameters() -> None:
     assert numbers("A") == [round(a * MODEL.ONE) for _, a, _ in STEPS]
     assert numbers("D") == [round(d * MODEL.ONE) for _, _, d in STEPS]
     assert numbers("HAND_ANGLE") == [round(MODEL.HAND_ANGLE * MODEL.ONE)]
+
+
+def md5_of(folder: Path) -> str:
+    return md5(STATE, MessageLibrary(RosVersion.ROS1, [folder]).closure(STATE))
+
+
+def test_the_state_has_the_fields_of_franka_ros() -> None:
+    assert md5_of(SPEC / "franka_msgs") == STATE_MD5
+    store = get_typestore(Stores.ROS1_NOETIC)
+    for path in (SPEC / "franka_msgs" / "msg").glob("*.msg"):
+        store.register(get_types_from_msg(path.read_text(), f"franka_msgs/msg/{path.stem}"))
+    assert store.generate_msgdef("franka_msgs/msg/FrankaState", ros_version=1)[1] == STATE_MD5
+
+
+def test_the_sum_is_that_of_the_definition_of_franka_ros() -> None:
+    assert md5_of(corpus.definitions("ros1", "franka_msgs")) == STATE_MD5

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
 from fusesoc_firm.gapi import GENERATORS, Call, make_request
 from fusesoc_firm.generation import as_files
@@ -28,15 +29,15 @@ def build(folder: Path, application: str = "quat2euler", **parameters: object) -
     given = {"spec": f"{application}.yaml"} | parameters
     generator = "far" if "spec" in parameters or not parameters else "firm"
     given = given if generator == "far" else parameters
-    root, vlnv = SPECS / application, f"robot:sys:{application}-system:0.1.0"
-    request = make_request(generator, Call(vlnv, root, given), GENERATORS[generator].parameters, no_messages)
-    made = folder / "generator_cache" / f"robot_sys_{application}-system_0.1.0-1234"
+    root, vlnv = SPECS / application, f"robot:sys:{application}-system:{__version__}"
+    request = make_request(generator, Call(vlnv, root, given), GENERATORS[generator], no_messages)
+    made = folder / "generator_cache" / f"robot_sys_{application}-system_{__version__}-1234"
     for name, content in as_files(GENERATORS[generator].generate(request), request).items():
         (made / name).parent.mkdir(parents=True, exist_ok=True)
         (made / name).write_bytes(content)
     call = {"files_root": str(root), "vlnv": vlnv, "parameters": given}
     (made / "system_input.yml").write_text(yaml.safe_dump(call))
-    copy = folder / "src" / f"robot_sys_{application}-system_0.1.0"
+    copy = folder / "src" / f"robot_sys_{application}-system_{__version__}"
     shutil.copytree(made, copy, ignore=shutil.ignore_patterns("*.yml"))
     return copy
 
@@ -61,7 +62,7 @@ def why(capsys: Captured, path: Path, text: str) -> dict[str, list[str]]:
 def test_every_line_is_that_of_the_template_named(application: str) -> None:
     """The rest of a template's line, without its tags, stands on the line that is made of it."""
     call = Call(f"a:b:{application}-x:1", SPECS / application, {"spec": f"{application}.yaml"})
-    request = make_request("far", call, GENERATORS["far"].parameters, no_messages)
+    request = make_request("far", call, GENERATORS["far"], no_messages)
     with recorded() as renderings:
         GENERATORS["far"].generate(request)
     for text, rendering in renderings.items():

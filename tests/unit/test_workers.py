@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -27,6 +29,7 @@ pytestmark = pytest.mark.xdist_group("dask")
 
 SMALL_BENCH = ("scheduler", "bench", "--requesters", "2,9", "--policies", "lru,lst", "--sets", "2", "--cycles", "500")
 
+needs_openssl = pytest.mark.skipif(not shutil.which("openssl"), reason="openssl is not installed")
 Captured = pytest.CaptureFixture[str]
 
 
@@ -118,6 +121,142 @@ def test_a_scheduler_that_ends() -> None:
         ):
             list(found.run(time.sleep, [60]))
         assert time.monotonic() - started < 45
+
+
+@pytest.fixture(scope="module")
+def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An authority, a certificate of it for all machines of a cluster, and another authority."""
+    folder = tmp_path_factory.mktemp("certificates")
+    new_key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1"]
+    for name in ("ca", "other"):
+        command = [
+            "openssl",
+            "req",
+            "-x509",
+            *new_key,
+            "-keyout",
+            f"{name}.key",
+            "-out",
+            f"{name}.pem",
+            "-subj",
+            f"/CN={name}",
+        ]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    for name, authority in (("node", "ca"), ("stranger", "other")):
+        request = ["openssl", "req", *new_key, "-keyout", f"{name}.key", "-out", f"{name}.csr", "-subj", f"/CN={name}"]
+        subprocess.run(request, cwd=folder, check=True, capture_output=True)
+        sign = [
+            "openssl",
+            "x509",
+            "-req",
+            "-in",
+            f"{name}.csr",
+            "-CA",
+            f"{authority}.pem",
+            "-CAkey",
+            f"{authority}.key",
+        ]
+        sign += ["-CAcreateserial", "-out", f"{name}.pem", "-days", "1"]
+        subprocess.run(sign, cwd=folder, check=True, capture_output=True)
+    return folder
+
+
+def _configuration(folder: Path, name: str, authority: str) -> Any:
+    """Dask's, as one file has it on every machine of a cluster."""
+    tls = {"ca-file": str(folder / f"{authority}.pem")}
+    for role in ("client", "scheduler", "worker"):
+        tls |= {f"{role}.cert": str(folder / f"{name}.pem"), f"{role}.key": str(folder / f"{name}.key")}
+    dask: Any = importlib.import_module("dask")
+    return dask.config.set({f"distributed.comm.tls.{key}": value for key, value in tls.items()})
+
+
+@pytest.fixture(scope="module")
+def tls_address(certificates: Path) -> Iterator[str]:
+    with _configuration(certificates, "node", "ca"):
+        security = distributed.Security(require_encryption=True)
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tls://",
+        host="127.0.0.1",
+        dashboard_address=":0",
+        security=security,
+    ) as cluster:
+        assert cluster.scheduler_address.startswith("tls://")
+        yield cluster.scheduler_address
+
+
+@needs_openssl
+def test_a_cluster_behind_tls(tls_address: str, certificates: Path, capsys: Captured) -> None:
+    with _configuration(certificates, "node", "ca"), workers.cluster_workers(tls_address) as cluster:
+        assert sorted(cluster.run(_square, range(5))) == [(number, number**2) for number in range(5)]
+    assert capsys.readouterr().err == ""
+
+
+@needs_openssl
+@pytest.mark.parametrize(("name", "authority"), [("stranger", "ca"), ("node", "other"), ("stranger", "other")])
+def test_a_stranger_gets_and_gives_nothing(
+    tls_address: str, certificates: Path, name: str, authority: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The cluster does not take the certificate, or is not taken itself."""
+    monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
+    with (
+        _configuration(certificates, name, authority),
+        pytest.raises(InputError, match=f"no Dask scheduler answers at '{tls_address}'"),
+        workers.cluster_workers(tls_address),
+    ):
+        pass
+
+
+@needs_openssl
+def test_no_plain_connection_gets_into_a_cluster_behind_tls(
+    tls_address: str, certificates: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
+    for address in (tls_address.replace("tls", "tcp"), tls_address.removeprefix("tls://")):
+        with (
+            _configuration(certificates, "node", "ca"),
+            pytest.raises(InputError, match="no Dask scheduler answers at"),
+            workers.cluster_workers(address),
+        ):
+            pass
+
+
+@needs_openssl
+def test_certificates_that_are_missing(certificates: Path, tmp_path: Path) -> None:
+    address = "tls://127.0.0.1:1"
+    with pytest.raises(InputError, match=r"needs distributed.comm.tls.ca-file\n.*names the certificates"):
+        workers.cluster_workers(address).__enter__()
+    with (
+        _configuration(tmp_path, "node", "ca"),
+        pytest.raises(InputError, match=r"there is no file '.*/ca.pem', which .* distributed.comm.tls.ca-file"),
+    ):
+        workers.cluster_workers(address).__enter__()
+
+
+@pytest.mark.parametrize(
+    ("address", "is_open"),
+    [
+        ("tcp://127.0.0.1:1", False),
+        ("localhost:1", False),
+        ("tcp://[::1]:1", False),
+        ("tcp://192.0.2.1:1", True),
+        ("192.0.2.1:1", True),
+        ("tcp://robot.example:1", True),
+    ],
+)
+def test_a_cluster_that_anyone_may_read_is_warned_of(
+    address: str, is_open: bool, monkeypatch: pytest.MonkeyPatch, capsys: Captured
+) -> None:
+    def refuse(*_: Any, **__: Any) -> None:
+        raise OSError("nobody")
+
+    monkeypatch.setattr(distributed, "Client", refuse)
+    with pytest.raises(InputError, match="no Dask scheduler answers"), workers.cluster_workers(address):
+        pass
+    err = capsys.readouterr().err
+    assert err.startswith(f"warning: '{address}' is neither on this machine nor tls://") if is_open else not err
 
 
 def test_ctrl_c_ends_it(address: str) -> None:

@@ -15,6 +15,7 @@ entity firm_axis_pack_tb is
     WIDTH         : integer := 8;
     STIMULUS_FILE : string  := "stimulus.txt";
     PACKED_FILE   : string  := "packed.txt";
+    EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     -- The chances, each cycle, that nothing is offered, and that the sink takes nothing.
     SOURCE_STALL_PERCENT : integer := 0;
@@ -161,6 +162,7 @@ begin
 
   receive : process
     file lines          : text open write_mode is PACKED_FILE;
+    file wanted_file    : text open read_mode is existing(EXPECTED_FILE);
     variable bytes      : line;
     variable frames     : natural := 0;  -- finished
     variable beats      : natural := 0;
@@ -209,13 +211,14 @@ begin
           end if;
         end loop;
         if tlast = '1' then
-          writeline(lines, bytes);
+          write_result(lines, wanted_file, EXPECTED_FILE, bytes);
           frames := frames + 1;
         end if;
       end if;
       wait until falling_edge(clk);
     end loop;
     print(integer'image(beats) & " beats, " & integer'image(gaps) & " gaps");
+    assert endfile(wanted_file) report "results are missing" severity failure;
     print("PASS");
     is_done <= true;
     wait;

@@ -17,6 +17,7 @@ entity firm_axis_trim_tb is
     SLACK         : natural := 0;
     STIMULUS_FILE : string  := "stimulus.txt";
     TRIMMED_FILE  : string  := "trimmed.txt";
+    EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     -- The chances, each cycle, that nothing is offered, and that nothing is taken.
     SOURCE_STALL_PERCENT : integer := 0;
@@ -53,7 +54,8 @@ architecture simulation of firm_axis_trim_tb is
   signal m_valid : std_logic;
   signal m_ready : std_logic := '0';
 
-  signal is_done : boolean := false;
+  signal frames_taken : natural := 0;
+  signal is_done      : boolean := false;
 
 begin
 
@@ -89,6 +91,7 @@ begin
     variable place    : natural;
     variable size     : natural;
     variable said     : std_logic_vector(31 downto 0);
+    variable frames   : natural  := 0;
     variable waits    : natural  := 0;
     variable random_1 : positive := SEED;
     variable random_2 : positive := 3;
@@ -168,9 +171,11 @@ begin
       data   <= (others => '0');
       count  <= (others => '0');
       offer;
-      last  <= '0';
-      frame := frame.next_frame;
+      last   <= '0';
+      frame  := frame.next_frame;
+      frames := frames + 1;
     end loop;
+    assert frames_taken = frames report integer'image(frames_taken) & " frames came" severity failure;
     print(integer'image(waits) & " waits");
     print("PASS");
     is_done <= true;
@@ -179,6 +184,7 @@ begin
 
   take : process
     file lines            : text open write_mode is TRIMMED_FILE;
+    file wanted_file      : text open read_mode is existing(EXPECTED_FILE);
     variable bytes        : line;
     variable watch        : natural := 0;
     variable was_cut      : boolean := false;
@@ -212,7 +218,8 @@ begin
           if was_filled then
             write(bytes, string'(" filled"));
           end if;
-          writeline(lines, bytes);
+          write_result(lines, wanted_file, EXPECTED_FILE, bytes);
+          frames_taken <= frames_taken + 1;
           was_cut    := false;
           was_filled := false;
         end if;

@@ -18,6 +18,7 @@ entity firm_axis_window_tb is
     VOID_LANES    : integer := 0;
     STIMULUS_FILE : string  := "stimulus.txt";
     TAKEN_FILE    : string  := "taken.txt";
+    EXPECTED_FILE : string  := "";
     SEED          : integer := 1;
     -- The chances, each cycle, that the source offers no beat, that the reader takes nothing, that it skips.
     SOURCE_STALL_PERCENT : integer := 0;
@@ -142,6 +143,7 @@ begin
 
   read : process
     file lines        : text open write_mode is TAKEN_FILE;
+    file wanted_file  : text open read_mode is existing(EXPECTED_FILE);
     variable taken    : line;
     variable finished : natural := 0;
     variable is_open  : boolean := false;  -- bytes of the frame were taken
@@ -172,7 +174,7 @@ begin
     begin
       assert finished < frames report "more frames than were sent" severity failure;
       write(taken, mark);
-      writeline(lines, taken);
+      write_result(lines, wanted_file, EXPECTED_FILE, taken);
       finished := finished + 1;
       is_open  := false;
       at_least := 0;
@@ -230,6 +232,7 @@ begin
       end if;
     end loop;
     print(integer'image(idle_max) & " cycles idle between frames");
+    assert endfile(wanted_file) report "results are missing" severity failure;
     print("PASS");
     is_done <= true;
     wait;

@@ -26,6 +26,7 @@ entity firm_manager_burst_tb is
     -- Publisher 0 stops for ever behind its first beat.
     STOPPED    : boolean  := false;
     TRACE_FILE : string   := "bursts.txt";
+    EXPECTED_FILE : string   := "";
     SEED       : positive := 1;
     -- The chance in a cycle that the grant moves; that it moves to any publisher, whether it has a beat or not; that a
     -- publisher pauses behind a beat; that the host takes none.
@@ -294,6 +295,7 @@ begin
   -- The host: takes beats, writes bursts, checks the rules of the stream.
   take : process (clk)
     file trace           : text open write_mode is TRACE_FILE;
+    file wanted_file     : text open read_mode is existing(EXPECTED_FILE);
     variable random_1    : positive := SEED;
     variable random_2    : positive := 3;
     variable draw        : real;
@@ -332,12 +334,13 @@ begin
           assert kept = LANES or (kept > 0 and out_tlast = '1') report "a beat is not full" severity failure;
           begun := out_tlast = '0';
           if not begun then
-            writeline(trace, text_line);
+            write_result(trace, wanted_file, EXPECTED_FILE, text_line);
           end if;
         end if;
         if frames_sent = FRAMES * SPEAKING and idle_cycles = 20 then
           print(integer'image(beats_in) & " " & integer'image(beats_out) & " "
                 & integer'image(cycle - idle_cycles - first_cycle + 1));
+          assert endfile(wanted_file) report "bursts are missing" severity failure;
           finished <= true;
         end if;
         assert idle_cycles < WATCHDOG report "nothing comes any more" severity failure;

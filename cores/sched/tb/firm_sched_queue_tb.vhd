@@ -8,6 +8,7 @@ use ieee.numeric_std.all;
 use ieee.math_real.all;
 use std.textio.all;
 library firm;
+use firm.firm_sim_pkg.all;
 use firm.firm_axis_pkg.all;
 
 entity firm_sched_queue_tb is
@@ -19,7 +20,8 @@ entity firm_sched_queue_tb is
     CYCLES         : integer := 1000;
     INSERT_PERCENT : integer := 50;
     POP_PERCENT    : integer := 50;
-    TRACE          : string  := "queue.txt");
+    TRACE          : string  := "queue.txt";
+    EXPECTED       : string  := "");
 end entity firm_sched_queue_tb;
 
 architecture simulation of firm_sched_queue_tb is
@@ -96,6 +98,7 @@ begin
   drive : process
 
     file trace_file     : text open write_mode is TRACE;
+    file wanted_file    : text open read_mode is existing(EXPECTED);
     variable trace_line : line;
 
     variable random_1 : positive := SEED;
@@ -143,7 +146,7 @@ begin
           write(trace_line, string'(" -"));
         end if;
       end if;
-      writeline(trace_file, trace_line);
+      write_result(trace_file, wanted_file, EXPECTED, trace_line);
     end procedure write_cycle;
 
     -- An item that is outside, the next one from a random index on; none if all are inside.
@@ -205,6 +208,7 @@ begin
       clk <= '0';
       wait for 5 ns;
     end loop;
+    assert endfile(wanted_file) report "results are missing" severity failure;
     report "PASS";
     wait;
   end process drive;

@@ -8,6 +8,7 @@ use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
 use std.textio.all;
 library firm;
+use firm.firm_sim_pkg.all;
 use firm.firm_axis_pkg.all;
 use firm.firm_sched_pkg.all;
 
@@ -33,7 +34,8 @@ entity firm_sched_trace_tb is
     STRETCH : integer := 0;
     -- At the beginning of a stretch nobody takes a beat for as many cycles at most.
     LONGEST_STALL : integer := 0;
-    TRACE     : string  := "trace.txt");
+    TRACE     : string  := "trace.txt";
+    EXPECTED  : string  := "");
 end entity firm_sched_trace_tb;
 
 architecture simulation of firm_sched_trace_tb is
@@ -175,7 +177,8 @@ begin
   end generate of_groups;
 
   drive : process
-    file trace_file : text open write_mode is TRACE;
+    file trace_file  : text open write_mode is TRACE;
+    file wanted_file : text open read_mode is existing(EXPECTED);
 
     variable state : random_t := initial_state(0);
 
@@ -345,7 +348,7 @@ begin
         write(text_line, ' ');
         write(text_line, times(place));
       end loop;
-      writeline(trace_file, text_line);
+      write_result(trace_file, wanted_file, EXPECTED, text_line);
     end procedure write_times;
 
     -- Highest requester first; "." if they are those of the cycle before.
@@ -382,7 +385,7 @@ begin
       write(text_line, 4 * boolean'pos(has_beat) + 2 * boolean'pos(is_its_last) + boolean'pos(granted /= NOBODY));
       write(text_line, ' ');
       write(text_line, to_integer(unsigned(grant_select)));
-      writeline(trace_file, text_line);
+      write_result(trace_file, wanted_file, EXPECTED, text_line);
     end procedure write_cycle;
 
   begin
@@ -420,6 +423,7 @@ begin
         tick;
       end loop;
     end loop;
+    assert endfile(wanted_file) report "results are missing" severity failure;
     report "PASS";
     wait;
   end process drive;

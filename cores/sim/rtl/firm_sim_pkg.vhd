@@ -54,6 +54,13 @@ package firm_sim_pkg is
   -- not copied once a line.
   procedure make_room(text : inout line; used : in natural; wanted : in positive);
 
+  -- A bench that writes results to a file can compare them at once. EXPECTED is the file with the right ones, or empty:
+  --   file wanted_file : text open read_mode is existing(EXPECTED);
+  --   write_result(result_file, wanted_file, EXPECTED, row);  -- in place of writeline
+  --   assert endfile(wanted_file)                             -- at the end
+  function existing(path : string) return string;
+  procedure write_result(file results : text; file expected : text; path : in string; row : inout line);
+
 end package firm_sim_pkg;
 
 package body firm_sim_pkg is
@@ -135,6 +142,28 @@ package body firm_sim_pkg is
     write(output_line, text);
     writeline(output, output_line);
   end procedure print;
+
+  function existing(path : string) return string is
+  begin
+    if path = "" then
+      return "/dev/null";
+    end if;
+    return path;
+  end function existing;
+
+  procedure write_result(file results : text; file expected : text; path : in string; row : inout line) is
+    variable wanted : line;
+  begin
+    if path /= "" then
+      assert not endfile(expected)
+        report path & " has fewer lines than there are results" severity failure;
+      readline(expected, wanted);
+      assert row /= null and row.all = wanted.all
+        report "another result than in " & path & ": " & wanted.all severity failure;
+      deallocate(wanted);
+    end if;
+    writeline(results, row);
+  end procedure write_result;
 
   procedure fail_at(path : in string; line_number : in natural; what : in string) is
   begin

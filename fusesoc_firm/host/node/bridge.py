@@ -69,7 +69,7 @@ class Channel:
                 return None
             kind, topic, time_ns, size = _HEADER.unpack(header)
             data = self._file.read(size)
-        except OSError:
+        except (OSError, ValueError):  # ValueError: this end is closed
             return None
         return None if len(data) < size else Parcel(kind, topic, time_ns, data)
 
@@ -91,7 +91,8 @@ class Channel:
         """Close this end; whoever waits for something from it has waited long enough."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
-        self._socket.close()
+        # The socket lives as long as its file.
+        self._file.close()
         self._socket.close()
 
 

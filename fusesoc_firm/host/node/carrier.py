@@ -89,13 +89,20 @@ class RosCarrier:
         mine, its = socket.socketpair()
         arguments = [*ros_arguments(ros, options.arguments)]
         # A session of its own: Ctrl-C is for us, and the node has to publish what is still in the hardware.
-        self._process = subprocess.Popen(
-            [self._python, bridge.__file__, str(its.fileno()), *arguments],
-            pass_fds=[its.fileno()],
-            stdin=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        its.close()
+        try:
+            self._process = subprocess.Popen(
+                [self._python, bridge.__file__, str(its.fileno()), *arguments],
+                pass_fds=[its.fileno()],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        except OSError as error:
+            mine.close()
+            raise CarrierError(
+                f"the Python of {self.title}, {self._python}, cannot be started: {error.strerror}"
+            ) from None
+        finally:
+            its.close()
         self._channel = bridge.Channel(mine)
         self._stopped = threading.Event()
         self._is_closing = False

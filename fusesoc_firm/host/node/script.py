@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,8 +12,7 @@ from fusesoc_firm.host.node.description import NodeDescription
 from fusesoc_firm.host.node.options import add_node_options, remappings
 from fusesoc_firm.host.node.run import run_node, run_options
 from fusesoc_firm.host.node.transports import at_address
-from fusesoc_firm.message.library import libraries
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.beside import load_beside
 
 
 def main(description: NodeDescription, script: str = "", specification: str = "", paths: Sequence[str] = ()) -> None:
@@ -29,8 +27,9 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
     passed = remappings(rest, parser.error)
     try:
         folder = Path(script).resolve().parent
-        known = libraries([folder / path for path in paths], os.environ, None)
-        loaded = load_system(folder / specification, known) if specification else None
+        places = [folder / path for path in paths]
+        # The folders of cores are among them.
+        loaded = load_beside(folder / specification, places, core_folders=lambda _: ()) if specification else None
         options = run_options(arguments, passed, description)
         run_node(description, at_address(arguments.transport), options, loaded)
     except InputError as error:

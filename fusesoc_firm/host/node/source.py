@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.host.node.description import NodeDescription, NodeTopic, describe
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.naming import identifier
+from fusesoc_firm.quoting import lines_of, python_string
 from fusesoc_firm.render import render
 from fusesoc_firm.system.generator import LoadedSystem
 
@@ -33,12 +35,9 @@ def python_node(
     call = "main(NODE)"
     if has_software:
         others = [os.path.relpath(path, folder) for path in paths]
-        call = f"main(NODE, __file__, {_quoted(os.path.relpath(specification, folder))}, {others!r})"
-    return {
-        name: render(
-            _TEMPLATE, {**_table(description), "file": name, "specification_name": specification.name, "call": call}
-        )
-    }
+        call = f"main(NODE, __file__, {python_string(os.path.relpath(specification, folder))}, {others!r})"
+    configuration = {"file": name, "specification": shlex.quote(specification.name), "call": call}
+    return {name: render(_TEMPLATE, {**_table(description), **configuration})}
 
 
 def _table(description: NodeDescription) -> dict[str, Any]:
@@ -46,17 +45,16 @@ def _table(description: NodeDescription) -> dict[str, Any]:
     definitions = {topic.type: topic.definition for topic in topics if topic.definition}
     return {
         "name": description.name,
-        "quoted_name": _quoted(description.name),
         "width": description.width,
         "definitions": [
-            {"message": name, "constant": _constant(name), "lines": [*map(_quoted, text.splitlines(keepends=True))]}
+            {"message": name, "constant": _constant(name), "lines": lines_of(text)}
             for name, text in definitions.items()
         ],
         "subscribers": [*map(_topic, description.subscribers)],
         "publishers": [*map(_topic, description.publishers)],
         "sources": repr(description.sources),
-        "entering": [{"block": _quoted(item.block), "id": item.id} for item in description.entering],
-        "leaving": [{"block": _quoted(item.block), "id": item.id} for item in description.leaving],
+        "entering": [{"block": str(item.block), "id": item.id} for item in description.entering],
+        "leaving": [{"block": str(item.block), "id": item.id} for item in description.leaving],
         "longest_payload": repr(description.longest_payload),
         "clock_hz": repr(description.clock_hz),
     }
@@ -64,11 +62,11 @@ def _table(description: NodeDescription) -> dict[str, Any]:
 
 def _topic(topic: NodeTopic) -> dict[str, Any]:
     return {
-        "block": _quoted(topic.block),
-        "topic": _quoted(topic.name),
-        "type": _quoted(topic.type),
+        "block": str(topic.block),
+        "topic": topic.name,
+        "type": topic.type,
         "ros": topic.ros,
-        "signature": _quoted(topic.signature),
+        "signature": topic.signature,
         "id": repr(topic.id),
         "definition": {"constant": _constant(topic.type)} if topic.definition else None,
     }
@@ -77,18 +75,3 @@ def _topic(topic: NodeTopic) -> dict[str, Any]:
 def _constant(message: str) -> str:
     """The name of a definition's text: `GEOMETRY_MSGS_QUATERNION`."""
     return identifier(*message.split("/")).upper()
-
-
-def _quoted(text: str) -> str:
-    """A Python string, in double quotes wherever that needs no escape."""
-    return (
-        f'"{text[:-1]}\\n"'
-        if text.endswith("\n") and _is_plain(text[:-1])
-        else f'"{text}"'
-        if _is_plain(text)
-        else repr(text)
-    )
-
-
-def _is_plain(text: str) -> bool:
-    return text.isprintable() and not {'"', "\\"} & {*text}

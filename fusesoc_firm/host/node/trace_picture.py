@@ -11,6 +11,7 @@ from typing import Any
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.host.node.trace import COLUMNS
+from fusesoc_firm.quoting import plot_text
 
 SUFFIXES = (".pdf", ".png", ".svg")
 
@@ -53,8 +54,9 @@ def draw_trace(table: Path, picture: Path) -> None:
     size = (_WIDTH_INCHES, _ROW_INCHES * len(ways) + 0.4)
     drawing, axes = plots.subplots(len(ways), 2, figsize=size, squeeze=False, layout="constrained")
     for (left, right), ((subscriber, publisher), rows) in zip(axes, ways.items(), strict=True):
-        left.set_title(f"{subscriber} to {publisher}: wall time")
-        right.set_title(f"{subscriber} to {publisher}: simulated time")
+        way = plot_text(f"{subscriber} to {publisher}")
+        left.set_title(f"{way}: wall time")
+        right.set_title(f"{way}: simulated time")
         _draw(left, rows, _WALL, lambda nanoseconds: nanoseconds / 1000, "us")
         _draw(right, rows, _CYCLES, float, "cycles")
     try:

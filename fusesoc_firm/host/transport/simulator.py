@@ -89,6 +89,7 @@ class Simulator:
                 start_new_session=True,
             )
         except OSError as error:
+            self._close_files()
             raise TransportError(f"the simulator cannot be started in {folder}: {error.strerror}") from None
         finally:
             os.close(from_us)
@@ -129,6 +130,9 @@ class Simulator:
         """Kill the simulator if it still runs. A second call does nothing."""
         self.kill()
         self._process.wait()
+        self._close_files()
+
+    def _close_files(self) -> None:
         for file in (self._requests, self._reports, self._printed):
             try:
                 file.close()

@@ -210,3 +210,40 @@ def test_a_port_called_like_the_instance(tmp_path: Path) -> None:
     ports = "    clk         : in  std_logic;\n    u_converter : out std_logic\n"
     vhdl = f"\nentity x is\n  port (\n{ports}  );\nend entity;\n"
     assert interface_configuration("y", "x", vhdl, "m")["label"] == "u_converter_2"
+
+
+# --- a name for the units of a core -------------------------------------------------------------------------------
+
+
+def test_every_unit_of_a_core_follows_its_name(demo: Path) -> None:
+    core = generate(request(demo, message="demo_msgs/srv/Add", ros=2, name="left"))
+    assert stems(core) == [
+        "left_demo_msgs_add_request_pkg",
+        "left_demo_msgs_add_response_pkg",
+        "left_axis_to_demo_msgs_add_request",
+        "left_demo_msgs_add_request_to_axis",
+        "left_axis_to_demo_msgs_add_response",
+        "left_demo_msgs_add_response_to_axis",
+    ]
+    for stem in stems(core):
+        units = re.findall(
+            r"^(?:entity|package|architecture \w+ of) (\w+)", str(core.files[f"{stem}.vhd"].content), re.MULTILINE
+        )
+        assert set(units) == {stem}
+
+
+def test_the_units_of_a_configuration_follow_its_prefix_but_for_the_interfaces(demo: Path) -> None:
+    messages = [
+        {"type": ros, "name": "demo_msgs/Grip", way: [f"{ros}Grip"]}
+        for ros, way in (("ROS1", "subscribers"), ("ROS2", "publishers"))
+    ]
+    core = made(demo, yaml.safe_dump({"project": {"name": "two", "prefix": "left"}, "messages": messages}))
+    assert stems(core) == [
+        "left_demo_msgs_grip_ros1_pkg",
+        "left_demo_msgs_grip_ros2_pkg",
+        "left_axis_to_demo_msgs_grip",
+        "left_demo_msgs_grip_to_axis",
+        "ROS1Grip",
+        "ROS2Grip",
+    ]
+    assert "entity work.left_axis_to_demo_msgs_grip" in str(core.files["ROS1Grip.vhd"].content)

@@ -27,6 +27,7 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_message, parse_name
+from tests.typestores import typestore
 
 _STORES = {RosVersion.ROS1: Stores.ROS1_NOETIC, RosVersion.ROS2: Stores.ROS2_JAZZY}
 _ROS1_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
@@ -45,7 +46,7 @@ class Oracle:
     ) -> None:
         self.ros = ros
         store = Stores(f"ros{int(ros)}_{distribution}") if distribution else _STORES[ros]
-        self._store = get_typestore(store)
+        self._store = typestore(store)
         self._texts = dict(texts or {})
         self._library = MessageLibrary(ros, store=store.value.partition("_")[2])
         for name, text in self._texts.items():

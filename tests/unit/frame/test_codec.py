@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
+import random
+import struct
+from copy import deepcopy
 from typing import Any
 
 import pytest
@@ -90,3 +94,32 @@ def test_arrays_of_nothing_may_be_named_or_not() -> None:
 
 def test_a_frame_is_id_length_payload() -> None:
     assert pack_frame(200, b"ab" * 129) == b"\xc8\x02\x01\0\0" + b"ab" * 129
+
+
+NANS = (0x7F800001, 0xFFA00000, 0x7FBFFFFF, 0x7FC00001, 0xFFFFFFFF, 0x7F800000, 0x3F800000)
+NANS_64 = (0x7FF0000000000001, 0xFFF4000000000000, 0x7FF8000000000001, 0xFFFFFFFFFFFFFFFF)
+
+
+def test_the_bits_of_every_nan_stay() -> None:
+    """A signalling NaN, the top bit of whose fraction is zero, must not become a quiet one."""
+    both = layout(ROS1, "float32 a\nfloat32[7] b\nfloat32[] c\nfloat64 d\nfloat64[4] e\nfloat64[] f\n")
+    some = random.Random(7)
+    for _ in range(50):
+        single = [*NANS, *(some.getrandbits(32) | 0x7F800000 for _ in range(20))]
+        double = [*NANS_64, *(some.getrandbits(64) | 0x7FF0000000000000 for _ in range(20))]
+        some.shuffle(single)
+        some.shuffle(double)
+        payload = struct.pack("<8I", *single[:8]) + struct.pack("<I", len(single))
+        payload += struct.pack(f"<{len(single)}I", *single) + struct.pack("<5Q", *double[:5])
+        payload += struct.pack(f"<I{len(double)}Q", len(double), *double)
+        message = decode(both, payload)
+        assert encode(both, message) == payload
+        # As a model gets them, and a process of a cluster.
+        for copied in (deepcopy(message), pickle.loads(pickle.dumps(message))):
+            assert encode(both, copied) == payload
+
+
+def test_a_nan_is_shown_as_a_nan() -> None:
+    found = decode(layout(ROS1, "float32 a\n"), bytes.fromhex("010080ff"))["a"]
+    assert (repr(found), str(found), f"{found:.3f}") == ("nan", "nan", "nan")
+    assert found != found

@@ -18,14 +18,15 @@ from rosbags.typesys import Stores, get_typestore
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.host.bags import open_bag
 from fusesoc_firm.host.routes import routes_of
 from fusesoc_firm.host.stimuli import Stimulus, read_stimuli
+from fusesoc_firm.message.bags import open_bag
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.system.derived import Converter
+from tests.typestores import typestore
 
 KINDS = ("ros1", "sqlite3", "mcap")
 POINT, VECTOR, STRING = "geometry_msgs/msg/Point", "geometry_msgs/msg/Vector3", "std_msgs/msg/String"
@@ -303,3 +304,27 @@ def test_two_types_on_one_topic(tmp_path: Path) -> None:
 def test_a_topic_that_nobody_takes(tmp_path: Path, kind: str) -> None:
     path = write(tmp_path, kind, [("/p", POINT, 1.0, 0), ("/q", POINT, 2.0, 0), ("/p", POINT, 3.0, 0)])
     assert read_x(path, kind) == [1.0, 3.0]
+
+
+@pytest.mark.parametrize("ours", ["tf2_msgs/TFMessage", "tf/tfMessage"])
+@pytest.mark.parametrize("theirs", ["tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"])
+def test_transforms_under_either_name_of_their_message(tmp_path: Path, ours: str, theirs: str) -> None:
+    store = typestore(Stores.ROS1_NOETIC)
+    taker = subscriber("transforms", ours, RosVersion.ROS1, topic="/tf")
+    payload = encode(taker.frame, {"transforms": []})
+    with Rosbag1Writer(tmp_path / "drive.bag") as writer:
+        connection = writer.add_connection("/tf", theirs, typestore=store)
+        writer.write(connection, 5, payload)
+    with open_bag(tmp_path / "drive.bag") as bag:
+        ((stream, route),) = routes_of(bag, [taker], signatures_of([taker])).items()
+    assert (route.misfit, route.subscribers) == ("", (taker,))
+    assert stream.signature == "94810edda583a504dfda3829e70d7eec"
+    # By its type alone, too.
+    (found,) = read_stimuli(tmp_path / "drive.bag", [subscriber("transforms", ours, RosVersion.ROS1)])
+    assert found.payload == payload
+
+
+def signatures_of(topics: Iterable[Converter]) -> dict[tuple[RosVersion, MessageName], str]:
+    names = [topic.frame.message for topic in topics]
+    library = MessageLibrary(RosVersion.ROS1)
+    return {(RosVersion.ROS1, name): signature(name, library.closure(name)) for name in names}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
 from pathlib import Path
@@ -38,6 +39,12 @@ def rows(source: str) -> list[tuple[str, ...]]:
     return re.findall(r'^ +(\d+|\{\}), "(.*)", "(.*)",\n +"(.*)",', source, re.MULTILINE)
 
 
+def definition(source: str, constant: str) -> str:
+    """The text of a definition: its literals are also Python's."""
+    literals = source.partition(f"{constant}[] =\n")[2].partition(";\n")[0]
+    return b"".join(ast.literal_eval("b" + line.strip().replace("\\?", "?")) for line in literals.split("\n")).decode()
+
+
 def loop(name: str, message: str, ros: str) -> str:
     """Two converters with nothing between."""
     return converter(f"{name}_in", "subscriber", message, f"{name}_out", ros=ros) + converter(
@@ -50,7 +57,7 @@ def test_the_table_of_a_node_for_ros_1() -> None:
     source = files["src/quat2euler_node.cpp"]
     assert rows(source)[0] == ("0", "QuaternionToEuler_sub", "geometry_msgs/Quaternion", QUATERNION_MD5)
     assert [row[1] for row in rows(source)] == ["QuaternionToEuler_sub", "QuaternionToEuler_pub"]
-    assert "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n" in source
+    assert "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n" in definition(source, "kGeometryMsgsQuaternion")
     assert "run<firm::Ros1>" in source
     assert "<depend>roscpp</depend>" in files["package.xml"] and "exec_depend" not in files["package.xml"]
     assert "find_package(catkin" in files["CMakeLists.txt"]
@@ -95,20 +102,21 @@ def test_all_that_is_included_is_there() -> None:
     assert included and {f"include/{name}" for name in included} <= {*files}
 
 
-def test_a_definition_may_hold_what_ends_a_string(tmp_path: Path) -> None:
+def test_a_definition_may_hold_what_ends_a_string_or_a_line(tmp_path: Path) -> None:
     folder = tmp_path / "odd_msgs/msg"
     folder.mkdir(parents=True)
-    (folder / "Odd.msg").write_text('string END=a)msg" b)msg_" c\nuint8 x\n', encoding="utf-8")
+    odd = 'string END = a)msg" b\\n ??/ \f c \v d \x85 e \u2028 \u00e9 // */ \n'
+    (folder / "Odd.msg").write_text(f"{odd}uint8 x\n", encoding="utf-8", newline="")
     text = specification(loop("odd", "odd_msgs/Odd", "ROS"))
     source = cpp_package(written(tmp_path, text, tmp_path / "odd_msgs"))["src/robot_node.cpp"]
-    begin = 'R"msg__('
-    assert source.count(begin) == source.count(')msg__"') == 1
-    assert 'a)msg" b)msg_" c' in source.partition(begin)[2].partition(')msg__"')[0]
+    assert source.isascii() and "??/" not in source
+    shown = definition(source, "kOddMsgsOdd")
+    assert shown == f"# odd_msgs/Odd (ROS 1)\n\n{odd.rstrip()}\n\nuint8 x\n"
 
 
 def test_nested_messages_are_part_of_a_definition() -> None:
     source = cpp_package(load(SPECS / "multi_type/multi_type.yaml"))["src/multi_type_node.cpp"]
-    twist = source.partition("kGeometryMsgsTwistStamped[]")[2].partition(')msg"')[0]
+    twist = definition(source, "kGeometryMsgsTwistStamped")
     separator = "\n" + "=" * 80 + "\nMSG: "
     assert sorted(part.splitlines()[0] for part in twist.split(separator)[1:]) == [
         "geometry_msgs/Twist",
@@ -152,7 +160,7 @@ def test_blocks_in_software_have_ids_of_their_own(tmp_path: Path) -> None:
     source = cpp_package(loaded)["src/robot_node.cpp"]
     assert [(row[0], row[1]) for row in rows(source)] == [("0", "sub"), ("0", "last"), ("{}", "pub"), ("{}", "rest")]
     assert "    2,  // converters that take messages\n    2,  // converters that send them\n" in source
-    ports = re.findall(r'^ +\{"(.*)", (.*)\},$', source, re.MULTILINE)
+    ports = re.findall(r'^ +\{ "(.*)", (.*) \},$', source, re.MULTILINE)
     assert ports == [("sub", "{}"), ("", "1"), ("", "1"), ("pub", "{}"), ("rest", "{}")]
 
 

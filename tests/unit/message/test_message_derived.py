@@ -405,7 +405,7 @@ def test_every_type_of_an_installed_ros2() -> None:
 @pytest.mark.skipif(not CORPUS, reason="CORPUS names no folder")
 def test_corpus_has_the_same_messages_of_actions(tmp_path: Path) -> None:
     corpus = MessageLibrary(ROS1, [Path(CORPUS, "ros1")])
-    paths = {name: path for name in corpus.names() for path in corpus.files([name])}
+    paths = {name: Path(corpus.origin(name)) for name in corpus.names() if corpus.files([name])}
     compared = 0
     for name, path in paths.items():
         if not name.name.endswith("ActionGoal"):

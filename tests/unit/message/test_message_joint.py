@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import pytest
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg
 
 from fusesoc_firm.message.joint import joint_text, signature_of_text
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
+from tests.typestores import typestore
 
 STORES = {RosVersion.ROS1: Stores.ROS1_NOETIC, RosVersion.ROS2: Stores.ROS2_JAZZY}
 LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
@@ -25,7 +26,7 @@ def test_every_message_reads_back_with_its_signature(ros: RosVersion) -> None:
 
 @pytest.mark.parametrize("ros", RosVersion)
 def test_rosbags_reads_the_same_types(ros: RosVersion) -> None:
-    library, store = LIBRARIES[ros], get_typestore(STORES[ros])
+    library, store = LIBRARIES[ros], typestore(STORES[ros])
     for name in library.names():
         text = joint_text(name, library.closure(name))
         for type_, (constants, fields) in get_types_from_msg(text, f"{name.package}/msg/{name.name}").items():
@@ -36,7 +37,7 @@ def test_rosbags_reads_the_same_types(ros: RosVersion) -> None:
 
 @pytest.mark.parametrize("ros", RosVersion)
 def test_what_rosbags_writes_has_the_same_signature(ros: RosVersion) -> None:
-    library, store = LIBRARIES[ros], get_typestore(STORES[ros])
+    library, store = LIBRARIES[ros], typestore(STORES[ros])
     for name in library.names():
         text, _ = store.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=int(ros))
         assert signature_of_text(name, text, ros) == signature(name, library.closure(name)), name

@@ -11,6 +11,8 @@ from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef
 from fusesoc_firm.message.folders import interface_files
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import InterfaceKind, MessageName, MessageType, PrimitiveType, RosVersion
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.message.stores import DistributionStore, distributions
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
@@ -153,7 +155,7 @@ def test_every_bad_folder_is_named(tmp_path: Path) -> None:
         MessageLibrary(ROS1, [tmp_path / "empty", tmp_path / "missing"])
     assert [diagnostic.message for diagnostic in caught.value.diagnostics] == [
         f"message path '{tmp_path / 'empty'}' holds no .msg, .srv or .action file",
-        f"message path '{tmp_path / 'missing'}' is not a folder",
+        f"message path '{tmp_path / 'missing'}' is neither a folder nor a bag",
     ]
 
 
@@ -194,7 +196,8 @@ def test_an_unknown_message_is_reported_where_it_is_named() -> None:
         MessageLibrary(ROS1).get(MessageName("geometry_msgs", "Quaternoin"), place)
     assert str(caught.value).splitlines()[0] == "spec.yaml:3:12: error: unknown message 'geometry_msgs/Quaternoin'"
     assert str(caught.value).splitlines()[-1] == (
-        "      = did you mean 'geometry_msgs/Quaternion'? looked in: rosbags ros1_noetic"
+        "      = did you mean 'geometry_msgs/Quaternion'? looked in: rosbags ros1_noetic; "
+        "further places: 'paths' of the specification or core, --path"
     )
 
 
@@ -251,3 +254,14 @@ def test_messages_may_be_called_like_what_msg_has_not(tmp_path: Path, ros: RosVe
     (folder / "All.msg").write_text("".join(f"{word} f{n}\nmy_msgs/{word}[] g{n}\n" for n, word in enumerate(words)))
     closure = MessageLibrary(ros, [tmp_path]).closure(MessageName("my_msgs", "All"))
     assert {name.name for name in closure} == {*words, "All"}
+
+
+# --- messages of tf -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["tf2_msgs/TFMessage", "tf/tfMessage"])
+def test_the_transforms_of_ros1_are_known_by_both_names(name: str) -> None:
+    message = parse_name(name)
+    closure = MessageLibrary(ROS1).closure(message)
+    assert signature(message, closure) == "94810edda583a504dfda3829e70d7eec"  # as rosmsg md5 prints it
+    assert [str(field.type) for field in closure[message].fields] == ["geometry_msgs/TransformStamped[]"]

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg
 
 from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.library import MessageLibrary
@@ -37,6 +37,7 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.message.stores import distributions
+from tests.typestores import typestore
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 CORPUS = os.environ.get("CORPUS", "")
@@ -95,7 +96,7 @@ def content_of_rosbags(entry: Any, ros: RosVersion) -> Content:
     ids=str,
 )
 def test_every_message_of_a_distribution_keeps_all_that_rosbags_knows(ros: RosVersion, distribution: str) -> None:
-    table = get_typestore(Stores(f"ros{int(ros)}_{distribution}")).fielddefs
+    table = typestore(Stores(f"ros{int(ros)}_{distribution}")).fielddefs
     library = MessageLibrary(ros, store=distribution)
     names = library.names()
     assert len(names) >= len(table) - 2 > 130  # without ROS 1's time and duration

@@ -33,6 +33,7 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.message.signature import md5, rihs01, signature
 from fusesoc_firm.message.stores import DistributionStore, distributions
+from tests.typestores import typestore
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 CORPUS = os.environ.get("CORPUS", "")
@@ -239,7 +240,7 @@ def different_from_rosbags(closures: dict[MessageName, Definitions], store: Type
 def test_every_message_of_a_distribution_has_the_signature_of_rosbags(ros: RosVersion, distribution: str) -> None:
     library = MessageLibrary(ros, store=distribution)
     closures = {name: library.closure(name) for name in library.names()}
-    store = get_typestore(Stores(f"ros{int(ros)}_{distribution}"))
+    store = typestore(Stores(f"ros{int(ros)}_{distribution}"))
     assert different_from_rosbags(closures, store, ros) == []
     assert len(closures) > 130
 
@@ -314,7 +315,7 @@ class Corpus:
         parts = {part for closure in self.closures.values() for part in closure}
         self.texts = {part: store.text(part) for part in parts - set(self.names)}
         for name in self.names:
-            self.texts[name] = self._library.files([name])[0].read_text(encoding="utf-8")
+            self.texts[name] = self._library.content(name).decode()
 
 
 @needs_corpus

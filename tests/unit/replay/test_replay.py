@@ -10,8 +10,8 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.host.bags import Form
 from fusesoc_firm.host.transport.simulator import Simulator
+from fusesoc_firm.message.bags import Form
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.system.generator import LoadedSystem
 from tests.unit.replay.replays import (

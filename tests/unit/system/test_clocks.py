@@ -105,7 +105,7 @@ def test_the_top_level_says_which_paths_cross(system: DerivedSystem) -> None:
     text = render(SYSTEM_TEMPLATE, system_configuration(system))
     assert re.search(r"clk_fast +: in  std_logic;  -- 250 MHz: a, c, t\n", text)
     assert "-- clk_fast, 128 bits\n  u_c : entity work.wide" in text
-    assert "-- c to first: from clk_fast to clk, 128 to 32 bits" in text
+    assert "-- crossing c to first: from clk_fast to clk, 128 to 32 bits" in text
     assert "--   max delay of a cycle of clk_fast: every field, request_r" in text
     assert text.count("entity firm.firm_cdc_reset") == 5
 

@@ -12,7 +12,6 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.system.board import boards
 from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
-from tests.house.test_franka_job import write_definition
 from tests.unit.system.systems import accelerator, converter, derived, instance, specification
 
 SPECS = Path(__file__).resolve().parents[3] / "specs"
@@ -49,10 +48,7 @@ def test_there_are_cores() -> None:
 
 
 @pytest.mark.parametrize("core", CORES, ids=lambda path: path.stem)
-def test_a_checked_in_core_is_what_the_command_writes(
-    core: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(write_definition(tmp_path)))
+def test_a_checked_in_core_is_what_the_command_writes(core: Path, tmp_path: Path) -> None:
     text = core.read_text(encoding="utf-8")
     made = tmp_path / core.name
     # Of the targets, nothing is taken over.
@@ -76,7 +72,7 @@ def test_a_new_core_has_all_that_is_given(tmp_path: Path) -> None:
     )
     found = content(new_core(system(tmp_path), "arm.yaml", options))
     assert (found["name"], found["description"]) == ("me:robots:arm:1.0", "An arm")
-    assert found["filesets"]["base"]["depend"] == ["robot:firm:generators", "robot:acc:firm_cordic"]
+    assert found["filesets"]["base"]["depend"] == ["robot:firm:firm_system", "robot:acc:firm_cordic"]
     common = {"spec": "arm.yaml", "paths": ["msg"], "distro": "noetic"}
     assert found["generate"]["system"]["parameters"] == common
     assert found["generate"]["simulation"]["parameters"] == {
@@ -87,6 +83,19 @@ def test_a_new_core_has_all_that_is_given(tmp_path: Path) -> None:
         "environment": ["tb/a.vhd", "tb/b.vhd"],
     }
     assert found["targets"]["sim_icarus"]["flow_options"]["ghdlsynth_top"] == "robot_system_in_environment"
+
+
+def test_a_core_that_depends_on_the_generators_of_converters_alone_is_refused(tmp_path: Path) -> None:
+    core = tmp_path / "robot.core"
+    text = new_core(system(tmp_path), "robot.yaml", CoreOptions())
+    core.write_text(text.replace("robot:firm:firm_system", "robot:firm:generators"), encoding="utf-8")
+    with pytest.raises(InputError, match="does not depend on 'robot:firm:firm_system', which has the generator 'far'"):
+        updated_core(system(tmp_path), core)
+
+
+def test_only_targets_for_tools_have_the_launcher(tmp_path: Path) -> None:
+    targets = content(new_core(system(tmp_path), "robot.yaml", CoreOptions()))["targets"]
+    assert [name for name, target in targets.items() if "firm_launcher" not in target.get("flags", {})] == ["default"]
 
 
 def test_a_new_core_without_options_is_whole(tmp_path: Path) -> None:

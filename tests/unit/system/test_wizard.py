@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -65,7 +66,7 @@ def turner() -> Answers:
 
 
 def run(path: Path, answers: Answers) -> str:
-    extend_specification(path, answers, lambda: [POINT, VECTOR])
+    extend_specification(path, answers, lambda _: [POINT, VECTOR])
     assert answers.is_used_up
     return path.read_text(encoding="utf-8")
 
@@ -98,6 +99,24 @@ def test_software_may_have_no_sources(tmp_path: Path) -> None:
         assert question.is_required is (kind == "VHDL")
         assert ("sources" in text) is (kind == "VHDL")
         assert len(derived(tmp_path, text).subscribers) == 1
+
+
+def test_the_paths_of_messages_decide_what_can_be_named(tmp_path: Path) -> None:
+    (tmp_path / "msg").mkdir()
+    answers = turner()
+    answers.add(paths=["msg"], one_more_of_paths=["me:msgs:arm"])
+    asked: list[Sequence[str]] = []
+
+    def names(paths: Sequence[str]) -> list[str]:
+        asked.append(paths)
+        return [POINT, VECTOR]
+
+    extend_specification(tmp_path / "robot.yaml", answers, names)
+    assert "paths:" in (tmp_path / "robot.yaml").read_text()
+    assert asked[0] == ["msg", "me:msgs:arm"]
+    wrong = ["robot", *[""] * 7, "mgs"]
+    with pytest.raises(InputError, match="answer 9: 'mgs' is neither a folder, a bag nor a core"):
+        extend_specification(tmp_path / "other.yaml", PipeAsker(wrong, io.StringIO()), names)
 
 
 def test_every_key_is_explained_once(tmp_path: Path) -> None:
@@ -174,8 +193,8 @@ def test_a_specification_that_is_there_is_extended(tmp_path: Path) -> None:
     [
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
-        (["robot", *[""] * 7, "no", "a", "b"], "answer 11: 'type' cannot be 'b'"),
-        (["robot", *[""] * 7, "no", "a", "", "ROS", "subscriber", ""], "answer 14: 'message' is needed"),
+        (["robot", *[""] * 8, "no", "a", "b"], "answer 12: 'type' cannot be 'b'"),
+        (["robot", *[""] * 8, "no", "a", "", "ROS", "subscriber", ""], "answer 15: 'message' is needed"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:
@@ -187,6 +206,6 @@ def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], messa
 
 def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
-    answers = ["robot", *[""] * 7, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "no", "yes", "a"]
-    with pytest.raises(InputError, match="answer 20: there is 'a' already"):
+    answers = ["robot", *[""] * 8, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "no", "yes", "a"]
+    with pytest.raises(InputError, match="answer 21: there is 'a' already"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)

@@ -11,11 +11,13 @@ library std;
 use std.textio.all;
 
 library firm;
+use firm.firm_sim_pkg.all;
 
 entity firm_cordic_sincos_tb is
   generic (
     VECTORS    : string   := "vectors.txt";
     RESULTS    : string   := "results.txt";
+    EXPECTED   : string   := "";
     FRACTION   : positive := 29;
     ITERATIONS : positive := 29
   );
@@ -98,6 +100,7 @@ begin
 
   sink : process
     file     result_file : text open write_mode is RESULTS;
+    file     wanted_file : text open read_mode is existing(EXPECTED);
     variable result      : line;
     variable cos         : std_logic_vector(FRACTION+1 downto 0);
     variable sin         : std_logic_vector(FRACTION+1 downto 0);
@@ -120,7 +123,7 @@ begin
     write(result, to_bitvector(out_cos));
     write(result, ' ');
     write(result, to_bitvector(out_sin));
-    writeline(result_file, result);
+    write_result(result_file, wanted_file, EXPECTED, result);
     received <= received + 1;
   end process sink;
 

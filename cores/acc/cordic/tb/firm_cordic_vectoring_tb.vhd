@@ -11,11 +11,13 @@ library std;
 use std.textio.all;
 
 library firm;
+use firm.firm_sim_pkg.all;
 
 entity firm_cordic_vectoring_tb is
   generic (
     VECTORS    : string   := "vectors.txt";
     RESULTS    : string   := "results.txt";
+    EXPECTED   : string   := "";
     WIDTH      : positive := 64;
     FRACTION   : positive := 60;
     ITERATIONS : positive := 35
@@ -104,6 +106,7 @@ begin
 
   sink : process
     file     result_file : text open write_mode is RESULTS;
+    file     wanted_file : text open read_mode is existing(EXPECTED);
     variable result      : line;
     variable magnitude   : std_logic_vector(WIDTH-1 downto 0);
     variable angle       : std_logic_vector(FRACTION+2 downto 0);
@@ -126,7 +129,7 @@ begin
     write(result, to_bitvector(out_magnitude));
     write(result, ' ');
     write(result, to_bitvector(out_angle));
-    writeline(result_file, result);
+    write_result(result_file, wanted_file, EXPECTED, result);
     received <= received + 1;
   end process sink;
 

@@ -12,13 +12,16 @@ library std;
 use std.textio.all;
 
 library firm;
+use firm.firm_sim_pkg.all;
 
 entity firm_float64_tb is
   generic (
     BLOCK_VECTORS  : string   := "block_vectors.txt";
     BLOCK_RESULTS  : string   := "block_results.txt";
+    BLOCK_EXPECTED : string   := "";
     FIXED_VECTORS  : string   := "fixed_vectors.txt";
     FIXED_RESULTS  : string   := "fixed_results.txt";
+    FIXED_EXPECTED : string   := "";
     COUNT          : positive := 4;
     BLOCK_FRACTION : positive := 60;
     FIXED_FRACTION : natural  := 60
@@ -33,6 +36,7 @@ architecture test of firm_float64_tb is
   signal rst_n            : std_logic := '0';
   signal is_block_done    : boolean   := false;
   signal is_fixed_done    : boolean   := false;
+  signal received : natural := 0;
 
   signal block_in_valid   : std_logic := '0';
   signal block_in_ready   : std_logic;
@@ -99,6 +103,7 @@ begin
   blocks : process
     file     vector_file : text open read_mode is BLOCK_VECTORS;
     file     result_file : text open write_mode is BLOCK_RESULTS;
+    file     wanted_file : text open read_mode is existing(BLOCK_EXPECTED);
     variable vector      : line;
     variable result      : line;
     variable numbers     : bit_vector(64*COUNT-1 downto 0);
@@ -131,7 +136,7 @@ begin
       write(result, to_bit(block_undefined));
       write(result, ' ');
       write(result, to_bit(block_zero));
-      writeline(result_file, result);
+      write_result(result_file, wanted_file, BLOCK_EXPECTED, result);
     end loop;
     is_block_done <= true;
     wait;
@@ -159,17 +164,22 @@ begin
     for drain in 1 to 5 loop
       wait until rising_edge(clk);
     end loop;
+    assert received = sent
+      report "firm_float64_tb: " & integer'image(received) & " results of " & integer'image(sent) & " numbers"
+      severity failure;
     is_fixed_done <= true;
     wait;
   end process fixed_source;
 
   fixed_sink : process
     file     result_file : text open write_mode is FIXED_RESULTS;
+    file     wanted_file : text open read_mode is existing(FIXED_EXPECTED);
     variable result      : line;
   begin
     wait until rising_edge(clk) and fixed_valid = '1';
     write(result, to_bitvector(fixed_number));
-    writeline(result_file, result);
+    write_result(result_file, wanted_file, FIXED_EXPECTED, result);
+    received <= received + 1;
   end process fixed_sink;
 
 end architecture test;

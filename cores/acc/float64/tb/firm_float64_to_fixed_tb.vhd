@@ -11,11 +11,13 @@ library std;
 use std.textio.all;
 
 library firm;
+use firm.firm_sim_pkg.all;
 
 entity firm_float64_to_fixed_tb is
   generic (
     VECTORS  : string   := "vectors.txt";
     RESULTS  : string   := "results.txt";
+    EXPECTED : string   := "";
     WIDTH    : positive := 32;
     FRACTION : natural  := 29
   );
@@ -28,6 +30,7 @@ architecture test of firm_float64_to_fixed_tb is
   signal clk           : std_logic := '0';
   signal rst_n         : std_logic := '0';
   signal is_done       : boolean   := false;
+  signal received : natural := 0;
   signal in_valid      : std_logic := '0';
   signal in_number     : std_logic_vector(63 downto 0) := (others => '0');
   signal out_valid     : std_logic;
@@ -89,12 +92,16 @@ begin
     for drain in 1 to 5 loop
       wait until rising_edge(clk);
     end loop;
+    assert received = sent
+      report "firm_float64_to_fixed_tb: " & integer'image(received) & " results of " & integer'image(sent) & " numbers"
+      severity failure;
     is_done <= true;
     wait;
   end process source;
 
   sink : process
     file     result_file : text open write_mode is RESULTS;
+    file     wanted_file : text open read_mode is existing(EXPECTED);
     variable result      : line;
   begin
     wait until rising_edge(clk) and out_valid = '1';
@@ -103,7 +110,8 @@ begin
     write(result, to_bit(out_overflow));
     write(result, ' ');
     write(result, to_bit(out_undefined));
-    writeline(result_file, result);
+    write_result(result_file, wanted_file, EXPECTED, result);
+    received <= received + 1;
   end process sink;
 
 end architecture test;

@@ -5,16 +5,17 @@
             ...
 
 ROS 1, and ROS 2 as sqlite3 or MCAP, compressed or not. Nothing is held in memory but the index, and payloads are what
-was recorded: nothing is decoded and encoded again.
+was recorded: nothing is decoded and encoded again. `definitions_in` gives what a bag says of its messages.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,12 +25,17 @@ from rosbags.rosbag2 import Reader as Rosbag2Reader
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 
-from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.message.joint import separate_texts
+from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.reads import in_part
 
 Reader = Rosbag1Reader | Rosbag2Reader
 
 BAGS = "a bag is a .bag of ROS 1, or a folder, .mcap or .db3 of ROS 2"
+_SUFFIXES = (".bag", ".mcap", ".db3")
+_METADATA = "metadata.yaml"
 _ROS1_MAGIC = b"#ROSBAG"
 # What is wrong with a bag in rosbags' words, and what mends it.
 _REMEDIES = {
@@ -105,6 +111,55 @@ class Bag:
                 yield Recorded(_stream(connection), number, stamp, bytes(payload))
 
 
+@dataclass(frozen=True)
+class BagDefinitions:
+    """What a bag says of messages: whose they are, and the texts of each by which the bag defines it."""
+
+    ros: RosVersion
+    texts: Mapping[MessageName, tuple[str, ...]]
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path looks like a bag by its name or, as a folder, by what it holds."""
+    if path.is_dir():
+        return (path / _METADATA).is_file() or any(file.suffix in _SUFFIXES[1:] for file in path.iterdir())
+    return path.suffix in _SUFFIXES and path.is_file()
+
+
+def bag_files(path: Path) -> list[Path]:
+    """The files of a bag, which may be a folder (ROS 2), or the file itself."""
+    return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
+
+
+def definitions_in(path: Path) -> BagDefinitions:
+    """The definitions of messages in a bag, which is not read beyond its index. Raises `InputError`.
+
+    A type without a definition in ROS's own language is left out.
+    """
+    files = bag_files(path)
+    with in_part(files):
+        return _definitions_in(path, tuple(map(_state, files)))
+
+
+def _state(file: Path) -> tuple[str, int, int]:
+    """What tells a state of a file from others."""
+    status = file.stat()
+    return str(file.absolute()), status.st_size, status.st_mtime_ns
+
+
+@lru_cache(maxsize=4)
+def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> BagDefinitions:
+    """As `definitions_in`, of a bag whose files are in these states: every library of a process asks for them."""
+    texts: dict[MessageName, dict[str, None]] = {}
+    with open_bag(path) as bag:
+        for stream in bag.streams:
+            if stream.definition:
+                with suppress(InputError):  # a type that no specification can name
+                    for name, text in separate_texts(parse_name(stream.type), stream.definition).items():
+                        texts.setdefault(name, {})[text] = None
+        return BagDefinitions(bag.form.ros, {name: tuple(found) for name, found in texts.items()})
+
+
 @contextmanager
 def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
     """A bag to be read within the context. Raises `InputError`, with the `hint` where it is no bag at all."""
@@ -123,9 +178,9 @@ def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
 
 
 def _readers(path: Path) -> list[Reader]:
-    if path.is_dir() and not (path / "metadata.yaml").exists():
+    if path.is_dir() and not (path / _METADATA).exists():
         # Who records ends the folder with this file; what is there can be read without it.
-        files = sorted((file for file in path.iterdir() if file.suffix in (".db3", ".mcap")), key=_natural)
+        files = sorted((file for file in path.iterdir() if file.suffix in _SUFFIXES[1:]), key=_natural)
         if not files:
             raise FileNotFoundError("there is no metadata.yaml in it, no .db3 and no .mcap")
         return [Rosbag2Reader(file) for file in files]

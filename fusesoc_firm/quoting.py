@@ -1,0 +1,139 @@
+"""Text from users quoted for the language that it is generated into.
+
+Names, descriptions, file names and the constants of messages hold any printable character. A template says what each
+is there, `{{comment block}}` or `{{string topic}}`, and the template's ending says in which language.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+import shlex
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+
+import yaml
+
+Quote = Callable[[str], str]
+
+# Characters that mean nothing to Tcl, Make or a shell, wherever they stand in a word.
+_PLAIN_WORD = re.compile(r"[A-Za-z0-9_./:+,-]+")
+_PRINTABLE_ASCII = range(0x20, 0x7F)
+_C_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n"}
+_SECOND_QUESTION_MARK = re.compile(r"(?<=[?])[?]")
+
+
+def comment(text: str) -> str:
+    """`text` for a comment that ends with its line, in any language, as printable ASCII.
+
+    VHDL-93 is Latin-1, and GHDL refuses UTF-8 even in comments. A backslash at the end of a line, which C also spells
+    `??/`, would take the next line into the comment.
+    """
+    escaped = text.encode("unicode_escape").decode("ascii").replace("??/", "? ?/")
+    return f"{escaped}." if escaped.endswith("\\") else escaped
+
+
+def lines_of(text: str) -> list[str]:
+    """The lines of a text that is data, each with its newline; unlike for `splitlines`, no other character ends one."""
+    return [f"{line}\n" for line in text.removesuffix("\n").split("\n")]
+
+
+def c_string(text: str) -> str:
+    """A string literal of C and C++, with the bytes of UTF-8: octal, as hexadecimal escapes have no end."""
+    letters = "".join(map(_c_byte, text.encode("utf-8", "surrogateescape")))
+    # The second of two question marks could begin a trigraph.
+    escaped = _SECOND_QUESTION_MARK.sub(r"\\?", letters)
+    return f'"{escaped}"'
+
+
+def _c_byte(byte: int) -> str:
+    if chr(byte) in _C_ESCAPES:
+        return _C_ESCAPES[chr(byte)]
+    return chr(byte) if byte in _PRINTABLE_ASCII else f"\\{byte:03o}"
+
+
+def python_string(text: str) -> str:
+    """A string literal of Python, in double quotes unless more than a newline at its end needs an escape."""
+    body = text.removesuffix("\n")
+    if not body.isprintable() or {'"', "\\"} & {*body}:
+        return repr(text)
+    return f'"{body}\\n"' if body != text else f'"{body}"'
+
+
+def tcl_word(text: str) -> str:
+    """One word of Tcl's that stands for `text`: nothing in it is substituted, and braces around it stay balanced."""
+    if _PLAIN_WORD.fullmatch(text):
+        return text
+    return f'"{"".join(map(_tcl_character, text))}"'
+
+
+def _tcl_character(character: str) -> str:
+    if character in '\\"$[]{};#':
+        return f"\\{character}"
+    if ord(character) in _PRINTABLE_ASCII:
+        return character
+    units = character.encode("utf-16-be", "surrogatepass").hex()
+    return "".join(f"\\u{units[first : first + 4]}" for first in range(0, len(units), 4))
+
+
+def yaml_scalar(text: str) -> str:
+    """A scalar of YAML on one line, which is the string `text` again, never a number or a list."""
+    return _yaml(text, text).removesuffix("\n...")
+
+
+def yaml_list(texts: Iterable[str]) -> str:
+    """A list of strings in YAML on one line."""
+    words = [*texts]
+    return _yaml(words, "".join(words))
+
+
+def _yaml(value: str | list[str], text: str) -> str:
+    # PyYAML folds newlines, and writes a NEL as it is but reads it as a blank, unless all is escaped.
+    is_plain = text.isprintable()
+    style = None if is_plain else '"'
+    shown = yaml.safe_dump(value, default_style=style, default_flow_style=True, allow_unicode=is_plain, width=10**6)
+    return shown.removesuffix("\n")
+
+
+def dot_text(text: str) -> str:
+    """`text` between the quotes of a string of Graphviz's language."""
+    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+
+
+def plot_text(text: str) -> str:
+    """`text` as matplotlib writes it: a dollar begins no formula."""
+    return text.replace("\\", "\\\\").replace("$", "\\$")
+
+
+def make_prerequisite(name: str) -> str:
+    """A file's name as a prerequisite in a makefile."""
+    return re.sub("[ #:]", r"\\\g<0>", name).replace("$", "$$")
+
+
+def make_argument(text: str) -> str:
+    """An argument of a command in a makefile's recipe, which Make and then a shell read."""
+    return shlex.quote(text).replace("$", "$$")
+
+
+_HDL = {"comment": comment}
+_TCL = {"comment": comment, "word": tcl_word}
+_MARKUP = {"text": html.escape}
+# By the ending of a template: the ways in which a text may stand in its language.
+QUOTES: Mapping[str, Mapping[str, Quote]] = MappingProxyType(
+    {
+        "vhd": _HDL,
+        "v": _HDL,
+        "lpf": _HDL,
+        "pcf": _HDL,
+        "cst": _HDL,
+        "tcl": _TCL,
+        "xdc": _TCL,
+        "sdc": _TCL,
+        "cpp": {"comment": comment, "string": c_string},
+        "py": {"comment": comment, "string": python_string},
+        "core": {"scalar": yaml_scalar},
+        "dot": {"text": dot_text},
+        "html": _MARKUP,
+        "xml": _MARKUP,
+    }
+)
