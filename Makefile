@@ -8,19 +8,24 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 SYSTEM ?= robot:sys:quat2euler
-# For make bitstream; each is a file in fusesoc_firm/boards.
+# For make bitstream: a target of SYSTEM.
 BOARD ?= ulx3s
 FUSESOC_OPTIONS ?=
 # The test bench's seed of random stalls; empty is the one of the system's .core.
 SEED ?=
-# WAVES=1 writes waves.ghw into the build folder.
+# WAVES=1 writes waves.ghw into the build folder and prints its path.
 WAVES ?=
 # Further options for the simulator.
 SIM_OPTIONS ?=
 # The system's target: sim, sim_icarus, sim_verilator.
 TARGET ?= sim
+# Pythons for make matrix, beside those on PATH and pyenv's, such as PYTHONS=/opt/python3.14/bin/python3
+PYTHONS ?=
 # Programs that a target needs beside those of all.
 TOOLS :=
+# Edalize's flows that end in a bitstream; what the open ones need from PyPI is an extra of the same name.
+OPEN_FLOWS := apicula icestorm trellis
+BITSTREAM_FLOWS := $(OPEN_FLOWS) quartus vivado
 # Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
@@ -31,6 +36,8 @@ PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core, which are GHDL's.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
+# Of a failed run, too.
+SAY_WAVES = $(if $(WAVES),trap 'ls -t build/*/sim/waves.ghw | sed -n "1s/^/waves: /p"' EXIT;)
 # A host in Verilog takes its seed from FuseSoC.
 RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 is for GHDL, TARGET=sim))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
 
@@ -39,16 +46,21 @@ DEBIAN_MODULES := /usr/lib/python3/dist-packages
 ROS1 := pkg-config rosmaster:python3-rosmaster /usr/include/ros/ros.h:libroscpp-dev \
   $(foreach name,rospy std_msgs geometry_msgs sensor_msgs,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
 
-.PHONY: help sim test ros bitstream bench proofs corpus lint setup tools clean distclean
+# Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip leaves out why it failed.
+pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
+  { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
+
+.PHONY: help sim test ros bitstream bench matrix proofs corpus lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # Without what make and Edalize say about folders, the result is the last line.
-sim: TOOLS = $(if $(filter sim,$(TARGET)),,$(patsubst icarus,iverilog,$(TARGET:sim_%=%)))
-sim: setup ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED=N, WAVES=1, SIM_OPTIONS='...'
-	@MAKEFLAGS=--no-print-directory PYTHONUNBUFFERED=1 \
+sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED=N, WAVES=1, SIM_OPTIONS='...'
+	@$(BIN)/python .ci/check_target.py $(SYSTEM) $(TARGET) sim >/dev/null
+	@./.ci/install-tools $(subst icarus,iverilog,$(patsubst sim_%,%,$(filter sim_%,$(TARGET)))) >/dev/null
+	@$(SAY_WAVES) MAKEFLAGS=--no-print-directory PYTHONUNBUFFERED=1 \
 	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
@@ -66,7 +78,7 @@ corpus: $(if $(HAS_CORPUS),setup) ## Verify the converters of all messages below
 ifeq ($(HAS_CORPUS),)
 	@echo "No corpus: '$(CORPUS)' has no folders ros1 and ros2 of message definitions; CORPUS=DIR names another place"
 else
-	@status=0; \
+	@status=0; mkdir -p build; \
 	for ros in 1 2; do \
 	  $(BIN)/firm message verify --ros $$ros --path "$(CORPUS)/ros$$ros" \
 	    --report build/corpus_ros$$ros.json $(VERIFY_OPTIONS) || status=1; \
@@ -74,13 +86,20 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup ros $(VENV)/.bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
+bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
-bitstream: TOOLS = yosys
-bitstream: setup $(VENV)/.boards ## Build SYSTEM for BOARD (icebreaker, tangnano9k, ulx3s) to a bitstream
+bitstream: $(VENV)/.installed ## Build SYSTEM for BOARD (icebreaker, tangnano9k, ulx3s) to a bitstream
+	@flow=$$($(BIN)/python .ci/check_target.py $(SYSTEM) $(BOARD) $(BITSTREAM_FLOWS)); \
+	case " $(OPEN_FLOWS) " in \
+	  *" $$flow "*) ./.ci/install-tools yosys >/dev/null; $(MAKE) --no-print-directory $(VENV)/.extra-$$flow ;; \
+	esac
 	@$(BIN)/fusesoc run --setup --build --target=$(BOARD) $(FUSESOC_OPTIONS) $(SYSTEM)
+
+matrix: TOOLS = verilator
+matrix: tools $(VENV)/.extra-matrix ## Try each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' names more
+	@$(BIN)/python -m tests.matrix $(PYTHONS)
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
 	@$(BIN)/python -m tests.proofs
@@ -89,19 +108,24 @@ lint: setup ## Check style and types
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 
-setup: tools $(VENV)/.installed ## Install what the other targets need: programs by apt, Python packages into .venv
+setup: tools $(VENV)/.extra-test ## Install what the other targets need: programs by apt, Python packages into .venv
 
 tools:
 	@./.ci/install-tools $(TOOLS) >/dev/null
 
-# Installed anew when the dependencies change. FUSESOC_IGNORE: no folder of ours but the library is to be searched for
+# Installed again when the dependencies change. FUSESOC_IGNORE: no folder of ours but the library is to be searched for
 # cores, even if somebody adds the whole checkout.
 $(VENV)/.installed: pyproject.toml | tools
 	@test -x $(BIN)/pip || "$$(./.ci/install-tools)" -m venv --clear $(VENV)
 	@touch $(VENV)/FUSESOC_IGNORE
 	@echo "Installing Python packages into $(VENV)"
-	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test]' || \
-	  { echo "pip could not install what pyproject.toml lists; its message is above." >&2; exit 1; }
+	@$(call pip_install,$(VENV),--editable .)
+	@touch $@
+
+# What a target needs beside: an extra of pyproject.toml.
+$(VENV)/.extra-%: $(VENV)/.installed
+	@echo "Installing Python packages for '$*' into $(VENV)"
+	@$(call pip_install,$(VENV),--editable '.[$*]')
 	@touch $@
 
 # ROS 2 as wheels, and the libpython that some of their libraries expect in the process. They have a venv of their own, as
@@ -113,17 +137,6 @@ $(VENV)/.ros2: tests/ros/ros2.txt $(VENV)/.installed
 	    name = f"python{v[0]}.{v[1]}"; print("" if f(name) else f"lib{name}")') >/dev/null && \
 	  $(VENV)/ros2/bin/pip install --quiet --disable-pip-version-check --requirement $< && touch $@ || \
 	  echo "No ROS 2: the tests with it are skipped" >&2
-
-# Yosys is there for the proofs; nextpnr is for the bench alone.
-$(VENV)/.bench: $(VENV)/.installed
-	@echo "Installing nextpnr into $(VENV)"
-	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[bench]'
-	@touch $@
-
-$(VENV)/.boards: $(VENV)/.installed
-	@echo "Installing place and route into $(VENV)"
-	@$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[boards]'
-	@touch $@
 
 clean: ## Remove what was built; .venv stays
 	@find build -mindepth 1 -maxdepth 1 ! -name FUSESOC_IGNORE -exec rm -rf {} +

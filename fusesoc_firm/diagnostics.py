@@ -1,8 +1,9 @@
-"""Faults in the user's input: where they are, what they are, and what would be right.
+"""Faults in the user's input: where they are, what they are, and what would be right; and warnings of what is doubtful.
 
 Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics`
 collector, goes on as far as it can, and lets the collector raise one `InputError` that holds all faults of
-the file. The two doors (`cli`, `gapi`) print it and exit with 1; nobody else catches it.
+the file. The two doors (`cli`, `gapi`) print it and exit with 1; nobody else catches it. Warnings are only printed:
+they change neither what is made nor the exit status.
 """
 
 from __future__ import annotations
@@ -54,15 +55,16 @@ def byte_place(file: str, data: bytes, position: int) -> SourceRef:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One fault: a sentence, its place (None where the input has no lines) and, if known, what is legal."""
+    """A fault or a warning: a sentence, its place (None where the input has no lines) and, if known, what is legal."""
 
     message: str
     source: SourceRef | None = None
     hint: str = ""
+    is_warning: bool = False
 
     def __str__(self) -> str:
         place = f"{self.source}: " if self.source else ""
-        lines = [f"{place}error: {_readable(self.message)}"]
+        lines = [f"{place}{'warning' if self.is_warning else 'error'}: {_readable(self.message)}"]
         if self.source and (excerpt := self.source.excerpt()):
             lines.append(excerpt)
         if self.hint:
@@ -92,6 +94,7 @@ class Diagnostics:
     """Collects faults so that a user sees all of them at once."""
 
     found: list[Diagnostic] = field(default_factory=list)
+    warned: list[Diagnostic] = field(default_factory=list)
     _known: set[Diagnostic] = field(default_factory=set, repr=False)
 
     def error(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
@@ -100,6 +103,15 @@ class Diagnostics:
         if diagnostic not in self._known:
             self._known.add(diagnostic)
             self.found.append(diagnostic)
+
+    def warn(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
+        """Note what is legal and probably not meant."""
+        self.warned.append(Diagnostic(message, source, hint, is_warning=True))
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """Every warning, in the order of files, lines and columns."""
+        return tuple(sorted(self.warned, key=_position))
 
     def take(self, error: InputError, source: SourceRef | None) -> None:
         """Note the faults of another reader; those without a place belong to what asked for it, at `source`."""

@@ -57,10 +57,16 @@ def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes | None:
-    """The content of a file; None if there is none that can be read."""
+    """The content of a regular file; None if there is none that can be read. A pipe is not waited for."""
     try:
-        with open(path, "rb") as file:
-            return file.read()
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            if not stat.S_ISREG(os.fstat(handle).st_mode):
+                return None
+            with open(handle, "rb", closefd=False) as file:
+                return file.read()
+        finally:
+            os.close(handle)
     except OSError:
         return None
 

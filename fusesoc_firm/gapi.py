@@ -117,6 +117,8 @@ def _generate_system(request: Request) -> GeneratedCore:
     if _is_simulation(request):
         return simulation.generate(request)
     loaded = generator.load_requested(request)
+    for warning in loaded.warnings:
+        print(warning, file=sys.stderr)
     core = generator.system_core(loaded)
     return replace(core, files={**core.files, **node_package.generated_files(loaded)})
 

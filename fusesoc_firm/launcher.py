@@ -21,6 +21,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.interrupts import accept_interrupts
 from fusesoc_firm.manifest import note
 from fusesoc_firm.tools import find, ways
 
@@ -47,12 +48,24 @@ def launch(program: str, arguments: Sequence[str]) -> int:
 
 def _run(command: Sequence[str]) -> int:
     """The exit status of a command; who ends this process, as make does, ends it."""
-    with subprocess.Popen(command) as program:
-        before = signal.signal(signal.SIGTERM, lambda *_: program.terminate())
-        try:
+    program: subprocess.Popen[bytes] | None = None
+    is_wanted = True
+
+    def end(*_: object) -> None:
+        nonlocal is_wanted
+        is_wanted = False
+        if program:
+            program.terminate()
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        with subprocess.Popen(command) as program:
+            # The signal may have come while it was being started.
+            if not is_wanted:
+                program.terminate()
             return program.wait()
-        finally:
-            signal.signal(signal.SIGTERM, before)
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
@@ -70,6 +83,7 @@ def starts_everything() -> bool:
 
 def main(arguments: Sequence[str]) -> int:
     """The same as `firm tool`, which has other commands to get ready; a build starts a dozen programs."""
+    accept_interrupts()
     noted = os.environ.pop(_NOTED, "")
     try:
         status = launch(arguments[0], arguments[1:])

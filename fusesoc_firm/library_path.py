@@ -21,3 +21,8 @@ def library_root() -> Path:
 def demos_root() -> Path:
     """The folder of the demo systems, for `fusesoc library add firm_demos FOLDER`, absolute."""
     return _PACKAGE / "demos"
+
+
+def docs_root() -> Path:
+    """The folder of the documentation, absolute."""
+    return _PACKAGE / "docs"

@@ -179,14 +179,6 @@ def _solved(manager: Any, top: Any, target: str) -> list[Any]:
         fail(f"{top.name} depends on what FuseSoC does not know here: {error}")
 
 
-def svg(dot: str) -> str:
-    """A graph as a picture. Raises `InputError` if Graphviz is missing."""
-    try:
-        return subprocess.run(["dot", "-Tsvg"], input=dot, capture_output=True, text=True, check=True).stdout
-    except FileNotFoundError:
-        fail("pictures need the program 'dot' of Graphviz", hint="Debian and Ubuntu: apt install graphviz")
-
-
 def _core(vlnv: str, path: Path) -> ProjectCore:
     data = _data(path)
     filesets = [item for item in _mapping(data, "filesets").values() if isinstance(item, dict)]

@@ -31,6 +31,13 @@ _PATHS_OF_PYTHON = ("stdlib", "platstdlib", "purelib", "platlib")
 _PACKAGE_FOLDERS = ("site-packages", "dist-packages")
 
 
+@cache
+def _apart() -> tuple[str, ...]:
+    """Folders that count apart. `sysconfig` itself reads files, so the hook must not call this for the first time."""
+    paths = sysconfig.get_paths()
+    return (*_MACHINE, str(PACKAGE), *(paths[name] for name in _PATHS_OF_PYTHON), sys.executable)
+
+
 @dataclass(frozen=True)
 class Part:
     """What was taken of the file or folder at `path`, which is not read as a whole, under a name of its own."""
@@ -48,13 +55,13 @@ Input = Path | Part
 class Reads:
     """Absolute paths of what was read, in the order in which it was; `python_path` is where Python finds packages.
 
-    `parts` are files that were read in part.
+    `parts` are files that were read in part. What lies in `apart`, or in a new temporary folder, is not noted.
     """
 
     files: dict[str, None] = field(default_factory=dict)
     parts: dict[str, None] = field(default_factory=dict)
     folders: dict[str, None] = field(default_factory=dict)
-    temporary: list[str] = field(default_factory=list)
+    apart: list[str] = field(default_factory=lambda: [*_apart()])
     python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
 
 
@@ -107,7 +114,7 @@ def _hook(event: str, arguments: tuple[object, ...]) -> None:
         if event != "os.listdir" or arguments[0] not in _current[-1].python_path:
             _note(arguments[0], is_file=False)
     elif event in _OF_TEMPORARY:
-        _current[-1].temporary.append(_absolute(str(arguments[0])))
+        _current[-1].apart.append(_absolute(str(arguments[0])))
 
 
 def _is_read(mode: object, flags: object) -> bool:
@@ -131,7 +138,7 @@ def _note(path: object, *, is_file: bool) -> None:
         return
     # An archive may be on Python's path, too.
     is_apart = is_file and absolute in reads.python_path
-    if not is_apart and not _is_below(absolute, (*_apart(), *reads.temporary)) and not _is_of_package(absolute, reads):
+    if not is_apart and not _is_below(absolute, reads.apart) and not _is_of_package(absolute, reads):
         (reads.files if is_file else reads.folders)[absolute] = None
 
 
@@ -139,14 +146,7 @@ def _absolute(path: str) -> str:
     return os.path.abspath(path)
 
 
-@cache
-def _apart() -> tuple[str, ...]:
-    """Folders of what is counted apart."""
-    paths = sysconfig.get_paths()
-    return (*_MACHINE, str(PACKAGE), *(paths[name] for name in _PATHS_OF_PYTHON), sys.executable)
-
-
-def _is_below(path: str, folders: tuple[str, ...]) -> bool:
+def _is_below(path: str, folders: Iterable[str]) -> bool:
     return any(path == folder or path.startswith(f"{folder}{os.sep}") for folder in folders)
 
 

@@ -39,7 +39,7 @@ from fusesoc_firm.store_files import (
     mark_used,
     place,
     read_entry,
-    read_json,
+    read_note,
 )
 
 IMPORTED = ("chevron", "numpy", "pyyaml", "rosbags")
@@ -63,14 +63,14 @@ def answer(command: str, arguments: Sequence[str]) -> bool:
     if call is None or os.environ.get(LOCKED):
         return False
     root = default_root()
-    noted = place(root, call_digest(command, call), CALL)
-    note = read_json(noted)
-    if not isinstance(note, dict) or any(state(kind, name) != was for kind, name, was in note["facts"]):
+    noted = place(call_digest(command, call), CALL)
+    note = read_note(root, noted)
+    if note is None or any(state(kind, name) != was for kind, name, was in note["facts"]):
         return False
-    stored = place(root, note["key"], ENTRY)
-    if (found := read_entry(stored)) is None:
+    stored = place(note["key"], ENTRY)
+    if (found := read_entry(root, stored)) is None:
         return False
-    mark_used(stored, noted)
+    mark_used(root, stored, noted)
     units, run = units_of(found[1]), run_of(os.getppid())
     if clash("", units, run):
         return False
@@ -95,7 +95,15 @@ def call_digest(command: str, call: bytes) -> str:
 
 
 def state(kind: str, name: str) -> str | None:
-    """The present state of what decides a result."""
+    """The present state of what decides a result; None if it is not there, or the name is of no such thing."""
+    try:
+        return _state(kind, name)
+    except (ValueError, TypeError, RecursionError):
+        # A note of others may hold anything.
+        return None
+
+
+def _state(kind: str, name: str) -> str | None:
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)

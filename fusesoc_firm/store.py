@@ -13,7 +13,7 @@ time without making the key. `store_files` tells how all this lies in the store.
 
 A file is written beside its place and appears there by one rename; it is read whole and checked before it is used. So
 no reader, on this machine or on another that shares the folder, sees half of it or is disturbed by its removal. Locks
-only save work: they need not hold between machines, and are never trusted.
+only save work: they need not hold between machines, and are never trusted. `shared_files` tells what else is not.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import fcntl
 import os
 import platform
 import re
+import stat
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -30,13 +31,12 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import IO
 
-from fusesoc_firm import store_files
+from fusesoc_firm import shared_files, store_files
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.files import TEMPORARY
 from fusesoc_firm.recall import IMPORTED, Fact
-from fusesoc_firm.store_files import CALL, ENTRY, KEPT, LAYOUT, LOCK, USES, digest, digest_of
+from fusesoc_firm.store_files import CALL, ENTRY, KEPT, LAYOUT, LOCK, USES, digest, digest_of, place
 
 Files = Mapping[str, bytes]
 """Contents by file name; a name may hold `/`."""
@@ -102,9 +102,9 @@ class Call:
 
 @dataclass(frozen=True)
 class StoredFile:
-    """A file of the store as it lies there: its size in bytes, and when it was last used (seconds since the epoch)."""
+    """A file by its name in the store: its size in bytes, and when it was last used (seconds since the epoch)."""
 
-    path: Path
+    name: str
     size: int
     used: float
 
@@ -126,32 +126,40 @@ class Store:
         """
         wanted = key()
         if (files := self._find(wanted)) is not None:
-            if call and self._is_writable():
+            if call and self.is_writable():
                 self._note(key, wanted, call)
             return Entry(files, True)
-        with self._lock(wanted) as is_writable:
+        with self._lock(wanted):
             # While this process waited for the lock another one may have made the entry.
             if (files := self._find(wanted)) is not None:
                 return Entry(files, True)
             made = build()
-            if is_writable:
-                self._keep(key, wanted, made, call)
+            self._keep(key, wanted, made, call)
         return Entry(made.files, False)
 
     def entries(self) -> list[StoredFile]:
         """Every entry, the one that was used last first."""
-        return [file for file in self._files() if file.path.suffix == ENTRY]
+        return [file for file in self._files() if file.name.endswith(ENTRY)]
 
     def size(self) -> int:
         """The bytes of all that counts against the limit."""
         return sum(file.size for file in self._files())
 
+    def is_writable(self) -> bool:
+        """Whether this user may add entries; True also if the store's folder is missing."""
+        there = next((folder for folder in (self.root / LAYOUT, self.root) if os.access(folder, os.F_OK)), None)
+        return there is None or os.access(there, os.W_OK)
+
     def remove_damaged(self) -> list[Path]:
-        """Remove what is not whole, and name it. Raises `OSError`."""
-        # What is no more was removed by another process.
-        damaged = [file.path for file in self._files() if store_files.read(file.path) is None and file.path.exists()]
-        for path in damaged:
-            path.unlink(missing_ok=True)
+        """Remove what is damaged, or is no file that a store can have, and name it. Raises `OSError`."""
+        damaged = []
+        for name, status in self._listed():
+            is_kept = name.endswith(KEPT)
+            is_good = stat.S_ISREG(status.st_mode) and (not is_kept or store_files.is_whole(self._root, name))
+            # What is no more was removed by another process.
+            if not is_good and shared_files.state(self._root, name) is not None:
+                shared_files.remove(self._root, name)
+                damaged.append(self.root / name)
         return damaged
 
     def shrink(self, limit: int) -> int:
@@ -163,63 +171,46 @@ class Store:
         for file in self._files():
             total += file.size
             if total > limit:
-                # Another process may do the same.
-                with suppress(FileNotFoundError):
-                    file.path.unlink()
-                    removed += file.size
+                removed += shared_files.remove(self._root, file.name)
         return removed
 
     def clean(self) -> int:
         """Remove all of it, that of former versions too; the number of bytes removed. Raises `OSError`."""
-        removed = 0
-        for layout in (*_FORMER_LAYOUTS, LAYOUT):
-            for folder, _, files in os.walk(self.root / layout, topdown=False):
-                for path in (Path(folder, name) for name in files):
-                    # Another process may remove it in between.
-                    with suppress(FileNotFoundError):
-                        size = path.lstat().st_size
-                        path.unlink()
-                        removed += size
-                # Another process may write into it.
-                with suppress(OSError):
-                    Path(folder).rmdir()
-        return removed
+        return sum(shared_files.remove(self._root, layout) for layout in (*_FORMER_LAYOUTS, LAYOUT))
 
     def uses(self, key: Key) -> list[str] | None:
         """Which of our own files were used for what was asked for when it was last made; None if that is not known."""
-        names = store_files.read_json(self._path(key.request, USES))
-        return names if isinstance(names, list) else None
+        return store_files.read_uses(self._root, place(key.request, USES))
 
     def _find(self, key: Key) -> Files | None:
         uses = self.uses(key)
         full = None if uses is None else key.with_code(uses)
-        if full is None or (found := store_files.read_entry(self._path(full, ENTRY))) is None:
+        if full is None or (found := store_files.read_entry(self._root, place(full, ENTRY))) is None:
             return None
-        store_files.mark_used(self._path(full, ENTRY), self._path(key.request, USES))
+        store_files.mark_used(self._root, place(full, ENTRY), place(key.request, USES))
         return found[1]
 
     @contextmanager
-    def _lock(self, key: Key) -> Iterator[bool]:
-        """Hold the request's lock, which the system frees if the process dies; False if the store cannot be written.
+    def _lock(self, key: Key) -> Iterator[None]:
+        """Hold the request's lock, which the system frees if the process dies.
 
-        Who has waited too long for it goes on without.
+        Who cannot have it, or has waited too long for it, goes on without.
         """
-        path = self._path(key.request, LOCK)
+        name = place(key.request, LOCK)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            file, is_held = _locked(path)
-        except OSError as error:
-            self._warn(error)
-            yield False
+            handle, is_held = _locked(self._root, name)
+        except OSError:
+            # If the store cannot be written, that is found out when the entry is.
+            yield
             return
         try:
-            yield True
+            yield
         finally:
             # While it is held: whoever waits for it then sees that the file is another one.
             if is_held:
                 with suppress(OSError):
-                    path.unlink()
-            file.close()
+                    shared_files.remove(self._root, name)
+            os.close(handle)
 
     def _keep(self, key: Callable[[], Key], wanted: Key, made: Made, call: Call | None) -> None:
         used = sorted(made.used)
@@ -230,13 +221,15 @@ class Store:
         if full is None or key() != wanted:
             return
         try:
-            store_files.write_entry(self._path(full, ENTRY), wanted.about, made.files)
-            store_files.write_json(self._path(wanted.request, USES), used)
+            store_files.write_entry(self._root, place(full, ENTRY), wanted.about, made.files)
+            store_files.write_json(self._root, place(wanted.request, USES), used)
             if call:
                 self._write_note(call, full, facts)
             self._shrink_if_needed()
         except OSError as error:
-            self._warn(error)
+            # Who may only read a store of others knows, or is told by `firm cache show`.
+            if self.is_writable():
+                print(f"warning: nothing is kept in the store {self.root}: {error.strerror}", file=sys.stderr)
 
     def _note(self, key: Callable[[], Key], wanted: Key, call: Call) -> None:
         """Note a call whose entry was found by the key, unless something is edited meanwhile."""
@@ -249,38 +242,33 @@ class Store:
                 self._write_note(call, full, facts)
 
     def _write_note(self, call: Call, full: str, facts: Sequence[Fact]) -> None:
-        store_files.write_json(self._path(call.digest, CALL), {**call.note, "key": full, "facts": facts})
-
-    def _is_writable(self) -> bool:
-        return os.access(self._folder(), os.W_OK)
+        note = {**call.note, "key": full, "facts": facts}
+        store_files.write_json(self._root, place(call.digest, CALL), note)
 
     def _shrink_if_needed(self) -> None:
         if self.size() > self.limit:
             self.shrink(int(self.limit * _KEPT_OF_LIMIT))
-        for path in self._folder().glob(f"*/{TEMPORARY}*"):
-            with suppress(OSError):
-                if path.stat().st_mtime < time.time() - _ABANDONED_SECONDS:
-                    path.unlink()
+        for name, status in self._listed():
+            is_abandoned = status.st_mtime < time.time() - _ABANDONED_SECONDS
+            if is_abandoned and name.rpartition("/")[2].startswith(TEMPORARY):
+                with suppress(OSError):
+                    shared_files.remove(self._root, name)
 
     def _files(self) -> list[StoredFile]:
         """What counts against the limit, the one that was used last first."""
-        found: list[StoredFile] = []
-        for path in self._folder().glob("*/*"):
-            if path.suffix in KEPT:
-                # Another process may remove it in between.
-                with suppress(OSError):
-                    status = path.stat()
-                    found.append(StoredFile(path, status.st_size, status.st_mtime))
-        return sorted(found, key=lambda file: (-file.used, file.path))
+        found = [
+            StoredFile(name, status.st_size, status.st_mtime)
+            for name, status in self._listed()
+            if name.endswith(KEPT) and stat.S_ISREG(status.st_mode)
+        ]
+        return sorted(found, key=lambda file: (-file.used, file.name))
 
-    def _folder(self) -> Path:
-        return self.root / LAYOUT
+    def _listed(self) -> list[tuple[str, os.stat_result]]:
+        return shared_files.listed(self._root, LAYOUT)
 
-    def _path(self, digest: str, suffix: str) -> Path:
-        return Path(store_files.place(self.root, digest, suffix))
-
-    def _warn(self, error: OSError) -> None:
-        print(f"warning: nothing is kept in the store {self.root}: {error.strerror}", file=sys.stderr)
+    @property
+    def _root(self) -> str:
+        return str(self.root)
 
 
 def default_store(environment: Mapping[str, str] = os.environ) -> Store:
@@ -321,28 +309,26 @@ def _version(package: str) -> str:
     return version(package)
 
 
-def _locked(path: Path) -> tuple[IO[bytes], bool]:
-    """The file at `path`, opened, and whether it is locked; whoever had the lock before may have removed it meanwhile.
+def _locked(root: str, name: str) -> tuple[int, bool]:
+    """A lock, opened, and whether it is held; whoever had it before may have removed it meanwhile. Raises `OSError`.
 
     A file system without locks, or one that another machine keeps, costs a second build at worst.
     """
     end = time.monotonic() + _LONGEST_WAIT_SECONDS
     while True:
-        file = path.open("wb")
-        while not (is_held := _take(file)) and time.monotonic() < end:
+        handle = shared_files.open_lock(root, name)
+        while not (is_held := _take(handle)) and time.monotonic() < end:
             time.sleep(_POLL_SECONDS)
-        if not is_held:
-            return file, False
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file, True
-        file.close()
+        there = shared_files.state(root, name)
+        if not is_held or (there and os.path.samestat(os.fstat(handle), there)):
+            return handle, is_held
+        os.close(handle)
 
 
-def _take(file: IO[bytes]) -> bool:
+def _take(handle: int) -> bool:
     """Lock a file unless another process has it; a lock that cannot be had at all counts as taken."""
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     except OSError:

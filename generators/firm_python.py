@@ -10,6 +10,7 @@ This file runs in any Python 3.9 or later.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Iterator
 
@@ -28,6 +29,9 @@ _TRIED, _LEFT = "_FUSESOC_FIRM_TRIED", "_FUSESOC_FIRM_LEFT"
 
 def run(command: str) -> NoReturn:
     """Answer FuseSoC's call of the generator `command`, in this Python or in another that takes this one's place."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        # Whoever started FuseSoC in the background of a script had it ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     tried, left = ([*filter(None, os.environ.pop(name, "").split("\n"))] for name in (_TRIED, _LEFT))
     chosen = os.environ.get(_CHOSEN)
     try:

@@ -1,6 +1,116 @@
-"""For all tests: how long an example of hypothesis takes says nothing on a machine that does other things, too."""
+"""For all tests: their own store, this Python first on PATH, busy machines, ignored interrupts, a limit on waiting.
 
+How long something takes says nothing on a busy machine, so no test is ended for the time it takes. But it fails when it
+and all processes below it have waited for a minute (`waiting_limit`) without doing anything.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import psutil
+import pytest
 from hypothesis import settings
+
+from fusesoc_firm.interrupts import accept_interrupts
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+# The part of a processor that polling takes, or clusters at rest. Work gets more, however busy a machine is.
+_AT_REST = 0.06
+# A Dask cluster that has nothing to do takes a seventh of a processor, unless it looks after itself less often.
+_QUIET_DASK = {
+    "WORKER__PROFILE__ENABLED": "False",
+    "WORKER__MEMORY__MONITOR_INTERVAL": "10s",
+    "SCHEDULER__WORK_STEALING_INTERVAL": "5s",
+    "ADMIN__TICK__INTERVAL": "2s",
+    "ADMIN__SYSTEM_MONITOR__INTERVAL": "10s",
+    "ADMIN__SYSTEM_MONITOR__GIL__ENABLED": "False",
+}
+_LOOKS = 10
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addini("waiting_limit", "seconds that a test may wait without doing anything", default="60")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    # What tests start inherits all this.
+    accept_interrupts()
+    # The processes that share the work of a run share its store, too, and no other run does.
+    if not hasattr(config, "workerinput"):
+        store = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
+        config.add_cleanup(store.cleanup)
+        os.environ["FUSESOC_FIRM_CACHE"] = store.name
+        # FuseSoC looks up a generator's interpreter there.
+        os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
+    os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
+    with _limited(item):
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    with _limited(item):
+        return (yield)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
+    with _limited(item):
+        return (yield)
+
+
+@contextmanager
+def _limited(item: pytest.Item) -> Iterator[None]:
+    """Within it, the test fails when it has waited for too long; not one that takes minutes by its nature."""
+    if item.get_closest_marker("thorough"):
+        yield
+        return
+    limit = float(item.config.getini("waiting_limit"))
+    # Moments of the last while, and how much had been done by then.
+    seen = deque([(time.monotonic(), _processor_seconds())])
+    looking = 0.0
+
+    def look(*_: object) -> None:
+        nonlocal looking
+        begun, now, done = time.process_time(), time.monotonic(), _processor_seconds() - looking
+        looking += time.process_time() - begun
+        if now - seen[-1][0] > limit / 2:
+            # The machine slept, or the test held the looks back.
+            seen.clear()
+        seen.append((now, done))
+        if now - seen[0][0] >= limit:
+            then, done_then = seen.popleft()
+            # What ends without being waited for takes its time with it.
+            if abs(done - done_then) < _AT_REST * (now - then):
+                pytest.fail(f"neither the test nor a process below it has done anything for {limit:g} s")
+
+    signal.signal(signal.SIGALRM, look)
+    signal.setitimer(signal.ITIMER_REAL, limit / _LOOKS, limit / _LOOKS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def _processor_seconds() -> float:
+    """What this process and all below it have taken."""
+    total = sum(os.times()[:4])
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            total += sum(process.cpu_times()[:4])
+    return total

@@ -132,6 +132,9 @@ def _owner(path: Path) -> Owner | None:
         return Owner(**json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         return None
+    except (ValueError, TypeError, RecursionError):
+        # Damaged: it is removed when nobody has touched it for a while.
+        return Owner("", "", 0, "", "an unknown machine")
 
 
 def _machine() -> str:

@@ -94,7 +94,7 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
     config.args_build_root = str(Path(build_root or config.build_root).absolute())
     fusesoc = Fusesoc(config)
     faults = Diagnostics()
-    names = [name for core in cores if (name := _full_name(fusesoc, core, faults))]
+    names = [name for core in cores if (name := _full_name(fusesoc, core, targets, faults))]
     builds = [
         Build(name, target, Path(fusesoc.get_work_root(fusesoc.get_core(name), flags)))
         for name, target in dict.fromkeys(product(names, targets))
@@ -104,8 +104,11 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
     return Plan(fusesoc, Path(config.build_root), tuple(builds))
 
 
-def _full_name(fusesoc: Any, core: str, faults: Diagnostics) -> str | None:
-    """The full name of a core; without a colon it is the name alone, as for `fusesoc run`."""
+def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnostics) -> str | None:
+    """The full name of a core; without a colon it is the name alone, as for `fusesoc run`.
+
+    For an unknown core, those that have all the targets are listed.
+    """
     from fusesoc.coremanager import DependencyError
 
     known = [name for name in fusesoc.get_cores() if name.split(":")[2].lower() == core.lower()]
@@ -116,7 +119,9 @@ def _full_name(fusesoc: Any, core: str, faults: Diagnostics) -> str | None:
     try:
         return str(fusesoc.get_core(families[0] if families else core).name)
     except (DependencyError, SyntaxError):
-        faults.error(f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
+        fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
+        listed = f"with {' and '.join(targets)} there are: {', '.join(sorted(fitting))}" if fitting else ""
+        faults.error(f"'{core}' is no core that FuseSoC knows here", hint=listed or "fusesoc core list")
         return None
 
 

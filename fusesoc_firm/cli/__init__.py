@@ -23,11 +23,13 @@ from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.host.node.options import remappings
-from fusesoc_firm.library_path import demos_root, library_root
+from fusesoc_firm.interrupts import accept_interrupts
+from fusesoc_firm.library_path import demos_root, docs_root, library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `firm`; the exit status is 1 for faults, 2 for a wrong command line, 130 for Ctrl-C."""
+    accept_interrupts()
     arguments = _parsed(argv)
     try:
         arguments.handler(arguments)
@@ -67,7 +69,9 @@ def _parser() -> argparse.ArgumentParser:
         'fusesoc library add firm "$(firm path)"',
         _print_path,
     )
-    path.add_argument("--demos", action="store_true", help="the library of demo systems instead")
+    kind = path.add_mutually_exclusive_group()
+    kind.add_argument("--demos", action="store_true", help="the library of demo systems instead")
+    kind.add_argument("--docs", action="store_true", help="the folder of the documentation instead")
     path.add_argument(
         "--relative", action="store_true", help="relative to the current folder, for a fusesoc.conf in version control"
     )
@@ -86,6 +90,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _print_path(arguments: argparse.Namespace) -> None:
-    folder = demos_root() if arguments.demos else library_root()
+    folder = demos_root() if arguments.demos else docs_root() if arguments.docs else library_root()
     # Both without links, so that the steps up lead where they seem to.
     print(os.path.relpath(folder, Path.cwd().resolve()) if arguments.relative else folder)

@@ -59,10 +59,12 @@ def _show_cache(arguments: argparse.Namespace) -> None:
     print(f"folder   {store.root}")
     print(f"entries  {len(entries)}")
     print(f"size     {_shown(store.size())} of {_shown(store.limit)}")
+    if not store.is_writable():
+        print("rights   read only: nothing is kept of what you generate")
     for file in entries if arguments.entries else ():
         used = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.used))
-        entry = read_entry(file.path)
-        about = f"{entry[0]['generator']}  {entry[0]['core']}" if entry else "damaged"
+        entry = read_entry(str(store.root), file.name)
+        about = "  ".join(entry[0].get(key, "") for key in ("generator", "core")) if entry else "damaged"
         print(f"{used}  {_shown(file.size):>10}  {about}")
 
 

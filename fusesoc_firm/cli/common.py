@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
-
-from fusesoc_firm.diagnostics import fail
 
 if TYPE_CHECKING:
     from fusesoc_firm.diagnostics import SourceRef
@@ -83,15 +82,18 @@ def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
 
 
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
-    """The system of the specification that the arguments name.
+    """The system of the specification that the arguments name, whose warnings are printed.
 
     Unless it `needs_sources`, those of its accelerators may be missing.
     """
     from fusesoc_firm.system.beside import load_beside
 
-    return load_beside(
+    loaded = load_beside(
         arguments.spec, arguments.path, arguments.distro, needs_sources=needs_sources, core_folders=core_folders
     )
+    for warning in loaded.warnings:
+        print(warning, file=sys.stderr)
+    return loaded
 
 
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
@@ -102,13 +104,16 @@ def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     return message_folders(names) if names else ()
 
 
-def write(path: Path, text: str) -> None:
-    """Write a file of the user, with the folders above it."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        fail(f"cannot write {path}: {error.strerror}")
+def add_picture(parser: argparse.ArgumentParser) -> None:
+    """The arguments of commands that draw a graph, for `pictures.draw`."""
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="F.svg",
+        help="where to write it, also as F.png, F.pdf or F.dot (default: print it)",
+    )
+    parser.add_argument("--format", choices=("svg", "dot"), help="of what is printed (default: svg)")
 
 
 def as_yaml(data: dict[str, Any]) -> str:

@@ -49,10 +49,14 @@ def _live(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.host.node.description import describe
     from fusesoc_firm.host.node.run import run_node, run_options
     from fusesoc_firm.host.node.transports import at_address, of_simulator
+    from fusesoc_firm.outputs import check_output
 
     loaded = load(arguments)
     description = describe(loaded)
     options = run_options(arguments, arguments.remappings, description, arguments.ros)
+    if arguments.trace:
+        # It is opened when the simulator has been built.
+        check_output(arguments.trace)
     if arguments.transport:
         opener = at_address(arguments.transport)
     else:

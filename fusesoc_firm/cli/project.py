@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import command, write
+from fusesoc_firm.cli.common import add_picture, command
 from fusesoc_firm.diagnostics import InputError, fail
 
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ def add_project(commands: Any) -> None:
     )
     graph.add_argument("core", metavar="CORE", help="its name as FuseSoC has it")
     graph.add_argument("--target", default="default", metavar="NAME", help="the target meant (default: default)")
-    graph.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where to write it (default: print it)")
-    graph.add_argument("--format", choices=("svg", "dot"), default="svg", help="of the picture (default: svg)")
+    add_picture(graph)
     affected = command(
         commands,
         "affected",
@@ -54,19 +53,16 @@ def add_project(commands: Any) -> None:
 
 
 def _draw_cores(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.project import core_graph, svg
+    from fusesoc_firm.pictures import check_picture, draw
+    from fusesoc_firm.project import core_graph
 
     def sources(instance: Instance) -> list[str]:
         request = _request(instance)
         # Told from here, files of one name in two cores are two.
         return [] if request is None else [*map(shown, _input_files(request))]
 
-    dot = core_graph(arguments.core, arguments.target, sources)
-    picture = dot if arguments.format == "dot" else svg(dot)
-    if arguments.output:
-        write(arguments.output, picture)
-    else:
-        print(picture, end="")
+    check_picture(arguments.output, arguments.format)
+    draw(core_graph(arguments.core, arguments.target, sources), arguments.output, arguments.format)
 
 
 def _list_affected(arguments: argparse.Namespace) -> None:
@@ -96,6 +92,7 @@ def check_locked(core: str) -> Path:
 
 def _lock(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.lock import lock_path, lock_text
+    from fusesoc_firm.outputs import write
     from fusesoc_firm.project import dependencies
 
     if arguments.locked:

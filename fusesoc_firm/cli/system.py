@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fusesoc_firm.cli.common import add_sources, as_yaml, command, core_folders, load, write
+from fusesoc_firm.cli.common import add_picture, add_sources, as_yaml, command, core_folders, load
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.model import RosVersion
@@ -68,8 +68,7 @@ def add_system(commands: Any) -> None:
         "firm system diagram robot.yaml -o robot.svg",
         _draw_system,
     )
-    draw.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where to write it (default: print it)")
-    draw.add_argument("--format", choices=("svg", "dot"), default="svg", help="of the picture (default: svg)")
+    add_picture(draw)
     report = command(
         actions,
         "report",
@@ -167,6 +166,7 @@ def _message_names(arguments: argparse.Namespace, own: Sequence[str]) -> list[st
 
 
 def _write_skeletons(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.outputs import write
     from fusesoc_firm.system.skeleton import missing_sources
 
     loaded = load(arguments, needs_sources=False)
@@ -179,10 +179,12 @@ def _write_skeletons(arguments: argparse.Namespace) -> None:
 
 
 def _write_core(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.outputs import check_output, write
     from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
 
     spec: Path = arguments.spec
     path: Path = arguments.output or spec.with_suffix(".core")
+    check_output(path, (".core",))
     loaded = load(arguments, needs_sources=False)
     system = loaded.system
     if path.exists():
@@ -206,6 +208,7 @@ def _write_core(arguments: argparse.Namespace) -> None:
 
 def _write_node(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.outputs import write
 
     loaded = load(arguments, needs_sources=False)
     ros = RosVersion(arguments.ros) if arguments.ros else None
@@ -218,13 +221,11 @@ def _write_node(arguments: argparse.Namespace) -> None:
 
 
 def _draw_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.pictures import check_picture, draw
     from fusesoc_firm.system.diagram import diagram
 
-    picture = diagram(load(arguments).system, arguments.format)
-    if arguments.output:
-        write(arguments.output, picture)
-    else:
-        print(picture, end="")
+    check_picture(arguments.output, arguments.format)
+    draw(diagram(load(arguments).system), arguments.output, arguments.format)
 
 
 def _report_system(arguments: argparse.Namespace) -> None:

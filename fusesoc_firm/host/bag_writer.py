@@ -19,6 +19,7 @@ from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.message.bags import Form
 from fusesoc_firm.message.joint import joint_text
 from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.outputs import check_parent
 
 _FILES = {".bag": Form.ROS1, ".mcap": Form.MCAP, ".db3": Form.SQLITE3}
 _PLUGINS = {Form.SQLITE3: StoragePlugin.SQLITE3, Form.MCAP: StoragePlugin.MCAP}
@@ -75,8 +76,7 @@ def form_of(path: Path) -> Form | None:
 
 def check_writable(path: Path, *, force: bool) -> None:
     """Raise `InputError` if there is something that must not, or without `force` should not, be replaced."""
-    if not path.parent.is_dir():
-        fail(f"there is no folder {path.parent} for {path.name}")
+    check_parent(path)
     if path.is_dir() and (other := next((file for file in path.iterdir() if not _is_of_bag(file)), None)):
         fail(f"{path} is a folder, and no bag's: it holds {other.name}")
     if path.exists() and not force:
@@ -102,7 +102,9 @@ def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterat
                     bag.add(topic)
                 yield bag
             _put(made, path)
-    except (OSError, sqlite3.Error) as error:
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror or error}")
+    except sqlite3.Error as error:
         fail(f"cannot write {path}: {error}")
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from typing import Any
 
 from fusesoc_firm.frame.codec import pack_frame, used_bytes
@@ -57,4 +59,17 @@ def _values(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
         for key, inner in value.items():
             yield from _values(inner, f"{name}.{key}" if name else key)
     else:
-        yield name, "".join(str(value).split())
+        yield name, _shown(value)
+
+
+def _shown(value: Any) -> str:
+    """A value without blanks, but for those of its texts, which are in quotes; of arrays no more than a label holds."""
+    match value:
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case Mapping():
+            return f"{{{','.join(f'{name}={_shown(inner)}' for name, inner in value.items())}}}"
+        case list() | bytes():
+            return f"[{','.join(map(_shown, islice(value, _LABEL_WIDTH)))}]"
+        case _:
+            return str(value)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.diagnostics import nearest
-from fusesoc_firm.frame.codec import CodecError
+from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.host.stimuli import Stimulus
 from fusesoc_firm.host.user_code import UserFunction, load_function
@@ -27,9 +27,9 @@ _ANSWER = "it returns a list of (publisher, message), the message a mapping of f
 
 @dataclass(frozen=True)
 class Response:
-    """A message that the system must send; `cause` is the number, from 0, of the stimulus that it answers.
+    """A message that the system must send: its payload, and the same decoded.
 
-    None if no single one is known.
+    `cause` is the number, from 0, of the stimulus that it answers, None if no single one is known.
     """
 
     publisher: Topic
@@ -84,6 +84,7 @@ class _Model:
             )
         publisher = known[block]
         try:
-            return Response(publisher, encode_used(publisher.frame, message), dict(message), cause)
+            payload = encode_used(publisher.frame, message)
         except CodecError as error:
             self.respond.fail(f"for {when}, what 'respond' gave to '{block}' does not fit: {error}")
+        return Response(publisher, payload, decode(publisher.frame, payload), cause)

@@ -15,7 +15,7 @@ from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived import Topic
+from fusesoc_firm.system.derived import Topic, absolute_name
 
 AnyTopic = TypeVar("AnyTopic", bound=Topic)
 Message = tuple[RosVersion, MessageName]
@@ -70,7 +70,7 @@ class _Routing:
         }
 
     def _named(self, topic: str) -> tuple[Topic, ...]:
-        return tuple(item for item in self.subscribers if item.name == topic)
+        return tuple(item for item in self.subscribers if item.name == absolute_name(topic))
 
     def _only_topic(self, subscriber: Topic, takers: Mapping[str, Sequence[Topic]]) -> str:
         """The topic of a subscriber that no topic is called like; empty if there is none, or no single one."""

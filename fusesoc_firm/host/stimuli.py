@@ -24,6 +24,8 @@ from fusesoc_firm.system.derived import Topic
 from fusesoc_firm.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
 
 _YAML_SUFFIXES = (".yaml", ".yml")
+# Subscribers that are named where there is no file.
+_SHOWN = 3
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,9 @@ class Stimulus:
 def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     """All messages of a file or bag, in its order. Raises `InputError`; a file without a message is one, too."""
     if not path.exists():
-        fail(f"there are no stimuli at {path}")
+        fields = "{<field>: <value>, ...}"
+        items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
+        fail(f"there are no stimuli at {path}", hint=f"a bag, or a YAML file with a list of messages: {items}")
     if path.suffix in _YAML_SUFFIXES:
         stimuli = _from_yaml(path, subscribers)
     else:

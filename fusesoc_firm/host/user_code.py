@@ -48,7 +48,7 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
     if spec is None or spec.loader is None or not path.is_file():
         fail(
             f"there is no {what.removeprefix('the ')} at {path}",
-            hint=f"it is a Python file (.py) with a function '{name}'",
+            hint=f"it is a Python file (.py) with a function '{name}({parameters})'; {hint}",
         )
     module = importlib.util.module_from_spec(spec)
     # Dataclasses, for one, look their module up.

@@ -23,7 +23,7 @@ from fusesoc_firm.message.bags import Bag, Form, Recorded, Stream, open_bag
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
-from fusesoc_firm.system.derived import Topic
+from fusesoc_firm.system.derived import Topic, absolute_name
 from fusesoc_firm.system.generator import LoadedSystem
 
 # Lines about messages that were refused; the rest is counted.
@@ -252,7 +252,7 @@ def _routes(
 ) -> dict[Stream, Route]:
     """Who takes what. Raises `InputError` if nobody takes anything, or a topic that was asked for is not there."""
     faults = Diagnostics()
-    topics = {stream.topic for stream in bag.streams}
+    topics = {absolute_name(stream.topic) for stream in bag.streams}
     for item in subscribers:
         if item.block in names and item.name not in topics:
             faults.error(f"{bag.path} has no topic {item.name} for '{item.block}'", hint=nearest(item.name, topics))

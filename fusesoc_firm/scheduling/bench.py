@@ -12,6 +12,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from fusesoc_firm.diagnostics import fail, nearest
+from fusesoc_firm.outputs import check_output, make_folder
 from fusesoc_firm.scheduling import area, chapter, pictures
 from fusesoc_firm.scheduling.evaluation import Outcome, Settings, jobs, run
 from fusesoc_firm.scheduling.metrics import METRICS
@@ -112,13 +113,14 @@ def write(evaluation: chapter.Evaluation, selection: Selection, folder: Path) ->
 
 def _check(places: Places) -> None:
     """Make the folder, and see whether the file can be written: an evaluation is too long to fail at its end."""
-    try:
-        if places.output:
-            places.output.mkdir(parents=True, exist_ok=True)
-        if places.csv:
+    if places.output:
+        make_folder(places.output)
+    if places.csv:
+        check_output(places.csv, (".csv",))
+        try:
             places.csv.open("a", encoding="utf-8").close()
-    except OSError as error:
-        fail(f"'{error.filename}' cannot be written: {error.strerror}")
+        except OSError as error:
+            fail(f"cannot write {places.csv}: {error.strerror}")
 
 
 def _workers(places: Places) -> AbstractContextManager[Workers]:

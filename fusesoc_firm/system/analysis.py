@@ -6,8 +6,7 @@ does not fit is reported where it was written; as much as can be checked is chec
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
@@ -31,6 +30,7 @@ from fusesoc_firm.system.derived import (
     End,
     MessageSide,
     PayloadLength,
+    Topic,
 )
 from fusesoc_firm.system.entities import check_entities
 from fusesoc_firm.system.hls import check_kernel
@@ -54,13 +54,12 @@ from fusesoc_firm.system.specification import (
     Specification,
 )
 from fusesoc_firm.system.timing import clock_frequency, scheduling_of
+from fusesoc_firm.system.topics import TopicUse, check_topic_name, check_topics
 from fusesoc_firm.yaml_sections import keys_only_of
 from fusesoc_firm.yaml_text import Text
 
 Libraries = Mapping[RosVersion, MessageLibrary]
 _KINDS_OF_BLOCKS = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
-# What both ROS 1 and ROS 2 take.
-_TOPIC = re.compile(r"(/[A-Za-z](_?[A-Za-z0-9])*_?)+")
 
 
 def derive(
@@ -82,6 +81,7 @@ def derive(
     clock = clock_frequency(specification.project, faults)
     clocks = clocks_of(specification, clock, faults)
     names = message_names(analysis.blocks, analysis.inputs, analysis.outputs)
+    check_topics(analysis.topic_uses(names), faults)
     parts = analysis.parts(analysis.wiring().connect(), names)
     connections = with_lengths(parts.connections, parts.outputs, parts.blocks, faults)
     faults.raise_if_any()
@@ -262,9 +262,8 @@ class _Analysis:
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)
             return
         assert block.middleware is not None and block.message is not None
-        if block.topic is not None and not _TOPIC.fullmatch(block.topic):
-            hint = "such as /arm/left: names of letters, digits and _, a / before each"
-            self.faults.error(f"'{block.topic}' is no topic", block.topic.source, hint)
+        if block.topic is not None:
+            check_topic_name(block.topic, self.faults)
         frame = self._frame(block.middleware, block.message, block.include, block.exclude)
         if frame is not None:
             is_subscriber = block.mode == "subscriber"
@@ -291,6 +290,18 @@ class _Analysis:
                 f"the system has {len(found)} {mode}s; an id of one byte tells {MOST_CONVERTERS} apart",
                 found[MOST_CONVERTERS].name.source,
             )
+
+    def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
+        """The topics of all converters, and of software elsewhere, whose messages have `names`."""
+        for name, block in self.blocks.items():
+            is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
+            if block.type is not None and not is_elsewhere:
+                continue
+            for sides, is_published in ((self.inputs, True), (self.outputs, False)):
+                for side in sides.get(name, ()):
+                    called = names[End(name, side.prefix)] if is_elsewhere else str(name)
+                    topic = Topic(called, side.frame, given_name=str(block.topic or ""))
+                    yield TopicUse(topic, is_published, block.topic.source if block.topic else block.name.source)
 
     def wiring(self) -> Wiring:
         """The blocks to connect."""

@@ -17,18 +17,28 @@ from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.specification import Accelerator
 
 
+def absolute_name(topic: str) -> str:
+    """A topic's name in the root namespace."""
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
 @dataclass(frozen=True)
 class Topic:
-    """A message between the system and others, under a block's name; `given_name` is empty for a topic called so."""
+    """A message between the system and others; unless it has a `given_name`, its topic is called as the block."""
 
     block: str
     frame: Frame
     given_name: str = field(default="", kw_only=True)
 
     @property
+    def ros_name(self) -> str:
+        """The topic as a node calls it: without a leading `/` it is relative to the node's namespace."""
+        return self.given_name or identifier(self.block, avoid=())
+
+    @property
     def name(self) -> str:
-        """The topic as ROS knows it."""
-        return self.given_name or f"/{identifier(self.block)}"
+        """The topic of a node without a namespace, and so in bags."""
+        return absolute_name(self.ros_name)
 
 
 @dataclass(frozen=True)
@@ -106,6 +116,11 @@ class AcceleratorType:
         """The unit that the top level instantiates: the user's entity or module, or the wrapper of a C++ function."""
         name = identifier(self.accelerator.name)
         return f"{name}_wrapper" if self.accelerator.type == "HLS" else name
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Whether it is software that others run, which is reached by topics."""
+        return self.accelerator.is_software and not self.accelerator.sources
 
     @property
     def is_component(self) -> bool:

@@ -1,4 +1,4 @@
-"""A picture of a system: blocks, messages, widths and ids, drawn by Graphviz."""
+"""A picture of a system: blocks, messages, widths and ids, as a graph for Graphviz."""
 
 from __future__ import annotations
 
@@ -15,9 +15,6 @@ from fusesoc_firm.system.sides import side_ports
 if TYPE_CHECKING:
     from graphviz import Digraph
 
-# What Graphviz makes of it; `dot` is its own language.
-FORMATS = ("svg", "dot")
-
 _HOST, _MANAGER = "host", "manager"
 _CONVERTER = {"shape": "box", "style": "filled", "fillcolor": "#dae8fc"}
 _ACCELERATOR = {"shape": "box", "style": "filled,rounded", "fillcolor": "#d5e8d4"}
@@ -27,8 +24,8 @@ _STREAM = {"penwidth": "2"}
 _CROSSING = {"style": "dashed"}
 
 
-def diagram(system: DerivedSystem, output_format: str) -> str:
-    """The system as text in one of `FORMATS`. Raises `InputError` if Graphviz is missing."""
+def diagram(system: DerivedSystem) -> str:
+    """The system in Graphviz's language DOT. Raises `InputError` if the package graphviz is missing."""
     try:
         import graphviz
     except ModuleNotFoundError:
@@ -41,12 +38,7 @@ def diagram(system: DerivedSystem, output_format: str) -> str:
     for connection in system.connections:
         _draw_connection(graph, connection, system)
     _draw_software(graph, system)
-    if output_format == "dot":
-        return str(graph.source)
-    try:
-        return str(graph.pipe(format=output_format, encoding="utf-8"))
-    except graphviz.ExecutableNotFound:
-        fail("pictures need the program 'dot' of Graphviz", hint="Debian and Ubuntu: apt install graphviz")
+    return str(graph.source)
 
 
 def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:

@@ -14,7 +14,7 @@ from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.generator import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail
+from fusesoc_firm.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -71,13 +71,17 @@ def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
 
 @dataclass(frozen=True)
 class LoadedSystem:
-    """A specification, the folder its paths are relative to, the board if one is given, and the system derived."""
+    """A specification, the folder its paths are relative to, the board if one is given, and the system derived.
+
+    `warnings` are for whoever wrote the specification.
+    """
 
     specification: Specification
     folder: Path
     libraries: dict[RosVersion, MessageLibrary]
     system: DerivedSystem
     board: Board | None = None
+    warnings: tuple[Diagnostic, ...] = ()
 
     def inputs(self) -> list[Input]:
         """The accelerators' sources and the files of all messages."""
@@ -120,7 +124,7 @@ def load_system(
     own = {str(item): item.source for item in specification.paths}
     libraries = with_paths(libraries, own, path.parent, core_folders, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
-    return LoadedSystem(specification, path.parent, libraries, system, board)
+    return LoadedSystem(specification, path.parent, libraries, system, board, faults.warnings)
 
 
 def with_paths(

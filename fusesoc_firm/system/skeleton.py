@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.converter.message_ports import message_side
 from fusesoc_firm.converter.ports import vhdl_type
-from fusesoc_firm.naming import identifier
+from fusesoc_firm.converter.program import has_bytes
+from fusesoc_firm.frame.length import sent_length_of
+from fusesoc_firm.frame.model import Loop, Node
+from fusesoc_firm.naming import distinct_identifiers, identifier
 from fusesoc_firm.render import render
 from fusesoc_firm.system.derived import AcceleratorType, DerivedSystem, MessageSide
 from fusesoc_firm.system.hls import arguments, function_name, prototype
 from fusesoc_firm.system.python_skeleton import python_skeleton
-from fusesoc_firm.system.sides import SidePort, accelerator_ports
+from fusesoc_firm.system.sides import PAYLOAD_LENGTH, SidePort, accelerator_ports
 from fusesoc_firm.system.specification import SOFTWARE, Pin
 
 Configuration = dict[str, Any]
@@ -22,15 +26,24 @@ _FUNCTION_TEMPLATE = "hls/skeleton.cpp"
 _SOFTWARE_TEMPLATE = "python/skeleton.py"
 
 
+# What the architecture or module declares; a pin may have such a name.
+_SIGNALS = ("is_there", "is_sent", "sent_r", "done")
+
+
 @dataclass(frozen=True)
 class _Language:
-    """How a language of hardware says what a first version is made of."""
+    """How a language of hardware says what a first version is made of.
+
+    `zero` is a value of so many bits, `word` a number of 32 bits. `offered` says that a message is there and that this
+    output of it has not been sent, by the names of the two signals and the output's number.
+    """
 
     template: str
     directions: tuple[str, str]
     type: Callable[[int | None], str]
     zero: Callable[[int | None], str]
-    one: str
+    word: Callable[[int], str]
+    offered: Callable[[str, str, int], str]
     conjunction: str
     separator: str
     comment: str
@@ -43,7 +56,8 @@ _LANGUAGES = {
         directions=("in ", "out"),
         type=vhdl_type,
         zero=lambda bits: "'0'" if bits is None else "(others => '0')",
-        one="'1'",
+        word=lambda value: f'x"{value:08x}"',
+        offered=lambda is_there, sent, number: f"{is_there} and not {sent}({number})",
         conjunction=" and ",
         separator=";",
         comment="--",
@@ -53,7 +67,8 @@ _LANGUAGES = {
         directions=("input  wire", "output wire"),
         type=lambda bits: "" if bits is None else f"[{bits - 1}:0] ",
         zero=lambda bits: f"{bits or 1}'b0",
-        one="1'b1",
+        word=lambda value: f"32'd{value}",
+        offered=lambda is_there, sent, number: f"{is_there} && !{sent}[{number}]",
         conjunction=" && ",
         separator=",",
         comment="//",
@@ -108,13 +123,21 @@ def _entity(type_: AcceleratorType, language: _Language) -> Configuration:
         for side in (*type_.inputs, *type_.outputs)
     }
     pins = type_.accelerator.pins
+    names = distinct_identifiers(((name,) for name in _SIGNALS), [str(pin.name) for pin in pins])
+    own = dict(zip(_SIGNALS, names, strict=True))
+    gives = [_given(number, side, of_side[side.prefix], own, language) for number, side in enumerate(type_.outputs)]
     return {
+        **own,
         "entity": identifier(type_.accelerator.name),
         "sides": _declarations(type_, of_side, pins, language),
-        "all_valid": language.conjunction.join(f"{side.prefix}msg_valid" for side in type_.inputs) or language.one,
+        # Without a message that it takes, nothing says when to send one.
+        "all_valid": language.conjunction.join(f"{side.prefix}msg_valid" for side in type_.inputs)
+        or language.zero(None),
+        "takes_none": not type_.inputs,
         "output_high": max(1, len(type_.outputs)) - 1,
-        "takes": [{"port": f"{side.prefix}msg_ready"} for side in type_.inputs],
-        "gives": [_given(number, side, of_side[side.prefix], language) for number, side in enumerate(type_.outputs)],
+        "takes": [{"port": f"{side.prefix}msg_ready", "done": own["done"]} for side in type_.inputs],
+        "gives": gives,
+        "counts": [count for given in gives for count in given["counts"]],
         "discards": _discards(type_.inputs, of_side),
         "pins": _driven_pins(pins, language),
     }
@@ -155,22 +178,67 @@ def _declarations(
     ]
 
 
-def _given(number: int, side: MessageSide, ports: Sequence[SidePort], language: _Language) -> Configuration:
-    """What an output does: its handshake with the message, zeros for the rest."""
-    names = {port.name for port in ports}
-    own = {"segment_valid", "msg_valid", "msg_ready"}
+def _given(
+    number: int, side: MessageSide, ports: Sequence[SidePort], own: Mapping[str, str], language: _Language
+) -> Configuration:
+    """What an output does: its handshake with the message, the length of a message of zeros, zeros for the rest."""
+    offered = language.offered(own["is_there"], own["sent_r"], number)
+    counts = _counts(side, offered)
+    by_name = {f"{side.prefix}{port.name}": port for port in ports}
+    length = f"{side.prefix}{PAYLOAD_LENGTH}"
+    segments = [f"{side.prefix}segment_valid", *(count["segment_valid"] for count in counts)]
+    valid = [f"{side.prefix}msg_valid", *(count["valid"] for count in counts)]
+    driven = {length, *segments, *valid, *(count["last"] for count in counts)}
     return {
         "number": number,
         "ready": f"{side.prefix}msg_ready",
-        "segment_valid": f"{side.prefix}segment_valid",
-        "segments": next(port.width or 1 for port in ports if port.name == "segment_valid"),
-        "valid": [{"port": f"{side.prefix}msg_valid", "number": number}] if "msg_valid" in names else [],
-        "zeros": [
-            {"port": f"{side.prefix}{port.name}", "zero": language.zero(port.width)}
-            for port in ports
-            if port.is_output and port.name not in own
+        "is_sent": own["is_sent"],
+        "sent_r": own["sent_r"],
+        "segments": [
+            {"port": name, "bits": by_name[name].width or 1, "offered": offered} for name in segments if name in by_name
         ],
+        "valid": [{"port": name, "offered": offered} for name in valid if name in by_name],
+        "length": {"port": length, "value": language.word(sent_length_of(side.frame).minimum)}
+        if length in by_name
+        else None,
+        "zeros": [
+            {"port": name, "zero": language.zero(port.width)}
+            for name, port in by_name.items()
+            if port.is_output and name not in driven
+        ],
+        "counts": counts,
     }
+
+
+def _counts(side: MessageSide, offered: str) -> list[Configuration]:
+    """The arrays of fixed size that are sent element by element, whose elements are counted: the last one is marked."""
+    if side.frame.is_fixed_size:
+        return []
+    ports = message_side(side.frame)
+    found: list[Configuration] = []
+    for loop in _fixed_loops(side.frame.nodes):
+        element = ports.element(loop)
+        found.append(
+            {
+                "port": f"{side.prefix}{element.name}",
+                "count_r": f"{side.prefix}{element.name}_r",
+                "high": (loop.count or 1) - 1,
+                "offered": offered,
+                "segment_valid": f"{side.prefix}{element.segment_valid}",
+                "valid": f"{side.prefix}{element.valid}",
+                "ready": f"{side.prefix}{element.ready}",
+                "last": f"{side.prefix}{element.last}",
+            }
+        )
+    return found
+
+
+def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
+    """The arrays of fixed size that a message of zeros has elements of: no other array is around them."""
+    for node in nodes:
+        if isinstance(node, Loop) and node.is_used and node.count and has_bytes(node):
+            yield node
+            yield from _fixed_loops(node.body)
 
 
 def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> Configuration | None:

@@ -184,7 +184,8 @@ class Block(Section):
     mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
     message: Text | None = key("a converter's message", only_of=CONVERTER)
     topic: Text | None = key(
-        "the topic of a converter's messages, such as /arm/left; / and its name unless given", only_of=CONVERTER
+        "the topic of a converter's messages, such as /arm/left or left; the block's name unless given",
+        only_of=CONVERTER,
     )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)

@@ -6,14 +6,19 @@ extended and keeps its comments; in a new one each key is explained where it sta
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import yaml as pyyaml
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.scalarstring import DoubleQuotedScalarString
+from ruamel.yaml.util import load_yaml_guess_indent
 
+from fusesoc_firm.outputs import check_output, write
 from fusesoc_firm.prompts import Asker, Question
 from fusesoc_firm.system.specification import (
     ACCELERATOR,
@@ -27,7 +32,7 @@ from fusesoc_firm.system.specification import (
     is_core,
 )
 from fusesoc_firm.yaml_sections import Key, Section, keys_of
-from fusesoc_firm.yaml_text import read_yaml
+from fusesoc_firm.yaml_text import LONGEST_NUMBER, read_yaml
 
 # All messages that can be named, by the specification's `paths`.
 MessageNames = Callable[[Sequence[str]], Sequence[str]]
@@ -37,16 +42,49 @@ _YES, _NO = "yes", "no"
 
 def extend_specification(path: Path, asker: Asker, message_names: MessageNames) -> None:
     """Ask for a specification and write it, or for more of one that is there."""
-    yaml = YAML()
-    yaml.indent(sequence=4, offset=2)
-    yaml.width = 10**6
+    check_output(path)
     is_new = not path.exists()
     if not is_new:
         read_yaml(path)  # reports what is no YAML, at its place
-    content = CommentedMap() if is_new else yaml.load(path.read_text(encoding="utf-8"))
+    before = "" if is_new else path.read_text(encoding="utf-8")
+    content = CommentedMap() if is_new else _style(before).load(before)
     _Wizard(asker, message_names, content, is_new, path.parent).run()
-    with path.open("w", encoding="utf-8") as file:
-        yaml.dump(content, file)
+    text = io.StringIO()
+    _style(before).dump(content, text)
+    write(path, text.getvalue())
+
+
+def _style(text: str) -> YAML:
+    """YAML that is written as `text` is: with its quotes, and lists that stand as far in; as ours without any."""
+    yaml = YAML()
+    yaml.preserve_quotes = True
+    yaml.brace_single_entry_mapping_in_flow_sequence = True
+    yaml.width = 10**6
+    # The dash of a list's item, and what comes after it, from where its key begins.
+    _, item, dash = load_yaml_guess_indent(text) if text else (None, None, None)
+    yaml.indent(sequence=item or 4, offset=2 if dash is None else dash)
+    return yaml
+
+
+def _word(answer: str) -> Any:
+    """An answer as a scalar; in quotes where YAML, or a list around it, would take it for another value."""
+    if answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer:
+        # A number is as good a word, and reads better without quotes.
+        return int(answer)
+    try:
+        is_plain = pyyaml.safe_load(f"[{answer}]") == [answer]
+    except (pyyaml.YAMLError, ValueError):
+        is_plain = False
+    return answer if is_plain else DoubleQuotedScalarString(answer)
+
+
+def _words(answers: Sequence[str]) -> Any:
+    """Answers on one line: a word, or a list in brackets."""
+    if len(answers) < 2:
+        return _word(answers[0]) if answers else []
+    words = CommentedSeq(map(_word, answers))
+    words.fa.set_flow_style()
+    return words
 
 
 @dataclass
@@ -117,7 +155,7 @@ class _Wizard:
         """Say what a key means where it stands for the first time; a section's name says enough."""
         if self.is_new and entry.section is None and name not in self.explained:
             self.explained.add(name)
-            made.yaml_add_eol_comment(entry.meaning, name)
+            made.yaml_add_eol_comment(entry.meaning, name, column=0)
 
     def _value(self, draft: _Draft, name: str, field_name: str, entry: Key) -> Any:
         """A key's value; empty if it is left out."""
@@ -141,16 +179,15 @@ class _Wizard:
         answer = self.asker.ask(question)
         if answer == question.default:
             return None
-        # A number is as good a word, and reads better without quotes.
-        return int(answer) if answer.isdecimal() and str(int(answer)) == answer else answer
+        return _word(answer) if answer else None
 
-    def _texts(self, question: Question) -> list[str]:
+    def _texts(self, question: Question) -> Any:
         """One answer after the other, until an empty one."""
         found: list[str] = []
-        while answer := self.asker.ask(question):
+        further = Question(f"one more of {question.name}", question.meaning, question.words, check=question.check)
+        while answer := self.asker.ask(further if found else question):
             found.append(answer)
-            question = Question(f"one more of {question.name}", question.meaning, question.words, check=question.check)
-        return found
+        return _words(found)
 
     # --- answers ---------------------------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from tqdm import tqdm
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.outputs import check_output, make_folder
 from fusesoc_firm.verify.campaign import Entry, Settings, run, select
 from fusesoc_firm.verify.report import Report, make_report, write_report
 from fusesoc_firm.verify.simulation import ghdl
@@ -44,6 +45,10 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
     if settings.width not in WIDTHS:
         legal = ", ".join(map(str, WIDTHS))
         fail(f"no converter is made for a stream of {settings.width} bits", hint=f"legal here: {legal}")
+    if places.report:
+        check_output(places.report, (".json",))
+    if places.keep:
+        make_folder(places.keep)
     if not places.cluster:
         ghdl()
     names = select(library, patterns)

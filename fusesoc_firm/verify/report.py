@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm import __version__
-from fusesoc_firm.files import write_if_changed
 from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.outputs import write
 from fusesoc_firm.render import render
 from fusesoc_firm.verify.campaign import Entry, Settings
 from fusesoc_firm.verify.complexity import Level, Statistics
@@ -62,9 +62,9 @@ def make_report(entries: Iterable[Entry], settings: Settings, seconds: float) ->
 
 def write_report(report: Report, path: Path) -> Path:
     """Write the report to `path`, and as HTML beside it; the path of that is returned."""
-    write_if_changed(path, json.dumps(as_data(report), indent=1, ensure_ascii=False) + "\n")
+    write(path, json.dumps(as_data(report), indent=1, ensure_ascii=False) + "\n")
     beside = path.with_suffix(".html")
-    write_if_changed(beside, as_html(report))
+    write(beside, as_html(report))
     return beside
 
 

@@ -16,6 +16,7 @@ import pytest
 from fusesoc import edalizer
 
 from fusesoc_firm.library_path import library_root
+from tests.processes import IGNORING_INTERRUPTS
 from tests.sim.ghdl import REPOSITORY
 
 CONFIGURATION = f"""\
@@ -103,9 +104,10 @@ def project(tmp_path: Path) -> Path:
 
 
 def start(project: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+    """`firm build`, which has to listen to SIGINT, although whoever starts it ignores that."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("FUSESOC", "EDALIZE"))}
     return subprocess.Popen(
-        [sys.executable, "-m", "fusesoc_firm.cli", "build", *arguments],
+        [*IGNORING_INTERRUPTS, sys.executable, "-m", "fusesoc_firm.cli", "build", *arguments],
         cwd=project,
         env={**kept, "PYTHONPATH": str(REPOSITORY), "FUSESOC_FIRM_CACHE": str(project.parent / "store"), **environment},
         stdout=subprocess.PIPE,
@@ -117,7 +119,7 @@ def start(project: Path, *arguments: str, **environment: str) -> subprocess.Pope
 def build(project: Path, *arguments: str, **environment: str) -> tuple[int, list[str], list[str]]:
     """Exit status, and lines of standard output and error."""
     running = start(project, *arguments, **environment)
-    out, err = running.communicate(timeout=120)
+    out, err = running.communicate()
     print(out, err)
     return running.returncode, out.splitlines(), err.splitlines()
 
@@ -126,10 +128,8 @@ def place(project: Path, core: str, target: str) -> Path:
     return project / "build" / f"me_project_{core}_1.0" / target
 
 
-def wait_until(is_so: Callable[[], object], seconds: float = 60) -> None:
-    end = time.monotonic() + seconds
+def wait_until(is_so: Callable[[], object]) -> None:
     while not is_so():
-        assert time.monotonic() < end
         time.sleep(0.05)
 
 
@@ -193,7 +193,7 @@ def test_eight_runs_of_one_target_at_once(project: Path, tmp_path: Path) -> None
     alone = ("one", "--target", "sim", "--build-root", "alone")
     assert build(project, *alone)[0] == 0
     runs = [start(project, "one", "--target", "sim", FUSESOC_FIRM_CACHE=str(tmp_path / "new")) for _ in range(8)]
-    outputs = [run.communicate(timeout=240) for run in runs]
+    outputs = [run.communicate() for run in runs]
     assert [run.returncode for run in runs] == [0] * 8, outputs
     waited = [err for _, err in outputs if "me:project:one:1.0 sim: waiting for process " in err]
     assert 1 <= len(waited) < 8
@@ -227,16 +227,16 @@ def staying(project: Path) -> subprocess.Popen[str]:
 
 def test_ctrl_c_ends_all(project: Path, staying: subprocess.Popen[str]) -> None:
     staying.send_signal(signal.SIGINT)
-    assert staying.communicate(timeout=30) == ("", "interrupted\n")
+    assert staying.communicate() == ("", "interrupted\n")
     assert staying.returncode == 130
-    assert not any(map(is_running, processes(project)))
+    wait_until(lambda: not any(map(is_running, processes(project))))
     assert not list((project / "build").rglob("*.lock*"))
 
 
 def test_killed_it_leaves_nothing_behind_that_hinders(project: Path, staying: subprocess.Popen[str]) -> None:
     staying.kill()
     staying.communicate()
-    wait_until(lambda: not any(map(is_running, processes(project))), 5)
+    wait_until(lambda: not any(map(is_running, processes(project))))
     # The same place; its lock is of a process that is no more.
     (lock,) = (project / "build" / "me_project_one_1.0").glob("*.lock")
     core = project / "one.core"
@@ -321,6 +321,6 @@ def test_ctrl_c_ends_what_runs_on_a_cluster(project: Path, cluster: str) -> None
     running = start(project, "one", "two", "--target", "long", "--setup", "--cluster", cluster)
     wait_until(lambda: len(processes(project)) == 4)
     running.send_signal(signal.SIGINT)
-    _, err = running.communicate(timeout=30)
+    _, err = running.communicate()
     assert (running.returncode, err.splitlines()[-1]) == (130, "interrupted")
-    wait_until(lambda: not any(map(is_running, processes(project))), 10)
+    wait_until(lambda: not any(map(is_running, processes(project))))

@@ -57,7 +57,6 @@ def call(*command: str | Path, **environment: str) -> subprocess.CompletedProces
         text=True,
         capture_output=True,
         check=False,
-        timeout=60,
     )
 
 

@@ -110,7 +110,6 @@ def run(command: str, workspace: Path) -> subprocess.CompletedProcess[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=120,
         check=False,
     )
     print(f"$ {command}\n{done.stdout}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -60,17 +61,17 @@ class Installation:
     def fusesoc(self, *arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
         return self._run(self.environment / "bin" / "fusesoc", *arguments, cwd=cwd, check=False)
 
+    def firm(self, *arguments: str, cwd: Path | None = None) -> str:
+        return self._run(self.environment / "bin" / "firm", *arguments, cwd=cwd or self.environment).stdout.strip()
+
     def library(self, *options: str, cwd: Path | None = None) -> Path:
-        firm = self.environment / "bin" / "firm"
-        return Path(self._run(firm, "path", *options, cwd=cwd or self.environment).stdout.strip())
+        return Path(self.firm("path", *options, cwd=cwd))
 
     def _run(self, *command: str | Path, cwd: Path, check: bool = True) -> subprocess.CompletedProcess[str]:
         home = self.environment.parent / "home"
         # Nothing is activated: `python3` is the system's, and knows no package of ours.
         environment = {"PATH": "/usr/bin:/bin", "HOME": str(home), "LANG": "C.UTF-8"}
-        return subprocess.run(
-            command, cwd=cwd, env=environment, text=True, capture_output=True, check=check, timeout=120
-        )
+        return subprocess.run(command, cwd=cwd, env=environment, text=True, capture_output=True, check=check)
 
 
 def copy_source(destination: Path) -> None:
@@ -150,6 +151,16 @@ def test_the_library_is_installed_whole(installation: Installation) -> None:
     demos = installation.library("--demos")
     assert files_below(demos, "") == files_below(installation.source / "specs", "")
     assert "obstacle/obstacle.core" in files_below(demos, "")
+
+
+def test_the_description_names_pages_that_are_installed(installation: Installation) -> None:
+    """Its links work wherever it is shown: there are none but to the web."""
+    text = installation.python(
+        "-c", "from importlib.metadata import metadata as m; print(m('fusesoc-firm').get_payload())"
+    )
+    assert re.findall(r"\]\((?!https?:)[^)]*\)", text) == []
+    docs = Path(installation.firm("path", "--docs"))
+    assert {*re.findall(r"`docs/(\w+\.md)`", text)} == {page.name for page in docs.iterdir()}
 
 
 def test_another_project_sees_each_core_once(installation: Installation, project: Path) -> None:

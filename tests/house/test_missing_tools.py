@@ -74,7 +74,6 @@ class Bare:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=100,
             check=False,
         )
         print(done.stdout)

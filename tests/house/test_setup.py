@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
+import sys
+import tempfile
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
+from packaging.requirements import Requirement
+
+from fusesoc_firm.tools import PROGRAMS
 
 ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
 class Machine:
@@ -104,6 +113,7 @@ def test_make_without_a_target_lists_them() -> None:
         "corpus",
         "bench",
         "bitstream",
+        "matrix",
         "proofs",
         "lint",
         "setup",
@@ -125,6 +135,30 @@ def test_make_sim_passes_its_variables_on(variables: list[str], arguments: str) 
     command = ["make", "--dry-run", "sim", *variables]
     done = subprocess.run(command, cwd=ROOT, env=environment, text=True, capture_output=True, check=True)
     assert f" .venv/bin/fusesoc run --target=sim {arguments} 2>&1 | " in " ".join(done.stdout.split())
+
+
+@pytest.mark.parametrize("status", [0, 1])
+def test_make_sim_prints_the_path_of_its_waves(tmp_path: Path, status: int) -> None:
+    """Of a run that fails, too; programs that do nothing stand in for ours."""
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    waves = "build/a_b_c_1/sim/waves.ghw"
+    programs = {
+        ".ci/install-tools": "true",
+        ".venv/bin/python": "true",
+        ".venv/bin/fusesoc": f"mkdir -p {Path(waves).parent}; touch {waves}; echo PASS 1/1; exit {status}",
+    }
+    for name, text in programs.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+        path.chmod(0o755)
+    for name in ("pyproject.toml", ".venv/.installed"):
+        (tmp_path / name).touch()
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
+    command = ["make", "sim", "SYSTEM=a:b:c", "WAVES=1"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, text=True, capture_output=True, check=False)
+    assert done.stdout.splitlines()[-2:] == ["PASS 1/1", f"waves: {waves}"], done.stderr
+    assert bool(done.returncode) is bool(status)
 
 
 def make_corpus(corpus: Path) -> list[str]:
@@ -149,3 +183,120 @@ def test_make_corpus_verifies_both_versions(tmp_path: Path) -> None:
 def test_make_corpus_without_a_corpus_is_one_line(tmp_path: Path) -> None:
     (line,) = make_corpus(tmp_path)
     assert line.startswith(f"echo \"No corpus: '{tmp_path}' has no folders ros1 and ros2")
+
+
+class Checkout:
+    """This checkout with an environment in which pip and FuseSoC only note how they are called."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.environment = folder / "venv"
+        (self.environment / "bin").mkdir(parents=True)
+        self.add("venv/bin/python", f'PYTHONPATH={ROOT} exec {sys.executable} "$@"')
+        for name in ("pip", "fusesoc"):
+            self.add(f"venv/bin/{name}", f'echo "$*" >> {folder}/{name}')
+        for name in ("ghdl", "g++", "yosys"):
+            self.add(name)
+        (self.environment / ".installed").touch()
+
+    def add(self, name: str, script: str = "") -> None:
+        (self.folder / name).write_text(f"#!/bin/bash\n{script}\n")
+        (self.folder / name).chmod(0o755)
+
+    def make(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "FUSESOC"))}
+        return subprocess.run(
+            ["make", f"VENV={self.environment}", "SYSTEM=robot:sys:obstacle", *arguments],
+            cwd=ROOT,
+            env={**kept, "PATH": f"{self.folder}:{os.environ['PATH']}"},
+            text=True,
+            capture_output=True,
+            timeout=60,
+            check=False,
+        )
+
+    def calls(self, program: str) -> list[str]:
+        """How a program was called."""
+        noted = self.folder / program
+        return noted.read_text().splitlines() if noted.exists() else []
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Checkout:
+    return Checkout(tmp_path)
+
+
+def test_a_bitstream_brings_only_what_its_board_needs(checkout: Checkout) -> None:
+    done = checkout.make("bitstream", "BOARD=tangnano9k")
+    assert done.returncode == 0, done.stderr
+    assert checkout.calls("pip") == ["install --disable-pip-version-check --editable .[apicula]"]
+    assert checkout.calls("fusesoc") == ["run --setup --build --target=tangnano9k robot:sys:obstacle"]
+    checkout.make("bitstream", "BOARD=tangnano9k")
+    assert len(checkout.calls("pip")) == 1
+
+
+def test_why_pip_failed_is_shown(checkout: Checkout) -> None:
+    checkout.add(
+        "venv/bin/pip", 'for word; do [ "$word" != --quiet ] || exit 1; done; echo "The conflict is this"; exit 1'
+    )
+    done = checkout.make("bitstream", "BOARD=icebreaker")
+    assert done.returncode
+    assert "The conflict is this\n" in done.stderr
+    assert checkout.calls("fusesoc") == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("sim TARGET=sim_vcs", ["has no target 'sim_vcs'", "it has: default, sim, sim_icarus, sim_verilator,"]),
+        ("sim TARGET=lint", ["target 'lint' of", "it has: sim, sim_icarus, sim_verilator,"]),
+        ("sim SYSTEM=robot:sys:no", ["'robot:sys:no' is no core", "with sim there are: ", "robot:sys:quat2euler:"]),
+        ("bitstream BOARD=iceberg", ["has no target 'iceberg'", "icebreaker, quartus, tangnano9k, ulx3s"]),
+    ],
+)
+def test_what_is_unknown_is_refused_before_anything_is_installed(
+    checkout: Checkout, arguments: str, said: list[str]
+) -> None:
+    done = checkout.make(*arguments.split())
+    assert done.returncode
+    assert [text for text in said if text not in done.stderr] == []
+    assert checkout.calls("pip") + checkout.calls("fusesoc") == []
+
+
+def test_each_family_of_boards_has_an_extra_that_can_be_installed() -> None:
+    boards = [yaml.safe_load(path.read_text(encoding="utf-8")) for path in ROOT.glob("fusesoc_firm/boards/*.yaml")]
+    extras = {name: {Requirement(item).name for item in items} for name, items in extras_of_project().items()}
+    programs = {"apicula": "nextpnr-himbaechel", "icestorm": "nextpnr-ice40", "trellis": "nextpnr-ecp5"}
+    assert {board["flow"] for board in boards} - {"quartus", "vivado"} == programs.keys()
+    for flow, program in programs.items():
+        assert extras[flow] == {PROGRAMS[program].pypi}
+    # nextpnr for Gowin asks for a certain version of it; a bound of ours can only contradict.
+    assert not any("apycula" in name.lower() for names in extras.values() for name in names)
+
+
+def extras_of_project() -> dict[str, list[str]]:
+    extras: dict[str, list[str]] = PROJECT["optional-dependencies"]
+    return extras
+
+
+@pytest.mark.parametrize(
+    ("package", "version"),
+    [
+        # Their cores have no `get_data`.
+        ("fusesoc", "2.4.6"),
+        # Its tool ghdl ends in a NameError.
+        ("edalize", "0.6.5"),
+        # They append what changes to a tool's configuration, so a second build has both.
+        ("edalize", "0.6.6"),
+        ("edalize", "0.6.7"),
+    ],
+)
+def test_a_version_that_does_not_work_is_not_accepted(package: str, version: str) -> None:
+    (accepted,) = (found for item in PROJECT["dependencies"] if (found := Requirement(item)).name == package)
+    assert version not in accepted.specifier
+
+
+def test_tests_find_this_python_first_and_an_empty_store() -> None:
+    assert shutil.which("python3") == str(Path(sys.executable).with_name("python3"))
+    store = Path(os.environ["FUSESOC_FIRM_CACHE"])
+    assert store.is_relative_to(tempfile.gettempdir())

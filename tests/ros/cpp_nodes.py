@@ -16,11 +16,13 @@ import threading
 import time
 import xmlrpc.client
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+
+from tests.processes import IGNORING_INTERRUPTS
 
 HERE = Path(__file__).resolve().parent
 DEBIAN_PYTHON = "/usr/bin/python3"
@@ -60,7 +62,7 @@ class Ros:
         return ["-I", str(package / "include"), *self.includes]
 
     def _compile(self, arguments: Sequence[str]) -> None:
-        done = subprocess.run(["g++", *_OPTIONS, *arguments], capture_output=True, text=True, timeout=300, check=False)
+        done = subprocess.run(["g++", *_OPTIONS, *arguments], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr[-4000:]
 
 
@@ -126,16 +128,24 @@ def _free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+def _free_domain() -> int:
+    """A domain that nobody on this machine has joined, of those that leave Linux its ephemeral ports."""
+    for number in range(100):
+        domain = 1 + (os.getpid() + number) % 100
+        with suppress(OSError), socket.socket(type=socket.SOCK_DGRAM) as probe:
+            # The first participant's (DDSI-RTPS 2.2, 9.6.1.1).
+            probe.bind(("127.0.0.1", 7410 + 250 * domain))
+            return domain
+    raise AssertionError("there is no free ROS domain")
+
+
 def _wait_for_master(uri: str) -> None:
     master = xmlrpc.client.ServerProxy(uri)
-    deadline = time.monotonic() + 20
     while True:
-        try:
+        with suppress(OSError):
             master.getSystemState("/test")
             return
-        except OSError:
-            assert time.monotonic() < deadline, "rosmaster does not answer"
-            time.sleep(0.05)
+        time.sleep(0.05)
 
 
 def ros2(folder: Path) -> Ros:
@@ -146,8 +156,7 @@ def ros2(folder: Path) -> Ros:
         "LD_LIBRARY_PATH": ":".join(map(str, libraries)),
         "LD_PRELOAD": _libpython(),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        # Of those that leave Linux its ephemeral ports.
-        "ROS_DOMAIN_ID": str(1 + os.getpid() % 100),
+        "ROS_DOMAIN_ID": str(_free_domain()),
         "ROS_LOG_DIR": str(folder / "log"),
     }
     includes = [word for path in sorted((ROS2 / "include").iterdir()) for word in ("-isystem", str(path))]
@@ -168,12 +177,13 @@ def running_ros(version: int, folder: Path) -> AbstractContextManager[Ros]:
 class NodeProcess:
     """A node that runs; within a `with`, after which it is gone."""
 
-    def __init__(self, log: Path, command: Sequence[str], environment: Mapping[str, str], patience: float) -> None:
-        """What it prints goes to `log`; its end is waited for `patience` seconds."""
+    def __init__(self, log: Path, command: Sequence[str], environment: Mapping[str, str]) -> None:
+        """What it prints goes to `log`. Like one that a script starts in its background, it has to listen to SIGINT."""
         self._path = log
-        self._patience = patience
         self._log = log.open("wb")
-        self.process = subprocess.Popen(command, env=environment, stdout=self._log, stderr=subprocess.STDOUT)
+        self.process = subprocess.Popen(
+            [*IGNORING_INTERRUPTS, *command], env=environment, stdout=self._log, stderr=subprocess.STDOUT
+        )
 
     def said(self) -> str:
         """All that it has printed."""
@@ -184,9 +194,15 @@ class NodeProcess:
         self.process.send_signal(number)
         return self.wait()
 
-    def wait(self, seconds: float | None = None) -> int:
+    def wait(self) -> int:
         """Wait until it ends; its exit status."""
-        return self.process.wait(self._patience if seconds is None else seconds)
+        return self.process.wait()
+
+    def wait_until_said(self, text: str, times: int = 1) -> None:
+        """Wait until it has printed a text so many times."""
+        while self.said().count(text) < times:
+            assert self.process.poll() is None, self.said()
+            time.sleep(0.02)
 
     def __enter__(self) -> Self:
         return self
@@ -207,7 +223,7 @@ class Node(NodeProcess):
 
     def __init__(self, ros: Ros, program: Path, transport: str, *arguments: str) -> None:
         command = [str(program), "--transport", transport, *arguments]
-        super().__init__(program.with_suffix(".log"), command, ros.environment, 120.0)
+        super().__init__(program.with_suffix(".log"), command, ros.environment)
 
 
 class Peer:
@@ -227,8 +243,8 @@ class Peer:
         for line in self._process.stdout:
             self._lines.put(json.loads(line))
 
-    def wait_until_connected(self, seconds: float = 30) -> None:
-        assert self._lines.get(timeout=seconds) == {"connected": True}
+    def wait_until_connected(self) -> None:
+        assert self._lines.get() == {"connected": True}
 
     def publish(self, topic: str, payload: bytes) -> None:
         assert self._process.stdin
@@ -236,9 +252,9 @@ class Peer:
         self._process.stdin.write(json.dumps(line) + "\n")
         self._process.stdin.flush()
 
-    def take(self, seconds: float = 30) -> tuple[str, bytes]:
-        """The next message: its topic and payload. Raises queue.Empty."""
-        line = self._lines.get(timeout=seconds)
+    def take(self) -> tuple[str, bytes]:
+        """The next message: its topic and payload."""
+        line = self._lines.get()
         return line["topic"], base64.b64decode(line["payload"])
 
     def kill(self) -> None:

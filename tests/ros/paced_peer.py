@@ -89,7 +89,7 @@ def run(ros: Any, rate: int, seconds: float, ways: list[Way]) -> None:
     for step in range(steps):
         time.sleep(max(0.0, start + step / rate / len(ways) - time.perf_counter()))
         ways[step % len(ways)].send()
-    latest = time.perf_counter() + 5
+    latest = time.perf_counter() + 60
     while time.perf_counter() < latest and any(len(way.came) < len(way.sent_at) for way in ways):
         time.sleep(0.02)
     print(json.dumps([way.result() for way in ways]), flush=True)

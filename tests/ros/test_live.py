@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import queue
 import random
 import re
 import signal
@@ -252,7 +251,7 @@ def test_any_size_goes_through(place: Place) -> None:
         for size in (0, 1, 63, 64, 65_536, FULL_HD):
             sent = image(version, size, random.Random(size).randbytes(size))
             peer.publish("/image_in", sent.data)
-            topic, payload = peer.take(120)
+            topic, payload = peer.take()
             assert topic == "/image_out" and sent.is_in(version, payload), size
         assert node.stop(signal.SIGTERM) == 0
 
@@ -281,7 +280,7 @@ def test_frames_of_all_types_through_a_preemptive_system(place: Place) -> None:
                 waiting[name].append(payload)
                 peer.publish(f"/{name}_in", payload.data)
             if number >= window:
-                topic, came = peer.take(60)
+                topic, came = peer.take()
                 expected = waiting[topic.strip("/").removesuffix("_out")].pop(0)
                 assert expected.is_in(version, came), f"{topic}: {came[:40]!r} for {expected.data[:40]!r}"
                 taken += 1
@@ -291,8 +290,11 @@ def test_frames_of_all_types_through_a_preemptive_system(place: Place) -> None:
 
 
 def test_a_rate_is_held(place: Place) -> None:
-    """5 s at 100 Hz: nothing is lost, and all comes in order. `make bench BENCH=live` has a minute of it."""
-    with place.live(place.mixed_specification(), "--tool", "verilator") as node:
+    """5 s at 100 Hz: nothing is lost, and all comes in order. `make bench BENCH=live` has a minute of it.
+
+    All fit the queue, as a busy machine may not let the node work for a while.
+    """
+    with place.live(place.mixed_specification(), "--tool", "verilator", "--queue", "500") as node:
         node.wait_until_ready()
         (found,) = paced(place.ros, 100, 5, [("/QuaternionToEuler_sub", "/QuaternionToEuler_pub")])
         assert node.stop() == 0
@@ -342,11 +344,7 @@ def test_a_simulator_that_is_killed_in_mid_frame_is_started_again(place: Place) 
             peer.publish("/image_in", sent.data)
             assert sent.is_in(version, peer.take()[1])
             peer.publish("/image_in", image(version, 100 + number, bytes(100)).data)
-            node.wait_until_said("it is started anew")
-            latest = time.monotonic() + 20
-            while node.said().count("it is started anew") <= number:
-                assert time.monotonic() < latest
-                time.sleep(0.02)
+            node.wait_until_said("it is started anew", number + 1)
         assert node.stop() == 0
         assert "restarts: 3" in node.said()
 
@@ -363,13 +361,9 @@ def test_what_was_taken_is_published_before_the_end(place: Place) -> None:
             peer.publish("/image_in", image(version, number, bytes(100)).data)
         came = [peer.take()[1]]
         assert node.stop() == 0
-        while True:
-            try:
-                came.append(peer.take(1.0)[1])
-            except queue.Empty:
-                break
         row = re.search(r"image_in +(\d+) +(\d+) +(\d+) ", node.said())
-        assert row and row.groups() == (str(len(came)), "0", str(len(came)))
+        assert row and row[2] == "0" and row[1] == row[3]
+        came += [peer.take()[1] for _ in range(int(row[1]) - 1)]
         assert all(image(version, number, bytes(100)).is_in(version, payload) for number, payload in enumerate(came))
 
 

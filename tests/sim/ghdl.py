@@ -19,6 +19,8 @@ from pathlib import Path
 
 import yaml
 
+from tests.processes import limited
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 CORES = REPOSITORY / "cores"
 
@@ -64,10 +66,13 @@ class Library:
         *,
         directory: Path | None = None,
         options: Sequence[str] = (),
-        timeout: float = 120,
+        seconds: float = 120,
     ) -> RunResult:
-        """Simulate `entity`; its files are relative to `directory` (default: the library's); `timeout` in seconds."""
-        command = ["ghdl", "-r", *self._options(), entity, *_generic_options(generics), *options]
+        """Simulate `entity`, which may take so many seconds of a processor.
+
+        Its files are relative to `directory` (default: the library's).
+        """
+        command = [*limited(seconds), "ghdl", "-r", *self._options(), entity, *_generic_options(generics), *options]
         process = subprocess.run(
             command,
             cwd=directory or self.directory,
@@ -75,7 +80,6 @@ class Library:
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            timeout=timeout,
             check=False,
         )
         return RunResult(process.returncode, process.stdout)

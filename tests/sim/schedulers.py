@@ -79,7 +79,7 @@ def analyse_bench(library: Library, by_policy: Path | None = None, combined: Pat
 
 def trace_of(library: Library, folder: Path, **generics: Generic) -> Trace:
     """Run the bench with its files in `folder`; its output, with the seed, is printed."""
-    result = library.run(BENCH, {"SEED": SEED, **generics}, directory=folder, timeout=1200)
+    result = library.run(BENCH, {"SEED": SEED, **generics}, directory=folder, seconds=1200)
     print(f"{generics}\n{result.output}")
     assert result.exit_code == 0
     return read_trace(folder / "trace.txt")

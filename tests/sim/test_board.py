@@ -82,7 +82,6 @@ def _build(folder: Path, board: str) -> Path:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stdout

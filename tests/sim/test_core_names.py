@@ -158,7 +158,8 @@ def design() -> str:
 @pytest.mark.parametrize("tool", ["ghdl", "icarus"])
 def test_cores_of_one_message_stand_side_by_side(tmp_path: Path, tool: str) -> None:
     files = [
-        {"name": str(path), "file_type": "vhdlSource-93", "logical_name": "firm"} for path in core_files("axis/axis")
+        {"name": str(path), "file_type": "vhdlSource-93", "logical_name": "firm"}
+        for path in core_files("axis/package", "axis/axis")
     ]
     for folder, (name, ros, width) in zip("abcd", [*CORES, CORES[-1]], strict=True):
         (tmp_path / folder).mkdir()

@@ -102,7 +102,6 @@ class Build:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=100,
             check=False,
         )
         print(done.stdout)

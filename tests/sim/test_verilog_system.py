@@ -10,7 +10,7 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
 from tests.sim import systems
-from tests.sim.first_versions import IMAGE_STIMULUS, ZEROS
+from tests.sim.first_versions import BOARD, IMAGE_STIMULUS, ZEROS, write_messages
 from tests.sim.verilog import Icarus, build
 
 pytestmark = pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed")
@@ -24,14 +24,25 @@ accelerators:
     sources: rtl/mix.v
     interface:
       input: [{{middleware: ROS, message: {IMAGE}}}, {{middleware: ROS, message: {POINT}}}]
-      output: [{{middleware: ROS, message: {IMAGE}}}, {{middleware: ROS, message: {POSE}}}]
-    pins: [{{name: led, direction: out}}, {{name: switches, direction: in, bits: 4}}]
+      output:
+        - {{middleware: ROS, message: {IMAGE}, length: given}}
+        - {{middleware: ROS, message: {POSE}}}
+        - {{middleware: ROS, message: {BOARD}, length: given}}
+    pins: [{{name: done, direction: out}}, {{name: switches, direction: in, bits: 4}}]
+  - name: Listen
+    type: Verilog
+    sources: rtl/listen.v
+    interface:
+      output: [{{middleware: ROS, message: {POINT}}}]
 blocks:
   - {{name: image, middleware: ROS, mode: subscriber, message: {IMAGE}, outgoing: [{{name: m}}]}}
   - {{name: point, middleware: ROS, mode: subscriber, message: {POINT}, outgoing: [{{name: m}}]}}
-  - {{name: m, type: Mix, outgoing: [{{name: image_out}}, {{name: pose_out}}]}}
+  - {{name: m, type: Mix, outgoing: [{{name: image_out}}, {{name: pose_out}}, {{name: board}}]}}
+  - {{name: l, type: Listen, outgoing: [{{name: heard}}]}}
   - {{name: image_out, middleware: ROS, mode: publisher, message: {IMAGE}}}
   - {{name: pose_out, middleware: ROS, mode: publisher, message: {POSE}}}
+  - {{name: board, middleware: ROS, mode: publisher, message: {BOARD}}}
+  - {{name: heard, middleware: ROS, mode: publisher, message: {POINT}}}
 """
 FIRST_STIMULI = (
     IMAGE_STIMULUS
@@ -45,7 +56,7 @@ FIRST_MODEL = (
 
 
 def respond(subscriber, message):
-    return {"image": [], "point": [("image_out", IMAGE), ("pose_out", POSE)]}[subscriber]
+    return {"image": [], "point": [("image_out", IMAGE), ("pose_out", POSE), ("board", BOARD)]}[subscriber]
 """
 )
 
@@ -187,15 +198,16 @@ def passes(made: Icarus, folder: Path, messages: int, **options: int) -> bool:
 
 def test_a_first_version_answers_with_zeros(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, {"spec.yaml": FIRST, "stimuli.yaml": FIRST_STIMULI * 5, "model.py": FIRST_MODEL})
-    assert main(["system", "skeleton", str(tmp_path / "spec.yaml")]) == 0
+    command = ["system", "skeleton", str(tmp_path / "spec.yaml"), "--path", str(write_messages(tmp_path))]
+    assert main(command) == 0
     source = tmp_path / "rtl" / "mix.v"
-    assert capsys.readouterr().out == f"{source}\n"
-    made = compiled(tmp_path)
-    assert passes(made, tmp_path, 10, STALL_PERCENT=0)
-    assert passes(made, tmp_path, 10, SEED=3, STALL_PERCENT=60)
+    assert capsys.readouterr().out == f"{source}\n{source.with_name('listen.v')}\n"
+    made = compiled(tmp_path, paths=["demo_msgs"])
+    assert passes(made, tmp_path, 15, STALL_PERCENT=0)
+    assert passes(made, tmp_path, 15, SEED=3, STALL_PERCENT=60)
     # It is its author's from now on.
     source.write_text("mine")
-    assert main(["system", "skeleton", str(tmp_path / "spec.yaml")]) == 0
+    assert main(command) == 0
     assert source.read_text() == "mine"
 
 

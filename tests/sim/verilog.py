@@ -11,6 +11,7 @@ from fusesoc_firm.generation import Request
 from fusesoc_firm.host import simulation
 from fusesoc_firm.netlist.translation import Translation, translate
 from fusesoc_firm.system import generator
+from tests.processes import limited
 from tests.sim.ghdl import CORES, Generic, RunResult, core_files
 from tests.sim.systems import RUNTIME
 
@@ -27,13 +28,12 @@ class Icarus:
         """Simulate in `directory`; options are those of the host, which the report repeats."""
         plusargs = [f"+{name}={value}" for name, value in options.items()]
         done = subprocess.run(
-            ["vvp", "-n", str(self.program), *plusargs],
+            [*limited(120), "vvp", "-n", str(self.program), *plusargs],
             cwd=directory,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            timeout=120,
             check=False,
         )
         return RunResult(done.returncode, done.stdout)

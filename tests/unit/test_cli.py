@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -323,12 +324,85 @@ def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, mo
     answers += ["yes", "pub", "", "ROS", "publisher", point, *[""] * 7, "no", "no"]
     monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
     assert f"{spec}: robot is right: 1 subscriber" in out(capsys, "system", "new", str(spec))
-    assert out(capsys, "system", "diagram", str(spec), "--format", "dot", "-o", str(picture)) == ""
+    assert out(capsys, "system", "diagram", str(spec), "-o", str(picture)) == ""
     assert '"block sub" -> "block pub"' in picture.read_text(encoding="utf-8")
+    assert out(capsys, "system", "diagram", str(spec), "--format", "dot") == picture.read_text(encoding="utf-8")
     assert "generated for each line written" in out(capsys, "system", "report", str(spec))
-    nowhere = spec / "robot.svg"
-    message = error(capsys, "system", "diagram", str(spec), "--format", "dot", "-o", str(nowhere))
-    assert message.startswith(f"error: cannot write {nowhere}: ")
+
+
+def test_what_is_doubtful_is_told_and_goes_on(capsys: Captured, tmp_path: Path) -> None:
+    """`warning` is told on the standard error, so that what is printed stays what it was."""
+    spec = tmp_path / "robot.yaml"
+    ends = ", middleware: ROS, message: geometry_msgs/Point, topic: point"
+    spec.write_text(
+        f"project: {{name: robot}}\nblocks:\n- {{name: sub, mode: subscriber{ends}, outgoing: [{{name: pub}}]}}\n"
+        f"- {{name: pub, mode: publisher{ends}}}\n",
+        encoding="utf-8",
+    )
+    for command in ("check", "show"):
+        assert main(["system", command, str(spec)]) == 0
+        captured = capsys.readouterr()
+        assert f"{spec}:4:86: warning: 'pub' publishes on topic /point, to which 'sub' subscribes\n" in captured.err
+        assert captured.out and "warning" not in captured.out
+
+
+# What the files of each format begin with.
+BEGINS = {"svg": b"<?xml", "png": b"\x89PNG\r\n", "pdf": b"%PDF-", "dot": b"digraph"}
+
+
+@pytest.mark.skipif(not shutil.which("dot"), reason="no dot; make test installs Graphviz")
+@pytest.mark.parametrize(
+    ("command", "endings"),
+    [(["system", "diagram", str(SPEC)], [*BEGINS]), (["graph", "robot:sys:quat2euler"], ["png"])],
+    ids=["diagram", "graph"],
+)
+def test_a_picture_is_what_its_name_says(
+    command: list[str], endings: list[str], capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(ROOT)
+    for ending in endings:
+        path = tmp_path / f"picture.{ending}"
+        assert out(capsys, *command, "-o", str(path)) == ""
+        assert path.read_bytes().lstrip(b"/ \n").startswith(BEGINS[ending]), ending
+    message = error(capsys, *command, "--format", "dot", "-o", str(tmp_path / "picture.svg"))
+    assert "not a picture in the format dot" in message
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "legal"),
+    [
+        (["system", "diagram", str(SPEC), "-o"], "x.jpg", ".svg, .png, .pdf, .dot"),
+        (["graph", "robot:sys:quat2euler", "-o"], "x", ".svg, .png, .pdf, .dot"),
+        (["system", "core", str(SPEC), "-o"], "x.txt", ".core"),
+        (["trace", str(SPEC), "-o"], "x.gif", ".pdf, .png, .svg"),
+        (["scheduler", "bench", "--csv"], "x.png", ".csv"),
+        (["message", "verify", "std_msgs/Empty", "--report"], "x.html", ".json"),
+    ],
+)
+def test_where_nothing_can_be_written_is_told_before_the_work(
+    command: list[str], name: str, legal: str, capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A name with another ending, a folder that is missing, and one in the file's place."""
+    monkeypatch.chdir(tmp_path)
+    message = error(capsys, *command, name)
+    assert message == (
+        f"error: {name} cannot be written: its name does not say what it is to be\n      = legal endings: {legal}\n"
+    )
+    good = f"x{legal.split(',', maxsplit=1)[0]}"
+    assert error(capsys, *command, f"none/{good}") == f"error: cannot write none/{good}: there is no folder none\n"
+    (tmp_path / good).mkdir()
+    assert error(capsys, *command, good) == f"error: cannot write {good}: it is a folder\n"
+    assert [path.name for path in tmp_path.iterdir()] == [good]
+
+
+def test_a_specification_without_a_folder_is_told_before_the_questions(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    spec = tmp_path / "none" / "robot.yaml"
+    assert (
+        error(capsys, "system", "new", str(spec)) == f"error: cannot write {spec}: there is no folder {spec.parent}\n"
+    )
 
 
 def test_the_schema_is_json(capsys: Captured) -> None:

@@ -112,9 +112,27 @@ def test_who_ends_the_launcher_ends_the_program(alone: Path, tmp_path: Path) -> 
             assert started.poll() is None
             time.sleep(0.01)
         started.terminate()
-        assert started.wait(timeout=30) == 128 + signal.SIGTERM
+        assert started.wait() == 128 + signal.SIGTERM
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "started").read_text()), 0)
+
+
+def test_who_ends_the_launcher_while_it_starts_the_program_ends_both(
+    alone: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program(alone, "icepack", "exec /bin/sleep 600")
+
+    class Slow(subprocess.Popen[bytes]):
+        def __init__(self, command: list[str]) -> None:
+            super().__init__(command)
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(subprocess, "Popen", Slow)
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        assert launcher.main(["icepack"]) == 128 + signal.SIGTERM
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 # A Python that counts its starts, and hands a program to the launcher.

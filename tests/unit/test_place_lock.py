@@ -127,6 +127,21 @@ def test_an_owner_elsewhere_has_it_while_its_file_is_touched(tmp_path: Path, mon
     assert mine.beat()
 
 
+@pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"token": 1}', b"\xff", b"[" * 100_000])
+def test_a_damaged_lock_is_removed_after_a_while(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
+) -> None:
+    monkeypatch.setattr(place_lock, "_GRACE_SECONDS", 0)
+    monkeypatch.setattr(place_lock, "_SILENT_SECONDS", 0.05)
+    path = tmp_path / "sim.lock"
+    path.write_bytes(content)
+    lock = PlaceLock(path)
+    assert str(lock.acquire()) == "process 0 on an unknown machine"
+    while lock.acquire():
+        time.sleep(0.01)
+    assert lock.beat()
+
+
 def test_a_beat_changes_the_time(tmp_path: Path) -> None:
     lock = PlaceLock(tmp_path / "sim.lock")
     assert not lock.beat()

@@ -16,7 +16,7 @@ from fusesoc_firm import recall
 from fusesoc_firm.gapi import main
 from fusesoc_firm.own_code import PACKAGE
 from fusesoc_firm.recall import answer
-from fusesoc_firm.store_files import CALL, ENTRY, USES
+from fusesoc_firm.store_files import CALL, ENTRY, USES, read_note, write_json
 
 QUAT2EULER = Path(__file__).resolve().parents[2] / "specs" / "quat2euler"
 
@@ -269,6 +269,32 @@ def test_what_is_edited_while_the_facts_are_noted_is_not_noted(calls: Calls, is_
     assert main("firm", arguments) == 0
     assert not answer("firm", arguments)
     assert [*calls.store.rglob(f"*{CALL}")] == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("file", "pipe"),
+        ("file", "/dev/zero"),
+        ("file", "a\0b"),
+        ("folder", "\ud800"),
+        ("program", "a\0b"),
+        ("messages", "8"),
+        ("messages", "[" * 100_000),
+        ("messages", "[8, {}]"),
+    ],
+)
+def test_facts_that_others_made_up_are_harmless(calls: Calls, kind: str, name: str) -> None:
+    """They can be written into a store that is shared: none is waited for, or ends in a traceback."""
+    arguments = calls.converter()
+    main("firm", arguments)
+    os.mkfifo("pipe")
+    (path,) = calls.store.rglob(f"*{CALL}")
+    note = read_note(str(calls.store), str(path.relative_to(calls.store)))
+    assert note
+    note["facts"].append([kind, name, "some state"])
+    write_json(str(calls.store), str(path.relative_to(calls.store)), note)
+    assert not answer("firm", arguments)
 
 
 @pytest.mark.parametrize("arguments", [[], ["nothing.yml"], ["a", "b"], ["."]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import platform
 import random
@@ -12,9 +13,11 @@ import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from fusesoc_firm import shared_files
 from fusesoc_firm import store as store_module
 from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.store import (
@@ -145,10 +148,8 @@ def test_a_store_that_can_only_be_read_gives_what_it_has(
 
     obtain(tmp_path)
     before = stored(tmp_path)
-    monkeypatch.setattr(Path, "unlink", refuse)
-    for function in ("makedirs", "replace", "utime"):
-        monkeypatch.setattr(os, function, refuse)
-    monkeypatch.setattr(store_module, "_locked", refuse)
+    for function in ("mark_used", "open_lock", "remove", "write_whole"):
+        monkeypatch.setattr(shared_files, function, refuse)
     assert obtain(tmp_path) == Entry(FILES, True)
     assert capfd.readouterr().err == ""
     assert obtain(tmp_path, request="cd" + "0" * 62) == Entry(FILES, False)
@@ -232,21 +233,21 @@ def test_processes_at_once(tmp_path: Path, script: str) -> None:
 
 
 HANG_IN_BUILD = """
-import sys, time
+import sys
 from pathlib import Path
 from fusesoc_firm.store import Key, Store
 def build():
     print("in the middle", flush=True)
-    time.sleep(600)
+    sys.stdin.read()
 Store(Path(sys.argv[1]), 2**30).obtain(lambda: Key(sys.argv[2], {}), build)
 """
 HANG_BEFORE_RENAME = """
-import os, sys, time
+import os, sys
 from pathlib import Path
 from fusesoc_firm.store import Key, Made, Store
-def replace(*_):
+def replace(*_, **__):
     print("in the middle", flush=True)
-    time.sleep(600)
+    sys.stdin.read()
 os.replace = replace
 Store(Path(sys.argv[1]), 2**30).obtain(lambda: Key(sys.argv[2], {}), lambda: Made({"a.vhd": b"whole"}, []))
 """
@@ -283,16 +284,10 @@ def test_one_that_is_stopped_is_not_waited_for_without_end(tmp_path: Path, monke
     process.communicate()
 
 
-class Gone:
+class Gone(io.FileIO):
     """A file that was opened, and removed on another machine before it was read."""
 
-    def __enter__(self) -> Gone:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-    def read(self) -> bytes:
+    def read(self, _: int | None = None) -> bytes:
         raise OSError(errno.ESTALE, "Stale file handle")
 
 
@@ -300,8 +295,8 @@ def test_what_is_gone_while_it_is_read_is_made(tmp_path: Path, monkeypatch: pyte
     obtain(tmp_path)
     real = open
 
-    def open_stale(path: Path | str, mode: str) -> object:
-        return Gone() if str(path).endswith((".entry", ".uses")) else real(path, mode)
+    def open_stale(file: int | str, mode: str, **how: Any) -> object:
+        return Gone(file, **how) if isinstance(file, int) and mode == "rb" else real(file, mode, **how)
 
     with monkeypatch.context() as patch:
         patch.setattr("builtins.open", open_stale)
@@ -336,7 +331,7 @@ def test_kills_at_any_moment(tmp_path: Path) -> None:
         process.kill()
         assert process.communicate()[0] == ""
         for entry in Store(tmp_path, LARGE).entries():
-            assert read_entry(entry.path) is not None
+            assert read_entry(str(tmp_path), entry.name) is not None
 
 
 def test_readers_while_entries_are_removed(tmp_path: Path) -> None:
@@ -352,9 +347,9 @@ def test_readers_while_entries_are_removed(tmp_path: Path) -> None:
 def age(root: Path, request: str, seconds: float) -> None:
     """Let what belongs to a request have been used long ago."""
     entry = next(
-        file.path
+        root / file.name
         for file in Store(root, LARGE).entries()
-        if (found := read_entry(file.path)) and found[0]["core"] == request
+        if (found := read_entry(str(root), file.name)) and found[0]["core"] == request
     )
     for path in (entry, next(root.rglob(f"{request}.uses"))):
         os.utime(path, (time.time() - seconds,) * 2)

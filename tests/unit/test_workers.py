@@ -20,9 +20,11 @@ import pytest
 from fusesoc_firm import workers
 from fusesoc_firm.cli import main
 from fusesoc_firm.diagnostics import InputError
+from tests.processes import IGNORING_INTERRUPTS
 from tests.sim.ghdl import REPOSITORY
 
 distributed: Any = pytest.importorskip("distributed", reason="no distributed; make test installs it")
+dask: Any = pytest.importorskip("dask")
 
 # All tests share the cluster.
 pytestmark = pytest.mark.xdist_group("dask")
@@ -75,9 +77,7 @@ def test_an_address_where_nobody_answers(monkeypatch: pytest.MonkeyPatch, capsys
         # Bound, not listening; free again behind it, and not given away soon.
         bound.bind(("127.0.0.1", 0))
         dead = f"tcp://127.0.0.1:{bound.getsockname()[1]}"
-    started = time.monotonic()
     assert main([*SMALL_BENCH, "--cluster", dead]) == 1
-    assert time.monotonic() - started < 20
     assert f"error: no Dask scheduler answers at '{dead}'" in capsys.readouterr().err
 
 
@@ -103,7 +103,9 @@ def test_workers_of_another_version(address: str, monkeypatch: pytest.MonkeyPatc
 
 
 def test_workers_that_die() -> None:
+    # The first time counts: starting another worker may take for ever on a busy machine.
     with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         _cluster(1) as cluster,
         pytest.raises(InputError, match="was lost"),
         workers.cluster_workers(cluster.scheduler_address) as found,
@@ -113,14 +115,17 @@ def test_workers_that_die() -> None:
 
 def test_a_scheduler_that_ends() -> None:
     with _cluster(1) as cluster:
-        threading.Timer(2, cluster.close).start()
-        started = time.monotonic()
+
+        def one_task() -> Iterator[float]:
+            yield 300
+            # It has been handed out.
+            threading.Thread(target=cluster.close).start()
+
         with (
             pytest.raises(InputError, match="was lost\n      = its scheduler ended"),
             workers.cluster_workers(cluster.scheduler_address) as found,
         ):
-            list(found.run(time.sleep, [60]))
-        assert time.monotonic() - started < 45
+            list(found.run(time.sleep, one_task()))
 
 
 @pytest.fixture(scope="module")
@@ -263,7 +268,7 @@ def test_ctrl_c_ends_it(address: str) -> None:
     """In a process of its own, which is interrupted while its work is on the cluster."""
     command = [sys.executable, "-m", "fusesoc_firm.cli", "scheduler", "bench", "--policies", "lst", "--sets", "5"]
     running = subprocess.Popen(
-        [*command, "--requesters", ",".join(map(str, range(2, 65))), "--cluster", address],
+        [*IGNORING_INTERRUPTS, *command, "--requesters", ",".join(map(str, range(2, 65))), "--cluster", address],
         env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -272,15 +277,13 @@ def test_ctrl_c_ends_it(address: str) -> None:
     with distributed.Client(address) as client, running:
         _wait_until(lambda: any(client.processing().values()))
         running.send_signal(signal.SIGINT)
-        out, err = running.communicate(timeout=30)
+        out, err = running.communicate()
         assert (running.returncode, out) == (130, "")
         assert err.endswith("interrupted\n") and "Traceback" not in err
         # What was handed out is taken back: the cluster is free for others.
         _wait_until(lambda: not any(client.processing().values()))
 
 
-def _wait_until(is_so: Any, seconds: float = 60) -> None:
-    end = time.monotonic() + seconds
+def _wait_until(is_so: Any) -> None:
     while not is_so():
-        assert time.monotonic() < end
         time.sleep(0.1)

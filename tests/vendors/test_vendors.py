@@ -77,7 +77,6 @@ class Project:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=120,
             check=False,
         )
         assert done.returncode == 0, done.stdout
@@ -97,7 +96,6 @@ class Project:
             cwd=self.folder,
             capture_output=True,
             text=True,
-            timeout=60,
             check=False,
         )
 

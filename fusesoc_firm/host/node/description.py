@@ -13,7 +13,6 @@ from fusesoc_firm.host.software import sent_elsewhere, taken_elsewhere, way_to
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import Converter, Topic
 from fusesoc_firm.system.generator import LoadedSystem
 
@@ -134,7 +133,7 @@ def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
     name = frame.message
     return NodeTopic(
         topic.block,
-        topic.given_name or identifier(topic.block),
+        topic.ros_name,
         str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
         int(frame.ros),
         signature(name, definitions),

@@ -12,6 +12,7 @@ from fusesoc_firm.host.node.description import NodeDescription
 from fusesoc_firm.host.node.options import add_node_options, remappings
 from fusesoc_firm.host.node.run import run_node, run_options
 from fusesoc_firm.host.node.transports import at_address
+from fusesoc_firm.interrupts import accept_interrupts
 from fusesoc_firm.system.beside import load_beside
 
 
@@ -20,6 +21,7 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
 
     `specification` is that of a system with software, and `paths` hold its messages, both relative to the `script`.
     """
+    accept_interrupts()
     parser = argparse.ArgumentParser(description=f"The node of the system {description.name}.")
     parser.add_argument("--transport", required=True, metavar="ADDRESS", help="the way to the hardware")
     add_node_options(parser)

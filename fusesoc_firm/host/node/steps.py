@@ -35,7 +35,9 @@ def are_steps(table: Path) -> bool:
     try:
         with table.open(newline="", encoding="utf-8") as file:
             return tuple(next(csv.reader(file), ())) == COLUMNS
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except OSError as error:
+        fail(f"cannot read {table}: {error.strerror}")
+    except (UnicodeDecodeError, csv.Error) as error:
         fail(f"cannot read {table}: {error}")
 
 

@@ -22,6 +22,7 @@ from time import monotonic_ns
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.host.node.description import NodeDescription
+from fusesoc_firm.outputs import check_output
 
 WALL_TIMES = ("received_ns", "queued_ns", "sent_ns", "came_ns", "published_ns")
 CYCLES = ("first_beat_in_cycle", "last_beat_in_cycle", "first_beat_out_cycle", "last_beat_out_cycle")
@@ -72,6 +73,7 @@ class Trace:
 
     def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
         """Begin the file at `path`; `clock` gives ns. Raises `InputError`."""
+        check_output(path)
         try:
             self._file = path.open("w", newline="", encoding="utf-8")
         except OSError as error:

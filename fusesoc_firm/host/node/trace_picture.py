@@ -11,6 +11,7 @@ from typing import Any
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.host.node.trace import COLUMNS
+from fusesoc_firm.outputs import check_output
 from fusesoc_firm.quoting import plot_text
 
 SUFFIXES = (".pdf", ".png", ".svg")
@@ -45,8 +46,7 @@ def draw_trace(table: Path, picture: Path) -> None:
 
     Raises `InputError` for a file that is none, a picture of another kind, and where matplotlib is missing.
     """
-    if picture.suffix not in SUFFIXES:
-        fail(f"'{picture.name}' is no picture that can be drawn", hint=f"legal endings: {', '.join(SUFFIXES)}")
+    check_output(picture, SUFFIXES)
     ways = _ways(table)
     if not ways:
         fail(f"{table} has no message that came back")
@@ -94,7 +94,9 @@ def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:
             if tuple(reader.fieldnames or ()) != COLUMNS:
                 fail(f"{table} is no trace of a node", hint="firm live ... --trace F.csv writes one")
             found = [*reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except OSError as error:
+        fail(f"cannot read {table}: {error.strerror}")
+    except (UnicodeDecodeError, csv.Error) as error:
         fail(f"cannot read {table}: {error}")
     ways: dict[tuple[str, str], list[_Row]] = {}
     for number, row in enumerate(found, start=2):

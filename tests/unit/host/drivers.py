@@ -31,9 +31,7 @@ class Driver:
         self._run(list(arguments), "")
 
     def _run(self, arguments: list[str], text: str) -> str:
-        done = subprocess.run(
-            [self.program, *arguments], input=text, capture_output=True, text=True, timeout=120, check=False
-        )
+        done = subprocess.run([self.program, *arguments], input=text, capture_output=True, text=True, check=False)
         assert done.returncode == 0 and not done.stderr, done.stderr
         return done.stdout
 

@@ -54,7 +54,7 @@ def board(answer: Answer, silence: float = 0.0) -> Iterator[str]:
         yield os.ttyname(theirs)
     finally:
         stop.set()
-        thread.join(20)
+        thread.join()
         os.close(ours)
         os.close(theirs)
 
@@ -131,7 +131,7 @@ def test_a_board_that_is_never_silent_cannot_be_read(node_driver: Driver) -> Non
     thread.start()
     outcome = run(node_driver, [], f"uart:{os.ttyname(theirs)}:115200")
     stop.set()
-    thread.join(20)
+    thread.join()
     os.close(ours)
     os.close(theirs)
     assert outcome.said["error"].endswith("the board is never silent, so nobody knows where frames begin")

@@ -466,12 +466,12 @@ def test_a_trace_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "picture", "message"),
     [
-        ("trace.csv", "ways.gif", "'ways.gif' is no picture that can be drawn"),
+        ("trace.csv", "ways.gif", "ways.gif cannot be written: its name"),
         ("none.csv", "ways.svg", "cannot read "),
         ("other.csv", "ways.svg", "is no trace of a node"),
         ("trace.csv", "ways.svg", "has no message that came back"),
         ("broken.csv", "ways.svg", "broken.csv:2 is no row of a trace"),
-        ("good.csv", "no/ways.svg", "cannot write "),
+        ("good.csv", "no/ways.svg", "/no/ways.svg: there is no folder "),
     ],
 )
 def test_what_cannot_be_drawn_is_told(tmp_path: Path, table: str, picture: str, message: str) -> None:
@@ -540,8 +540,9 @@ def test_what_no_version_knows_is_refused(tmp_path: Path) -> None:
         run_options(*parsed("--ros-args -r a:=b"), description)
 
 
-def test_a_relative_topic_moves_with_the_namespace(tmp_path: Path) -> None:
-    blocks = converter("a", "subscriber", "Point", "z").replace("}\n", ", topic: /arm/left}\n")
-    found = describe(loaded(tmp_path, specification(blocks + converter("z", "publisher", "Point"))))
-    assert [topic.name for topic in (*found.subscribers, *found.publishers)] == ["/arm/left", "z"]
-    assert replace(found.publishers[0], block="a", name="/arm/left") == found.subscribers[0]
+@pytest.mark.parametrize("topic", ["/arm/left", "arm/left"])
+def test_a_relative_topic_moves_with_the_namespace(tmp_path: Path, topic: str) -> None:
+    blocks = converter("a", "subscriber", "Point", "out").replace("}\n", f", topic: {topic}}}\n")
+    found = describe(loaded(tmp_path, specification(blocks + converter("out", "publisher", "Point"))))
+    assert [topic.name for topic in (*found.subscribers, *found.publishers)] == [topic, "out"]
+    assert replace(found.publishers[0], block="a", name=topic) == found.subscribers[0]

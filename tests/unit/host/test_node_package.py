@@ -79,12 +79,12 @@ def test_the_table_of_a_node_for_ros_2() -> None:
     assert "include/firm/ros2.hpp" in files and "include/firm/ros1.hpp" not in files
 
 
-def test_a_topic_of_its_own_name_keeps_it(tmp_path: Path) -> None:
-    text = specification(
-        loop("point", "Point", "ROS").replace("mode: subscriber", "topic: /arm/left, mode: subscriber")
-    )
-    source = cpp_package(written(tmp_path, text))["src/robot_node.cpp"]
-    assert [row[1] for row in rows(source)] == ["/arm/left", "point_out"]
+@pytest.mark.parametrize("topic", ["/arm/left", "arm/left", "groundtruth"])
+def test_a_topic_of_its_own_name_keeps_it(tmp_path: Path, topic: str) -> None:
+    """ROS resolves a relative one; a block's name is one, also where VHDL would not have it."""
+    text = specification(loop("point", "Point", "ROS").replace("mode: subscriber", f"topic: {topic}, mode: subscriber"))
+    source = cpp_package(written(tmp_path, text.replace("point_out", "out")))["src/robot_node.cpp"]
+    assert [row[1] for row in rows(source)] == [topic, "out"]
 
 
 def test_the_files_say_nothing_of_when_and_where(tmp_path: Path) -> None:

@@ -207,9 +207,9 @@ def test_threads_lose_nothing() -> None:
     for thread in (*writers, reader):
         thread.start()
     for thread in writers:
-        thread.join(20)
+        thread.join()
     queues.close()
-    reader.join(20)
+    reader.join()
     assert found == [[*range(items)]] * subscribers
 
 
@@ -230,7 +230,7 @@ def test_a_writer_that_waits_is_told_of_the_end() -> None:
     writer = threading.Thread(target=write, daemon=True)
     writer.start()
     queues.close()
-    writer.join(20)
+    writer.join()
     assert told.is_set()
     assert [*queues] == [(0, 1)]
 
@@ -242,7 +242,7 @@ def test_times_are_kept() -> None:
         queues.get(0.05)
     queues.put(0, 1)
     assert not queues.put(0, 2, 0.05)
-    assert 0.1 <= time.monotonic() - begun < 10
+    assert time.monotonic() - begun >= 0.1
 
 
 def test_illegal_numbers_are_named() -> None:

@@ -249,7 +249,8 @@ def test_no_list_of_messages(tmp_path: Path, text: str, message: str) -> None:
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"error: there are no stimuli at .*nowhere\.yaml"):
+    message = r"error: there are no stimuli at .*nowhere\.yaml\n.*list of messages: '- \w+: \{<field>"
+    with pytest.raises(InputError, match=message):
         read_stimuli(tmp_path / "nowhere.yaml", SUBSCRIBERS)
 
 

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.pictures import picture
 from fusesoc_firm.system.diagram import diagram
 from fusesoc_firm.system.generator import load_system
 from fusesoc_firm.system.report import Report, report
@@ -35,7 +36,7 @@ needs_dot = pytest.mark.skipif(not shutil.which("dot"), reason="no dot; make tes
 
 
 def test_the_diagram_has_every_block_and_connection(tmp_path: Path) -> None:
-    text = diagram(derived(tmp_path, TEXT), "dot")
+    text = diagram(derived(tmp_path, TEXT))
     edges = re.findall(r'"block (\w+)" -> "block (\w+)"', text)
     assert edges == [("sub", "acc"), ("sub", "copy"), ("acc", "pub"), ("image_in", "image_out")]
     for what in ("geometry_msgs/Point\n192 bits", "mix (VHDL)", "id 2", "streams of 8 bits", "streams: ", "ROS 1"):
@@ -44,16 +45,16 @@ def test_the_diagram_has_every_block_and_connection(tmp_path: Path) -> None:
 
 @needs_dot
 def test_the_picture_is_the_same_each_time(tmp_path: Path) -> None:
-    picture = diagram(derived(tmp_path, TEXT), "svg")
-    assert picture == diagram(derived(tmp_path, TEXT), "svg")
-    labels = [element.text for element in ET.fromstring(picture).iter() if element.tag.endswith("}text")]
+    found = picture(diagram(derived(tmp_path, TEXT)), "svg")
+    assert found == picture(diagram(derived(tmp_path, TEXT)), "svg")
+    labels = [element.text for element in ET.fromstring(found).iter() if element.tag.endswith("}text")]
     assert {"sub", "acc", "mix (VHDL)", "sensor_msgs/Image"} <= set(labels)
 
 
 def test_missing_graphviz_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(InputError, match="apt install graphviz"):
-        diagram(derived(tmp_path, TEXT), "svg")
+        picture(diagram(derived(tmp_path, TEXT)), "svg")
 
 
 def test_lines_are_counted(tmp_path: Path) -> None:

@@ -480,7 +480,7 @@ def test_without_software_nothing_is_shown_of_it(tmp_path: Path) -> None:
 
 def test_the_diagram_has_software_outside_of_the_fpga(tmp_path: Path) -> None:
     system = derived(tmp_path, specification(row("soft", "hard", "soft"), TYPES))
-    text = diagram(system, "dot").replace("\\n", "\n")
+    text = diagram(system).replace("\\n", "\n")
     fpga = text[text.index("subgraph cluster_fpga") : text.index("\t}")]
     for block in ("b1", "b0_out", "b2_in"):
         assert f'"block {block}" [' in fpga

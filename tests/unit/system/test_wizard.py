@@ -46,23 +46,24 @@ class Answers:
         return not any(self._answers.values())
 
 
-def turner() -> Answers:
-    """A system of a subscriber, an accelerator and a publisher."""
-    return Answers(
-        name=["turn", "turner", "sub", "acc", "acc", "pub", "pub"],
-        width=["16"],
-        add_to_accelerators=["yes"],
-        type=["VHDL", "", "turner", ""],
-        sources=["acc.vhd"],
-        add_to_input=["yes"],
-        add_to_output=["yes"],
-        middleware=["ROS", "ROS", "ROS", "ROS"],
-        message=[POINT, VECTOR, POINT, VECTOR],
-        mode=["subscriber", "publisher"],
-        add_to_blocks=["yes", "yes"],
-        add_to_outgoing=["yes", "no", "yes", "no"],
-        period=["500"],
-    )
+def turner(**others: list[str]) -> Answers:
+    """A system of a subscriber, an accelerator and a publisher; some questions get `others` as answers."""
+    answers = {
+        "name": ["turn", "turner", "sub", "acc", "acc", "pub", "pub"],
+        "width": ["16"],
+        "add_to_accelerators": ["yes"],
+        "type": ["VHDL", "", "turner", ""],
+        "sources": ["acc.vhd"],
+        "add_to_input": ["yes"],
+        "add_to_output": ["yes"],
+        "middleware": ["ROS", "ROS", "ROS", "ROS"],
+        "message": [POINT, VECTOR, POINT, VECTOR],
+        "mode": ["subscriber", "publisher"],
+        "add_to_blocks": ["yes", "yes"],
+        "add_to_outgoing": ["yes", "no", "yes", "no"],
+        "period": ["500"],
+    }
+    return Answers(**{**answers, **others})
 
 
 def run(path: Path, answers: Answers) -> str:
@@ -186,6 +187,62 @@ def test_a_specification_that_is_there_is_extended(tmp_path: Path) -> None:
     assert "# my blocks" in text and "0x10" in text
     added = [line.strip() for line in text.splitlines() if line not in before.splitlines()]
     assert added == ["- name: copy", "- name: copy"]
+
+
+def test_answers_read_well(tmp_path: Path) -> None:
+    """A word, a list on one line, and double quotes only where a word would be something else without them."""
+    answers = turner(
+        name=["0x10", "turner", "on", "acc", "acc", "a, b", "a, b"],
+        sources=["rtl/turn.vhd"],
+        one_more_of_sources=["007", "rtl/three.vhd"],
+        include=["x", "y"],
+        fpgaPart=["007"],
+        clock=["100 MHz"],
+    )
+    text = run(tmp_path / "robot.yaml", answers)
+    for line in (
+        'name: "0x10" # the system\'s name; the top level is <name>_system',
+        'fpgaPart: "007" # the FPGA\'s part number',
+        "clock: 100 MHz # frequency",
+        "width: 16 # bits",
+        'sources: [rtl/turn.vhd, "007", rtl/three.vhd] # its source files',
+        "include: x # only these fields",
+        "include: y\n",
+        '- name: "on"\n',
+        '- name: "a, b"\n',
+    ):
+        assert line in text, line
+    # An answer after the second is asked for as the second is.
+    assert max(question.name.count("one more of") for question in answers.asked) == 1
+
+
+@pytest.mark.parametrize(("item", "dash"), [(2, 0), (4, 2), (6, 3)])
+def test_a_specification_that_is_there_keeps_its_quotes_and_lists(tmp_path: Path, item: int, dash: int) -> None:
+    """Only what is new is another line, and it stands as far in as its neighbours."""
+    path = tmp_path / "robot.yaml"
+    first, rest = f"{' ' * dash}-{' ' * (item - dash - 1)}", " " * item
+    before = f"""project: {{name: "turn", 'clock': '100 MHz'}}
+blocks:
+{first}name: "sub"
+{rest}middleware: 'ROS'
+{rest}mode: subscriber
+{rest}message: {POINT}
+{rest}outgoing: [{{name: "pub"}}]
+{first}{{name: pub, middleware: ROS, mode: publisher, message: "{POINT}"}}
+"""
+    path.write_text(before, encoding="utf-8")
+    answers = Answers(
+        name=["copy", "copy"],
+        add_to_blocks=["yes"],
+        middleware=["ROS"],
+        mode=["publisher"],
+        message=[POINT],
+        block=["sub"],
+        add_to_outgoing=["no", "yes"],
+    )
+    text = run(path, answers)
+    new = f"{first}name: copy\n{rest}middleware: ROS\n{rest}mode: publisher\n{rest}message: {POINT}\n"
+    assert text == before.replace('[{name: "pub"}]', '[{name: "pub"}, {name: copy}]') + new
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,72 @@
+"""What tests/conftest.py promises: what tests start listens to SIGINT, and none of them waits for ever."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.processes import IGNORING_INTERRUPTS
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+WAITING = """
+import subprocess, sys, threading
+import pytest
+
+@pytest.fixture
+def slow_fixture():
+    threading.Event().wait()
+
+def test_process():
+    child = subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE)
+    child.wait()
+
+def test_thread():
+    threading.Event().wait()
+
+def test_fixture(slow_fixture):
+    pass
+
+def test_work():
+    code = "import time\\nwhile time.process_time() < 3: pass"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+def test_default():
+    import signal
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    code = "import signal; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    assert subprocess.check_output([sys.executable, "-c", code]) == b"True\\n"
+
+@pytest.mark.thorough
+def test_thorough():
+    import time
+    time.sleep(4)
+"""
+
+
+def test_a_run_that_inherits_an_ignored_interrupt(tmp_path: Path) -> None:
+    (tmp_path / "test_waiting.py").write_text(WAITING)
+    (tmp_path / "pytest.ini").write_text("[pytest]\nwaiting_limit = 2\nmarkers = thorough\n")
+    options = ["-p", "tests.conftest", "-p", "no:cacheprovider", "-p", "no:xdist", "-rA", "--tb=line"]
+    done = subprocess.run(
+        [*IGNORING_INTERRUPTS, sys.executable, "-m", "pytest", *options],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    print(done.stdout, done.stderr)
+    results = {
+        line.split("::")[1].split()[0]: line.split()[0] for line in done.stdout.splitlines() if "::test_" in line
+    }
+    assert results == {
+        "test_process": "FAILED",
+        "test_thread": "FAILED",
+        "test_fixture": "ERROR",
+        "test_work": "PASSED",
+        "test_default": "PASSED",
+        "test_thorough": "PASSED",
+    }
+    assert "neither the test nor a process below it has done anything for 2 s" in done.stdout
