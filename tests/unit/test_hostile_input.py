@@ -34,8 +34,8 @@ from fusesoc_firm.system.specification import read_specification
 from fusesoc_firm.yaml_text import yaml_data
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
-# Seconds of the processor that a child has; each takes one or two.
-_TIME = 60
+# Seconds of the processor that a child has; each takes one or two. One that waits for ever is ended, too.
+_TIME = 20
 
 
 def limited(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -45,6 +45,7 @@ def limited(*arguments: str) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         check=False,
+        timeout=4 * _TIME,
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (_TIME, _TIME)),
     )
 
