@@ -84,7 +84,7 @@ def write_library(folder: Path, cores: int) -> None:
             'filesets: {base: {depend: ["robot:firm:generators"]}}',
             "generate:",
             *(
-                f"  {name}: {{generator: firm, parameters: {{message: {message}, ros: 2, width: {width}}}}}"
+                f"  {name}: {{generator: firm, parameters: {{message: {message}, ros: 2, width: {width}, name: {name}}}}}"
                 for name, (message, width) in instances.items()
             ),
             "targets:",
