@@ -84,8 +84,8 @@ def write_library(folder: Path, cores: int) -> None:
             'filesets: {base: {depend: ["robot:firm:generators"]}}',
             "generate:",
             *(
-                f"  {name}: {{generator: firm, parameters: {{message: {message}, ros: 2, width: {width}, name: {name}}}}}"
-                for name, (message, width) in instances.items()
+                f"  {name}: {{generator: firm, parameters: {{name: {name}, message: {message}, ros: 2, width: {bits}}}}}"
+                for name, (message, bits) in instances.items()
             ),
             "targets:",
             f"  default: {{filesets: [base], generate: [{', '.join(instances)}], {_FLOW}}}",
