@@ -53,16 +53,20 @@ def clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
 
 def note_units(folder: str, core: str, units: Mapping[str, str], run: str) -> None:
     """Leave a generated core's units in its folder, for the calls after it."""
-    if units:
+    if units and _is_generated(os.path.abspath(folder)):
         lines = [run, core, *(f"{digest} {unit}" for unit, digest in units.items())]
         write_whole(os.path.join(folder, _FILE), "\n".join(lines).encode())
 
 
+def _is_generated(folder: str) -> bool:
+    return os.path.basename(os.path.dirname(folder)) == _GENERATED
+
+
 def _others(folder: str, run: str) -> Iterator[tuple[str, dict[str, str]]]:
     """Core and units of every call of the run but that of `folder`, in the order of their folders' names."""
-    generated = os.path.dirname(folder)
-    if os.path.basename(generated) != _GENERATED:
+    if not _is_generated(folder):
         return
+    generated = os.path.dirname(folder)
     try:
         names = sorted(os.listdir(generated))
     except OSError:

@@ -14,6 +14,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
+# Of a file that is none of ours at all, each line is a fault.
+_MOST_SHOWN = 200
 # Characters of a line that are shown around a fault, and of a word that is shown whole.
 _WIDEST = 200
 _LONG_WORD = re.compile(r"\S{500,}")
@@ -81,7 +83,10 @@ class InputError(Exception):
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(diagnostics)
-        super().__init__("\n".join(str(d) for d in self.diagnostics))
+        lines = [str(diagnostic) for diagnostic in self.diagnostics[:_MOST_SHOWN]]
+        if len(self.diagnostics) > _MOST_SHOWN:
+            lines.append(f"and {len(self.diagnostics) - _MOST_SHOWN} more")
+        super().__init__("\n".join(lines))
 
 
 @dataclass
@@ -90,11 +95,13 @@ class Diagnostics:
 
     found: list[Diagnostic] = field(default_factory=list)
     warned: list[Diagnostic] = field(default_factory=list)
+    _known: set[Diagnostic] = field(default_factory=set, repr=False)
 
     def error(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
         """Note a fault and go on; the same fault at the same place is noted once."""
         diagnostic = Diagnostic(message, source, hint)
-        if diagnostic not in self.found:
+        if diagnostic not in self._known:
+            self._known.add(diagnostic)
             self.found.append(diagnostic)
 
     def warn(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:

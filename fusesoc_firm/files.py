@@ -5,6 +5,7 @@ Of Python's library no more is imported than a file needs, as an answer out of t
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from contextlib import suppress
@@ -68,3 +69,28 @@ def read_file(path: str | os.PathLike[str]) -> bytes | None:
             os.close(handle)
     except OSError:
         return None
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a regular file is there; a path that no file can have, such as one that is too long, is none."""
+    return os.path.isfile(path)
+
+
+def read_regular(path: str | os.PathLike[str], most: int) -> bytes:
+    """The content of a regular file of at most `most` bytes.
+
+    Raises `OSError`, with its reason, for anything else: to open a FIFO would wait for its writer, and a device may
+    never end.
+    """
+    with open(path, "rb", opener=_open_at_once) as file:
+        mode = os.fstat(file.fileno()).st_mode
+        if not stat.S_ISREG(mode):
+            raise OSError(errno.EINVAL, "it is not a regular file", os.fspath(path))
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"it is larger than {most} bytes", os.fspath(path))
+    return data
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

@@ -32,6 +32,7 @@ from fusesoc_firm.requesting_core import find_requesting_core
 from fusesoc_firm.store import Call as StoredCall
 from fusesoc_firm.store import Entry, Files, Key, Made, default_store, request_digest
 from fusesoc_firm.tools import explanation, missing, simulation_programs
+from fusesoc_firm.yaml_text import yaml_data
 
 # The generator of cores that carry messages.
 MESSAGES = "firm_messages"
@@ -295,10 +296,10 @@ def read_request(command: str, path: Path, generator: Generator, *, is_this_run:
     Raises `InputError`.
     """
     try:
-        call: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+        call: dict[str, Any] = yaml_data(path.read_text(encoding="utf-8"))
         vlnv, files_root = str(call["vlnv"]), Path(call["files_root"])
         given = call.get("parameters") or {}
-    except (OSError, yaml.YAMLError, KeyError, TypeError) as error:
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
         fail(f"{path} is no file of FuseSoC's generator call: {error}")
 
     def beside(names: MessageCores) -> tuple[Path, ...]:

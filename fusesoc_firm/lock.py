@@ -18,6 +18,7 @@ import yaml
 
 from fusesoc_firm.converter.generator import library_sources, order_of_request
 from fusesoc_firm.diagnostics import Diagnostics, fail
+from fusesoc_firm.files import read_regular
 from fusesoc_firm.generation import Request
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MessageName
@@ -26,6 +27,7 @@ from fusesoc_firm.project import ProjectCore
 from fusesoc_firm.reads import Input
 from fusesoc_firm.system.generator import load_requested
 from fusesoc_firm.tools import facts_of, installed_programs, packages
+from fusesoc_firm.yaml_text import LARGE, yaml_data
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """By kind (`messages`, `cores`, `tools`) and name: facts by name."""
@@ -70,7 +72,7 @@ def lock_text(lock: Lock) -> str:
 def read_lock(path: Path) -> Lock:
     """A lock file. Raises `InputError` if it cannot be read or is none."""
     try:
-        data: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+        data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
         return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
     except OSError as error:
         fail(f"cannot read {path}: {error.strerror}", hint="firm lock writes it")

@@ -16,6 +16,7 @@ import yaml
 
 from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.render import render
+from fusesoc_firm.yaml_text import yaml_data
 
 GRAPH_TEMPLATE = "dot/cores.dot"
 
@@ -219,8 +220,8 @@ def _names(path: Path | str) -> list[str]:
 
 def _data(path: Path) -> dict[str, Any]:
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8").removeprefix("CAPI=2:"))
-    except (OSError, yaml.YAMLError) as error:
+        data = yaml_data(path.read_text(encoding="utf-8").removeprefix("CAPI=2:"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
         fail(f"cannot read {path}: {error}")
     return data if isinstance(data, dict) else {}
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -16,7 +17,7 @@ import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, closest, nearest
 from fusesoc_firm.naming import text_fault
-from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind
+from fusesoc_firm.yaml_text import Text, YamlText, integer, is_null, items, kind
 
 # What is wrong with a text, and what is legal; None if nothing is.
 TextRule = Callable[[str], tuple[str, str] | None]
@@ -178,7 +179,9 @@ class _Reader:
 
     def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
-            return int(yaml.safe_load(node.value))
+            # The tag may have been written there, of whatever.
+            with suppress(ValueError):
+                return integer(node.value)
         self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
         return None
 

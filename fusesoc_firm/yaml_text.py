@@ -2,6 +2,9 @@
 
 PyYAML's own nodes hold the marks; here they become `SourceRef`s, and what a reader takes out of a file stays
 tied to its place: `Text` is a string that knows it.
+
+A file is bounded in bytes, levels and nodes before it is made into anything, as a few lines of aliases could mean more
+than any memory holds.
 """
 
 from __future__ import annotations
@@ -11,10 +14,16 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, byte_place, fail
+from fusesoc_firm.files import read_regular
+
+MOST_LEVELS = 64
+LONGEST_NUMBER = 40
+"""Characters of a number. Python itself refuses to read one of thousands of digits, with a `ValueError`."""
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
@@ -24,6 +33,55 @@ _INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", 
 _BLOCK_BEGIN = re.compile(r" *(-(?= )|[^\s#:-][^\s:]*)")
 # The ends of lines that PyYAML counts.
 _LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """How large a file may be; an alias counts as what it stands for."""
+
+    bytes: int
+    nodes: int
+
+
+SMALL = Bounds(2**20, 50_000)
+"""A specification, a configuration, a board, a core."""
+LARGE = Bounds(2**26, 5_000_000)
+"""Data, such as stimuli with images."""
+
+
+class TooLargeError(Exception):
+    """A text is beyond its bounds: it has more than `what`, at `mark`."""
+
+    def __init__(self, what: str, mark: yaml.Mark) -> None:
+        super().__init__(f"more than {what}")
+        self.mark = mark
+
+
+class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
+    """Makes nodes of a parser's events, and raises `TooLargeError` at the first one beyond the bounds."""
+
+    def __init__(self, parser: Any, bounds: Bounds) -> None:
+        yaml.composer.Composer.__init__(self)
+        yaml.resolver.Resolver.__init__(self)
+        self.check_event, self.peek_event, self.get_event = parser.check_event, parser.peek_event, parser.get_event
+        self._bounds = bounds
+        self._nodes = self._level = 0
+        # The nodes within each anchor.
+        self._sizes: dict[str, int] = {}
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event, before = self.peek_event(), self._nodes
+        self._nodes += self._sizes.get(event.anchor or "", 1) if isinstance(event, yaml.AliasEvent) else 1
+        self._level += 1
+        if self._level > MOST_LEVELS:
+            raise TooLargeError(f"{MOST_LEVELS} levels", event.start_mark)
+        if self._nodes > self._bounds.nodes:
+            raise TooLargeError(f"{self._bounds.nodes} values", event.start_mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._level -= 1
+        if event.anchor and not isinstance(event, yaml.AliasEvent):
+            self._sizes[event.anchor] = self._nodes - before
+        return node
 
 
 class Text(str):
@@ -64,8 +122,10 @@ class YamlText:
         return Text(str(node.value), self.source(node))
 
 
-def read_yaml(path: Path, file: str | None = None, faults: Diagnostics | None = None) -> YamlText:
-    """Read a file, called `file` in messages.
+def read_yaml(
+    path: Path, file: str | None = None, faults: Diagnostics | None = None, bounds: Bounds = SMALL
+) -> YamlText:
+    """Read a file within `bounds`, called `file` in messages.
 
     Raises `InputError` if it cannot be read or is no YAML. With `faults`, what is no YAML is noted there, and what
     stands above it is returned.
@@ -73,25 +133,28 @@ def read_yaml(path: Path, file: str | None = None, faults: Diagnostics | None = 
     name = file or str(path)
     try:
         # Some editors put a byte order mark in front.
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_regular(path, bounds.bytes).decode("utf-8-sig")
     except OSError as error:
         fail(f"cannot read {name}: {error.strerror}")
     except UnicodeDecodeError as error:
         fail(f"byte 0x{error.object[error.start]:02x} is not UTF-8", byte_place(name, error.object, error.start))
     noted = Diagnostics() if faults is None else faults
-    read = parse_yaml(text, name, noted)
+    read = parse_yaml(text, name, noted, bounds)
     if faults is None:
         noted.raise_if_any()
     return read
 
 
-def parse_yaml(text: str, file: str, faults: Diagnostics) -> YamlText:
+def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL) -> YamlText:
     """The nodes of a YAML text; where it stops being YAML is noted, and what stands above is kept."""
     lines = tuple(_LINE_END.split(text.rstrip()))
     _note_control_characters(text, file, faults)
     text = _CONTROL_CHARACTERS.sub(_REPLACEMENT, text)
     try:
-        return YamlText(file, lines, yaml.compose(text, Loader=yaml.SafeLoader))
+        return YamlText(file, lines, _composed(text, bounds))
+    except TooLargeError as error:
+        line, column = error.mark.line, error.mark.column
+        fail(f"the file is too large: {error}", SourceRef(file, line + 1, column + 1, lines[line]))
     except yaml.MarkedYAMLError as error:
         _note_syntax(error, file, lines, faults)
         return YamlText(file, lines, _composed_above(error, text.splitlines(keepends=True)), is_cut=True)
@@ -153,13 +216,51 @@ def _block_begins(line: str) -> Iterator[tuple[int, str]]:
         position = found.end()
 
 
+def _composed(text: str, bounds: Bounds = SMALL) -> yaml.Node | None:
+    """The root node of a text. Raises `yaml.MarkedYAMLError`, in the words of Python's own parser."""
+    with suppress(yaml.YAMLError):
+        return _composed_by(getattr(yaml, "CSafeLoader", yaml.SafeLoader), text, bounds)
+    return _composed_by(yaml.SafeLoader, text, bounds)
+
+
+def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
+    """By one of PyYAML's parsers; that of libyaml is much faster, but does not say as well what is wrong."""
+    parser = loader(text)
+    try:
+        node: yaml.Node | None = _Composer(parser, bounds).get_single_node()
+        return node
+    finally:
+        parser.dispose()
+
+
 def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
     """The root node of the lines above a fault or, if it lies in something still open, above that; None without any."""
     for mark in (error.problem_mark, error.context_mark):
         if mark is not None:
-            with suppress(yaml.YAMLError):
-                return yaml.compose("".join(lines[: mark.line]), Loader=yaml.SafeLoader)
+            with suppress(yaml.YAMLError, TooLargeError):
+                return _composed("".join(lines[: mark.line]))
     return None
+
+
+def integer(text: str) -> int:
+    """The integer that a plain scalar means to YAML, of at most `LONGEST_NUMBER` characters. Raises `ValueError`."""
+    if len(text) > LONGEST_NUMBER:
+        raise ValueError(f"more than {LONGEST_NUMBER} characters")
+    value = yaml.safe_load(text)
+    if type(value) is not int:
+        raise ValueError(f"'{text}' is not an integer")
+    return value
+
+
+def yaml_data(text: str) -> Any:
+    """What a text means: mappings, lists and scalars. Raises `yaml.YAMLError` for whatever means nothing."""
+    try:
+        constructor = yaml.SafeLoader("")
+        root = _composed(text, LARGE)
+        return None if root is None else constructor.construct_document(root)
+    except (ValueError, TypeError, LookupError, OverflowError, TooLargeError) as error:
+        # A number of thousands of digits or of none, a date that is none, a key that is a list.
+        raise yaml.YAMLError(str(error)) from error
 
 
 def is_null(node: yaml.Node) -> bool:

@@ -22,6 +22,8 @@ from hypothesis import settings
 
 from fusesoc_firm.interrupts import accept_interrupts
 
+pytest_plugins = ["tests.time_report"]
+
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
 

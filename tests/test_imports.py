@@ -28,12 +28,12 @@ ALLOWED: dict[str, set[str]] = {
     "naming": set(),
     "wire": set(),
     # It reads bags in part.
-    "message": _WIRE | {"reads"},
+    "message": _WIRE | {"files", "reads"},
     "frame": _MESSAGE,
     "converter": _FRAME | _WRITING | _READING,
     # It knows requesters, not systems.
     "scheduling": {"diagnostics", "outputs", "workers"},
-    "system": _CONVERTER | {"outputs", "prompts", "scheduling"},
+    "system": _CONVERTER | {"files", "outputs", "prompts", "scheduling"},
     # It builds simulators of systems, by FuseSoC and with the library.
     "host": _SYSTEM | {"files", "interrupts", "library_path", "outputs", "store_files", "tools"},
     "replay": _SYSTEM | {"host"},
@@ -56,8 +56,8 @@ ALLOWED: dict[str, set[str]] = {
     "recall": {"design_units", "files", "message_runs", "own_code", "store_files"},
     "message_core": _MESSAGE | {"generation", "message_runs"},
     "why": _SYSTEM,
-    "lock": _SYSTEM | {"project", "tools"},
-    "project": {"diagnostics", "render"},
+    "lock": _SYSTEM | {"files", "project", "tools"},
+    "project": {"diagnostics", "render", "yaml_text"},
     # It knows FuseSoC, and generators only as FuseSoC calls them.
     "building": {"diagnostics", "generation", "workers"},
     "store": {"diagnostics", "files", "recall", "shared_files", "store_files"},
@@ -66,7 +66,7 @@ ALLOWED: dict[str, set[str]] = {
     "tools": {"own_code"},
     "manifest": {"tools"},
     "launcher": {"diagnostics", "interrupts", "manifest", "tools"},
-    "yaml_text": {"diagnostics"},
+    "yaml_text": {"diagnostics", "files"},
     "yaml_sections": _WORDS | {"yaml_text"},
     "yaml_schema": {"yaml_sections"},
     "prompts": {"diagnostics"},

@@ -66,11 +66,10 @@ def _split(text: str) -> tuple[Path, int | None]:
 
 def _generator(call: Path) -> str:
     """The generator that a call is for: FuseSoC does not write it down."""
-    import yaml
-
     from fusesoc_firm.gapi import MESSAGES
+    from fusesoc_firm.yaml_text import yaml_data
 
-    given = yaml.safe_load(call.read_text(encoding="utf-8")).get("parameters") or {}
+    given = yaml_data(call.read_text(encoding="utf-8")).get("parameters") or {}
     if "spec" in given:
         return "far"
     return "firm" if {"message", "config"} & given.keys() else MESSAGES

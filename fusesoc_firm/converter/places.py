@@ -6,6 +6,7 @@ a stream, padding, the end of an element. A publisher goes from place to place a
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -72,7 +73,7 @@ class Places:
         """Every `Close`, with the place at which the element ends: the last word in front of it, or its own."""
         steps = self.program.steps
         return tuple(
-            (step, max(area.last for area in self.areas if area.number <= number))
+            (step, self.areas[bisect_right(self._area_numbers, number) - 1].last)
             for number, step in enumerate(steps)
             if isinstance(step, Close)
         )
@@ -100,7 +101,12 @@ class Places:
 
     def _place(self, number: int) -> int:
         """Where step `number` begins, or the next one that has a place."""
-        return next((area.first for area in self.areas if area.number >= number), self.end)
+        index = bisect_left(self._area_numbers, number)
+        return self.areas[index].first if index < len(self.areas) else self.end
+
+    @cached_property
+    def _area_numbers(self) -> list[int]:
+        return [area.number for area in self.areas]
 
     def _behind(self, area: Area) -> int:
         number = self.program.behind_guard(area.number) if isinstance(area.step, Guard) else area.number
@@ -119,7 +125,12 @@ class Places:
         return 0
 
     def _is_guarded(self, part: Data | Loop) -> bool:
-        return any(isinstance(step, Guard) and step.part is part for step in self.program.steps)
+        return id(part) in self._guarded
+
+    @cached_property
+    def _guarded(self) -> frozenset[int]:
+        """The identities of the parts that have a guard."""
+        return frozenset(id(step.part) for step in self.program.steps if isinstance(step, Guard))
 
     def _rows(self, step: Step, place: int) -> Iterator[Row]:
         """The bytes of a step in words, many of zeros in one word."""

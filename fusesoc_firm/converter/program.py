@@ -18,13 +18,14 @@ and for `Close`, which `Program` leads elsewhere.
 from __future__ import annotations
 
 import struct
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 from fusesoc_firm.frame.defaults import default_elements
-from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Run
+from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Path, Run
 from fusesoc_firm.frame.values import dotted, units_of
 
 # The loops around a step, the outermost first.
@@ -151,22 +152,19 @@ class Program:
 
     def segments(self, scope: Scope = ()) -> int:
         """How many segments the message has, or the element of the innermost loop of `scope`."""
-        return len([found for found in self._completed if found.scope == scope])
+        return self._completed[_path(scope)]
 
     @cached_property
-    def _completed(self) -> tuple[Segment, ...]:
+    def _completed(self) -> Counter[Path]:
+        """How many segments each scope has, by its path."""
         steps = (step for step in self.steps if isinstance(step, Header | Block | Open))
-        return tuple(step.completes for step in steps if step.completes)
+        return Counter(_path(step.completes.scope) for step in steps if step.completes)
 
     def behind_guard(self, number: int) -> int:
         """Where a `Guard` leads if its part is empty: to its `Open`."""
         guard = self.steps[number]
         assert isinstance(guard, Guard)
-        return next(
-            place
-            for place, step in enumerate(self.steps)
-            if place > number and isinstance(step, Open) and step.part is guard.part
-        )
+        return self._openings[id(guard.part)]
 
     def behind(self, number: int) -> int:
         """Where an `Open` leads if its part is empty."""
@@ -174,17 +172,28 @@ class Program:
         assert isinstance(opening, Open)
         if isinstance(opening.part, Data):
             return number + 2
-        closing = (
-            p for p, s in enumerate(self.steps) if isinstance(s, Close) and s.loop is opening.part and p > number
-        )
-        return next(closing, number) + 1
+        return self._closings.get(id(opening.part), number) + 1
 
     def body(self, number: int) -> int:
         """Where a `Close` leads if another element follows."""
         closing = self.steps[number]
         assert isinstance(closing, Close)
-        opening = (p for p, s in enumerate(self.steps) if isinstance(s, Open) and s.part is closing.loop and p < number)
-        return next(opening) + 1
+        return self._openings[id(closing.loop)] + 1
+
+    @cached_property
+    def _openings(self) -> dict[int, int]:
+        """The place of the `Open` of each part, by the part's identity: to compare parts is to compare all in them."""
+        return {id(step.part): place for place, step in enumerate(self.steps) if isinstance(step, Open)}
+
+    @cached_property
+    def _closings(self) -> dict[int, int]:
+        """The place of the `Close` of each loop, by its identity."""
+        return {id(step.loop): place for place, step in enumerate(self.steps) if isinstance(step, Close)}
+
+
+def _path(scope: Scope) -> Path:
+    """The path of the innermost loop."""
+    return scope[-1].path if scope else ()
 
 
 def subscriber_program(frame: Frame) -> Program:

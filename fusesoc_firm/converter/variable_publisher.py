@@ -332,23 +332,37 @@ class _Publisher:
         }
 
     def _depth_of(self, loop: Loop) -> int:
-        return next(len(close.scope) for close, _ in self._closings if close.loop is loop)
+        return self._depths[id(loop)]
 
-    def _loops(self, depth: int) -> list[Loop]:
-        return [close.loop for close, _ in self._closings if len(close.scope) == depth]
+    @cached_property
+    def _depths(self) -> dict[int, int]:
+        """How many loops are around the elements of each loop, itself included; by its identity."""
+        return {id(close.loop): len(close.scope) for close, _ in self._closings}
 
     def _depth_bits(self, depth: int) -> int:
         """Bits of the counter for the elements of loops with `depth` - 1 others around."""
-        counts = (loop.count for loop in self._loops(depth))
-        return max(_COUNTER_BITS if count is None else count.bit_length() for count in counts)
+        return self._bits_of_depths[depth]
+
+    @cached_property
+    def _bits_of_depths(self) -> dict[int, int]:
+        bits: dict[int, int] = {}
+        for close, _ in self._closings:
+            count, depth = close.loop.count, len(close.scope)
+            bits[depth] = max(bits.get(depth, 0), _COUNTER_BITS if count is None else count.bit_length())
+        return bits
 
     def _elements_end(self, depth: int) -> str:
         return f"elements_{depth}_sum({self._depth_bits(depth)})"
 
     def _depth(self, depth: int) -> Configuration:
-        loops, bits = self._loops(depth), self._depth_bits(depth)
-        counts = [area for area in self._counts if any(_part(area) is loop for loop in loops)]
-        opens = [(area.first, loop.count) for area in self._opens for loop in loops if _part(area) is loop]
+        bits = self._depth_bits(depth)
+        own = {id(close.loop) for close, _ in self._closings if len(close.scope) == depth}
+        counts = [area for area in self._counts if id(_part(area)) in own]
+        opens = [
+            (area.first, part.count)
+            for area in self._opens
+            if isinstance(part := _part(area), Loop) and id(part) in own
+        ]
         return {
             "depth": depth,
             "high": bits - 1,

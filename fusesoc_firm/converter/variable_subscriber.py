@@ -48,7 +48,7 @@ from fusesoc_firm.converter.steps import (
 )
 from fusesoc_firm.converter.storing import joints
 from fusesoc_firm.converter.stream import Store, StoreMap, Stream, ranges, stores_of
-from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop
+from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop, Path
 from fusesoc_firm.frame.values import dotted
 
 Configuration = dict[str, Any]
@@ -215,7 +215,7 @@ class _Subscriber:
                 pairs = []
                 if part.loop.count is None:
                     pairs.append((part.length, f"std_logic_vector({self._length_register(part.loop)})"))
-                if part in self._elements:
+                if self._is_closed(part.loop):
                     pairs.append((part.valid, self._register("valid", part.loop)))
                     pairs.append((part.last, self._register("last", part.loop)))
                 if part.segments is not None:
@@ -342,17 +342,31 @@ class _Subscriber:
     @cached_property
     def _elements(self) -> list[ElementPorts]:
         """Of every loop whose elements somebody takes."""
-        loops = self._closed_loops
-        return [ports for ports in self.side.parts if isinstance(ports, ElementPorts) and ports.loop in loops]
+        return [ports for ports in self.side.parts if isinstance(ports, ElementPorts) and self._is_closed(ports.loop)]
+
+    @cached_property
+    def _element_paths(self) -> frozenset[Path]:
+        return frozenset(ports.loop.path for ports in self._elements)
 
     @cached_property
     def _closed_loops(self) -> list[Loop]:
         return [step.loop for step in self.steps if isinstance(step, Close)]
 
-    def _number(self, part: Data | Loop) -> int:
+    @cached_property
+    def _closed_paths(self) -> frozenset[Path]:
+        return frozenset(loop.path for loop in self._closed_loops)
+
+    def _is_closed(self, part: Data | Loop) -> bool:
+        return isinstance(part, Loop) and part.path in self._closed_paths
+
+    @cached_property
+    def _numbers(self) -> dict[tuple[type, Path], int]:
         """Parts are numbered in wire order for the names of their registers."""
         paths = [(type(step.part), step.part.path) for step in self.steps if isinstance(step, Open)]
-        return paths.index((type(part), part.path))
+        return {path: number for number, path in enumerate(paths)}
+
+    def _number(self, part: Data | Loop) -> int:
+        return self._numbers[type(part), part.path]
 
     def _register(self, what: str, part: Data | Loop) -> str:
         return f"{what}_{self._number(part)}_r"
@@ -378,7 +392,7 @@ class _Subscriber:
         for step in self.steps:
             if isinstance(step, Open) and step.part.is_used and is_counted(step):
                 registers.append((self._length_register(step.part), "unsigned(31 downto 0)"))
-            if isinstance(step, Open) and isinstance(step.part, Loop) and step.part in self._closed_loops:
+            if isinstance(step, Open) and self._is_closed(step.part):
                 registers.append((self._register("left", step.part), f"unsigned(31 downto 0) := {zeros}"))
         for ports in self._elements:
             valid = self._register("valid", ports.loop)
@@ -425,7 +439,7 @@ class _Subscriber:
         statements = []
         if part.is_used and is_counted(step):
             statements.append(f"{self._length_register(part)} <= count_value;")
-        if isinstance(part, Loop) and part in self._closed_loops:
+        if isinstance(part, Loop) and self._is_closed(part):
             value = "left_r" if part.count is None else f"to_unsigned({part.count}, 32)"
             statements.append(f"{self._register('left', part)} <= {value};")
         return statements
@@ -444,7 +458,7 @@ class _Subscriber:
     def _closing(self, loop: Loop) -> list[str]:
         left = self._register("left", loop)
         statements = [f"{left} <= {left} - 1;"]
-        if loop in [ports.loop for ports in self._elements]:
+        if loop.path in self._element_paths:
             last = self._register("last", loop)
             statements += [f"{self._register('valid', loop)} <= '1';", f"{last} <= '0';"]
             statements.append(f"if {left} = 1 then {last} <= '1'; end if;")

@@ -58,11 +58,12 @@ def frame_of(name: MessageName, definitions: Definitions) -> Frame:
 
 @dataclass
 class _Types:
-    """What the walk asks about types."""
+    """What the walk asks about types. Each answer is worked out once, as types nest and may come many times."""
 
     rules: WireRules
     definitions: Definitions
     _fixed: dict[MessageName, bool] = field(default_factory=dict)
+    _ends: dict[tuple[ElementType, Position], Position] = field(default_factory=dict)
 
     def has_fixed_size(self, type_: FieldType) -> bool:
         match type_:
@@ -75,6 +76,24 @@ class _Types:
                     self._fixed[name] = all(self.has_fixed_size(member.type) for member in fields)
                 return self._fixed[name]
         return isinstance(type_, PrimitiveType)
+
+    def behind(self, element: ElementType, position: Position, member: Field) -> Position:
+        """The position behind an element of `member` that begins at `position`."""
+        key = element, position
+        if key not in self._ends:
+            walk = _Walk(self, position, has_nodes=False)
+            walk.element(element, (), 1, member)
+            self._ends[key] = walk.position
+        return self._ends[key]
+
+    def steady(self, element: ElementType, position: Position, member: Field) -> Position:
+        """Where any element of an array begins whose first one begins at `position`: the smallest set that holds all.
+
+        An element starts where the array does, or where the element before it ends.
+        """
+        while (known := position.joined(self.behind(element, position, member))) != position:
+            position = known
+        return position
 
 
 @dataclass
@@ -99,7 +118,8 @@ class _Leaf:
 class _Walk:
     """One walk through a message or the element of a loop: what is known of the position, and the nodes so far.
 
-    `size` and `leaves` are those of the `Fixed` that is not closed yet, `passed` counts the elements of a leaf.
+    `size` and `leaves` are those of the `Fixed` that is not closed yet, `passed` counts the elements of a leaf. Without
+    `has_nodes` only the position is worked out.
     """
 
     types: _Types
@@ -108,6 +128,7 @@ class _Walk:
     nodes: list[Node] = field(default_factory=list)
     leaves: dict[Path, _Leaf] = field(default_factory=dict)
     passed: Counter[Path] = field(default_factory=Counter)
+    has_nodes: bool = True
 
     def message(self, definition: MessageDefinition, path: Path) -> None:
         if not definition.fields:
@@ -151,9 +172,12 @@ class _Walk:
                 for _ in range(count):
                     for part, type_ in self.types.rules.compounds[name]:
                         self.values(type_, (*path, Step(part)), 1, None)
-            case MessageType(name):
+            case MessageType(name) if self.has_nodes or not path:
                 for _ in range(count):
                     self.message(self.types.definitions[name], path)
+            case MessageType():
+                for _ in range(count):
+                    self.position = self.types.behind(element, self.position, member)
             case StringType(is_wide, bound) if count:
                 kind = DataKind.WSTRING if is_wide else DataKind.STRING
                 self.data(kind, WIDE_CHARACTER if is_wide else CHARACTER, path, bound, member)
@@ -209,17 +233,13 @@ class _Walk:
         if count is None:
             self.align(COUNT_BYTES)
         start = self.position.advanced(COUNT_BYTES if count is None else 0)
-        # An element starts where the count ends or where the one before it does: the smallest set that holds both.
-        known = start
-        while True:
+        known = self.types.steady(element, start, member)
+        if self.has_nodes:
             walk = _Walk(self.types, known)
             walk.element(element, here, 1, member)
             body = walk.finish()
-            if known.joined(walk.position) == known:
-                break
-            known = known.joined(walk.position)
-        self.append(Loop(here, str(member.type), count, bound, body, member.default, source=member.source))
-        self.position = known if count is None else walk.position
+            self.append(Loop(here, str(member.type), count, bound, body, member.default, source=member.source))
+        self.position = known if count is None else self.types.behind(element, known, member)
 
 
 def _is_array_of_texts(type_: FieldType) -> bool:

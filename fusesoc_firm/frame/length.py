@@ -7,7 +7,7 @@ So the padding of CDR, which depends on all that came before, needs no formula o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad
@@ -64,19 +64,19 @@ class Length:
     @property
     def minimum(self) -> int:
         """The bytes of a message whose variable parts are empty."""
-        shortest = _grown(self.terms, 0, _shortest, None)
+        shortest = _Walk(_shortest).behind(self.terms, 0)
         assert shortest is not None
         return self.prefix + shortest
 
     @property
     def maximum(self) -> int | None:
         """The bytes of a message whose variable parts are at their bounds; None if one has none."""
-        longest = _grown(self.terms, 0, _longest, None)
+        longest = _Walk(_longest).behind(self.terms, 0)
         return None if longest is None else self.prefix + longest
 
     def of(self, message: MessageValue) -> int:
         """The bytes of a message. Raises `CodecError` for a part without value and default."""
-        size = _grown(self.terms, 0, _elements_of, _Scope(message, 0))
+        size = _Walk(_elements_of).behind(self.terms, 0, _Scope(message, 0))
         assert size is not None
         return self.prefix + size
 
@@ -158,65 +158,76 @@ def _stride(body: tuple[Term, ...]) -> int | None:
     """
     if any(isinstance(term, Repeat) for term in body):
         return None
-    first = _grown(body, 0, _longest, None)
+    walk = _Walk(_longest)
+    first = walk.behind(body, 0)
     assert first is not None
-    second = _grown(body, first, _longest, None)
+    second = walk.behind(body, first)
     assert second is not None
     return second - first
 
 
-def _grown(terms: Sequence[Term], position: int, elements_of: _Elements, value: Any) -> int | None:
-    """The position behind `terms`; None if there is no limit to it."""
-    for term in terms:
-        match term:
-            case Bytes(count):
-                position += count
-            case Align(alignment):
-                position += -position % alignment
-            case Repeat():
-                end = _repeated(term, position, elements_of, value)
-                if end is None:
-                    return None
-                position = end
-    return position
+@dataclass
+class _Walk:
+    """Works off terms. `_grown` is what a part without a value adds, by the place of its term and the residue."""
 
+    elements_of: _Elements
+    _grown: dict[tuple[int, int], int | None] = field(default_factory=dict)
 
-def _repeated(term: Repeat, position: int, elements_of: _Elements, value: Any) -> int | None:
-    elements = elements_of(term.part, value)
-    if elements is None:
-        return None
-    if not elements:
+    def behind(self, terms: Sequence[Term], position: int, value: Any = None) -> int | None:
+        """The position behind `terms`; None if there is no limit to it."""
+        for term in terms:
+            match term:
+                case Bytes(count):
+                    position += count
+                case Align(alignment):
+                    position += -position % alignment
+                case Repeat():
+                    end = self._behind_part(term, position, value)
+                    if end is None:
+                        return None
+                    position = end
         return position
-    if term.stride is not None:
-        first = _grown(term.body, position, elements_of, None)
-        return None if first is None else first + (len(elements) - 1) * term.stride
-    if isinstance(elements, range):
-        return _repeated_alike(term, position, elements_of, len(elements))
-    for element in elements:
-        end = _grown(term.body, position, elements_of, _Scope(element, len(term.part.path)))
-        assert end is not None
-        position = end
-    return position
 
-
-def _repeated_alike(term: Repeat, position: int, elements_of: _Elements, count: int) -> int | None:
-    """`count` elements without a value: the same growth comes again when a residue does, so not all are walked."""
-    passed: dict[int, tuple[int, int]] = {}
-    done = 0
-    while done < count:
-        before = passed.setdefault(position % _PERIOD, (done, position))
-        if before[0] < done:
-            periods = (count - done) // (done - before[0])
-            position += periods * (position - before[1])
-            done += periods * (done - before[0])
-            passed = {}
-            if done == count:
-                break
-        end = _grown(term.body, position, elements_of, None)
-        if end is None:
+    def _behind_part(self, term: Repeat, position: int, value: Any) -> int | None:
+        elements = self.elements_of(term.part, value)
+        if elements is None:
             return None
-        position, done = end, done + 1
-    return position
+        if not elements:
+            return position
+        if term.stride is not None:
+            first = self.behind(term.body, position)
+            return None if first is None else first + (len(elements) - 1) * term.stride
+        if isinstance(elements, range):
+            # Parts lie within parts, so each would be walked many times for every walk of the one around it.
+            key = id(term), position % _PERIOD
+            if key not in self._grown:
+                self._grown[key] = self._growth_alike(term, key[1], len(elements))
+            growth = self._grown[key]
+            return None if growth is None else position + growth
+        for element in elements:
+            end = self.behind(term.body, position, _Scope(element, len(term.part.path)))
+            assert end is not None
+            position = end
+        return position
+
+    def _growth_alike(self, term: Repeat, start: int, count: int) -> int | None:
+        """`count` elements without a value: growth comes again when a residue does, so not all are walked."""
+        passed: dict[int, tuple[int, int]] = {}
+        position, done = start, 0
+        while done < count:
+            before = passed.setdefault(position % _PERIOD, (done, position))
+            if before[0] < done:
+                periods = (count - done) // (done - before[0])
+                position += periods * (position - before[1])
+                done += periods * (done - before[0])
+                passed = {}
+                if done == count:
+                    break
+            end = self.behind(term.body, position)
+            if end is None:
+                return None
+            position, done = end, done + 1
+        return position - start
 
 
 @dataclass(frozen=True)

@@ -73,9 +73,13 @@ def _fields(
     path: tuple[str, ...],
     leaves: list[_Leaf],
 ) -> Iterator[Row]:
+    by_name: dict[str, list[_Leaf]] = {}
+    for leaf in leaves:
+        if len(leaf.names) > len(path):
+            by_name.setdefault(leaf.names[len(path)], []).append(leaf)
     for field in definition.fields:
         here = (*path, field.name)
-        below = [leaf for leaf in leaves if leaf.names[: len(here)] == here]
+        below = by_name.get(field.name, [])
         bits = [leaf.bits for leaf in below]
         known = [bit for bit in bits if bit is not None]
         offset = min((leaf.offset for leaf in below if leaf.offset is not None), default=None)

@@ -21,7 +21,7 @@ from fusesoc_firm.frame.codec import decode, encode
 from fusesoc_firm.frame.defaults import completed
 from fusesoc_firm.host.yaml_message import read_message
 from fusesoc_firm.system.derived import Topic
-from fusesoc_firm.yaml_text import YamlText, is_null, kind, read_yaml
+from fusesoc_firm.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
 
 _YAML_SUFFIXES = (".yaml", ".yml")
 # Subscribers that are named where there is no file.
@@ -60,7 +60,7 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
 
 def _from_yaml(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     faults = Diagnostics()
-    text = read_yaml(path, faults=faults)
+    text = read_yaml(path, faults=faults, bounds=LARGE)
     known = {subscriber.block: subscriber for subscriber in subscribers}
     if isinstance(text.root, yaml.SequenceNode):
         stimuli = [_item(text, node, known, faults) for node in text.root.value]

@@ -130,7 +130,7 @@ class _Reader:
             return self._text(node, branch.text, path)
         if branch.type is None:
             return self.message(node, branch, path)
-        if not isinstance(node, yaml.ScalarNode) or is_null(node) or node.style is not None:
+        if not isinstance(node, yaml.ScalarNode) or is_null(node) or node.style:
             self._error(f"'{path}' is a {branch.type.name}, not {kind(node)}", node)
             return None
         try:

@@ -10,6 +10,8 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from fusesoc_firm.files import read_regular
+from fusesoc_firm.message.bounds import MOST_FILE_BYTES
 from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
 
 # What catkin, colcon and ament leave out; colcon puts one into `build`, `install` and `log` itself.
@@ -83,6 +85,7 @@ def _package_name(parent: Path, folder: Path) -> str:
 def _declared_name(manifest: Path) -> str:
     """The `<name>` in a `package.xml`; empty if there is none, as in rosbuild's `manifest.xml` days."""
     try:
-        return (ET.parse(manifest).findtext("name") or "").strip()
-    except (OSError, ET.ParseError):
+        return (ET.fromstring(read_regular(manifest, MOST_FILE_BYTES)).findtext("name") or "").strip()
+    # ElementTree has a ValueError or a LookupError for encodings.
+    except (OSError, ET.ParseError, ValueError, LookupError):
         return ""

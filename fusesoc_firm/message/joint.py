@@ -6,11 +6,13 @@ The definitions are parted by lines of 80 `=`; all but the first begin with `MSG
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from graphlib import CycleError, TopologicalSorter
 
 from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.message.bounds import check_extents
 from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion, nested_message
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.signature import signature
@@ -41,6 +43,16 @@ def signature_of_text(name: MessageName, text: str, ros: RosVersion) -> str | No
         texts = separate_texts(name, text)
         definitions = {each: parse(part, each, ros, str(each), faults) for each, part in texts.items()}
         faults.raise_if_any()
+        check_extents({each: definitions[each] for each in _inner_first(definitions)}, {})
         return signature(name, definitions)
-    except (InputError, KeyError):
+    except (InputError, KeyError, CycleError):
         return None
+
+
+def _inner_first(definitions: Mapping[MessageName, MessageDefinition]) -> Iterable[MessageName]:
+    """The names, each behind those that its message holds. Raises `CycleError`."""
+    within = {
+        name: [nested for field in definition.fields if (nested := nested_message(field.type))]
+        for name, definition in definitions.items()
+    }
+    return TopologicalSorter(within).static_order()

@@ -15,6 +15,8 @@ from functools import cached_property
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
+from fusesoc_firm.files import read_regular
+from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files
 from fusesoc_firm.message.middleware import known_suffixes, middleware_of
@@ -72,6 +74,7 @@ class MessageLibrary:
         self._messages: set[MessageName] = set()
         # A definition or None, with the faults of its text: a faulty file is reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
+        self._extents: dict[MessageName, Extent] = {}
         self._put_before(dict.fromkeys(paths), self._middleware.folders(environment) if environment is not None else [])
 
     def before(self, paths: Mapping[Path, SourceRef | None]) -> MessageLibrary:
@@ -126,7 +129,8 @@ class MessageLibrary:
     def closure(self, name: MessageName, source: SourceRef | None = None) -> dict[MessageName, MessageDefinition]:
         """The message and all messages within it, each behind those that it holds itself.
 
-        Raises `InputError` with every fault in every file, every unknown message and every cycle.
+        Raises `InputError` with every fault in every file, every unknown message and every cycle, and for a message
+        beyond the bounds of `bounds`.
         """
         return self.joint_closure((name,), source)
 
@@ -139,6 +143,7 @@ class MessageLibrary:
         for name in names:
             self._collect(name, source, (), closure, diagnostics)
         diagnostics.raise_if_any()
+        check_extents(closure, self._extents)
         return closure
 
     def origin(self, name: MessageName) -> str:
@@ -148,7 +153,7 @@ class MessageLibrary:
     def content(self, name: MessageName) -> bytes:
         """What defines a known message, as it stands: a file's bytes, or the text that a bag or distribution has."""
         if source := self._sources.get(name):
-            return source.texts[0].encode() if source.texts else source.paths[0].read_bytes()
+            return source.texts[0].encode() if source.texts else read_regular(source.paths[0], MOST_FILE_BYTES)
         return self._store.text(name).encode()
 
     def files(self, names: Iterable[MessageName]) -> list[Input]:
@@ -175,6 +180,7 @@ class MessageLibrary:
         found = {place: interface_files(place, self._middleware.suffixes) for place in places}
         # New ones, since a copy of this library may have these.
         self._sources, self._interfaces, self._parsed = dict(self._sources), dict(self._interfaces), {}
+        self._extents = {}
         self._messages = self._messages | {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
         bags = {place: self._bag(place, paths[place], faults) for place in paths if not any(found[place].values())}
         faults.raise_if_any()
@@ -255,6 +261,9 @@ class MessageLibrary:
             return
         if name in closure:
             return
+        if len(above) == MOST_LEVELS:
+            _note_depth(above[0], name, source, diagnostics)
+            return
         definition = self.find(name, diagnostics, source)
         if definition is None:
             return
@@ -299,17 +308,33 @@ def libraries(
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
-    """The text of the first file; it is a fault if another one differs, or if it is not UTF-8."""
-    first, *others = paths
-    data = first.read_bytes()
-    for other in others:
-        if other.read_bytes() != data:
+    """The text of the first file; it is a fault if one cannot be read, or another one differs, or is not UTF-8."""
+    contents = [_content(path, faults) for path in paths]
+    if faults.found:
+        return ""
+    first, data = paths[0], contents[0]
+    for other, content in zip(paths, contents, strict=True):
+        if content != data:
             faults.error(f"'{name}' differs from {other}", SourceRef(str(first), 1, 1), "name the folder of one")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as fault:
         faults.error(f"byte 0x{data[fault.start]:02x} is not UTF-8", byte_place(str(first), data, fault.start))
         return ""
+
+
+def _content(path: Path, faults: Diagnostics) -> bytes:
+    """The bytes of a file; nothing, with the fault noted, if it cannot be read."""
+    try:
+        return read_regular(path, MOST_FILE_BYTES)
+    except OSError as error:
+        faults.error(f"cannot read {path}: {error.strerror}", SourceRef(str(path), 1, 1))
+        return b""
+
+
+def _note_depth(top: MessageName, name: MessageName, source: SourceRef | None, faults: Diagnostics) -> None:
+    hint = f"legal here: up to {MOST_LEVELS} levels of messages within messages"
+    faults.error(f"'{top}' holds '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
 
 
 def _part(name: MessageName, source: _Source) -> Part:

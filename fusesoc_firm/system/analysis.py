@@ -11,11 +11,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.diagnostics import Diagnostics, InputError, nearest
+from fusesoc_firm.files import is_file
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Names, names_in_use, select, with_names_in_use
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MIDDLEWARES, RosVersion
+from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.clocks import clocks_of
@@ -132,6 +133,7 @@ class _Analysis:
     libraries: Libraries
     faults: Diagnostics
     needs_sources: bool
+    frames: dict[tuple[RosVersion, MessageName], Frame] = field(default_factory=dict)
     types: dict[str, AcceleratorType] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
     inputs: dict[str, tuple[MessageSide, ...]] = field(default_factory=dict)
@@ -179,7 +181,7 @@ class _Analysis:
     def _check_sources(self, accelerator: Accelerator) -> None:
         legal = SOURCE_SUFFIXES.get(accelerator.type, ())
         for source in accelerator.sources:
-            if self.needs_sources and not (self.folder / source).is_file():
+            if self.needs_sources and not is_file(self.folder / source):
                 hint = "paths are relative to the specification; 'firm system skeleton' writes a first version"
                 self.faults.error(f"there is no source file '{source}'", source.source, hint)
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
@@ -208,7 +210,10 @@ class _Analysis:
         try:
             name = parse_name(message)
             library.get(name, message.source)
-            frame = select(frame_of(name, library.closure(name)), places(include), places(exclude))
+            key = library.ros, name
+            if key not in self.frames:
+                self.frames[key] = frame_of(name, library.closure(name))
+            frame = select(self.frames[key], places(include), places(exclude))
         except InputError as error:
             self.faults.take(error, message.source)
             return None

@@ -18,6 +18,7 @@ import yaml
 from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.system.generator import CoreFolders, LoadedSystem, load_system, no_core_folders, with_paths
+from fusesoc_firm.yaml_text import yaml_data
 
 
 @dataclass(frozen=True)
@@ -30,14 +31,15 @@ class MessageSources:
 
 def core_of(spec: Path) -> Path | None:
     """The core beside a specification that makes a system of it and can simulate it; None if there is none."""
-    spec = spec.resolve()
+    # Path.resolve() raises an error of its own for a link that leads in a circle.
+    spec = Path(os.path.realpath(spec))
     return next((path for path in sorted(spec.parent.glob("*.core")) if _makes(path, spec)), None)
 
 
 def core_content(core: Path) -> Any:
     """A core's description; empty if it does not make a system."""
     try:
-        content = yaml.safe_load(core.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
+        content = yaml_data(core.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
         return content if isinstance(content["generate"]["system"]["parameters"], dict) else {}
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
         return {}
@@ -83,7 +85,7 @@ def known_names(spec: Path, own: Sequence[str], sources: MessageSources, core_fo
 def _makes(core: Path, spec: Path) -> bool:
     """Whether a core makes a system of the specification."""
     parameters = core_content(core).get("generate", {}).get("system", {}).get("parameters", {})
-    return bool(parameters.get("spec")) and (core.parent / str(parameters["spec"])).resolve() == spec
+    return bool(parameters.get("spec")) and os.path.realpath(core.parent / str(parameters["spec"])) == str(spec)
 
 
 def _words(value: object) -> list[str]:

@@ -128,7 +128,7 @@ class Wiring:
         try:
             pairs = {pair: _fields(outgoing, *pair) for pair in alike}
         except InputError as error:
-            self.faults.found += [fault for fault in error.diagnostics if fault not in self.faults.found]
+            self.faults.take(error, None)
             return {}
         pairs = {pair: names for pair, names in pairs.items() if names}
         if not pairs:

@@ -20,6 +20,7 @@ from fusesoc_firm.render import render
 from fusesoc_firm.system.board import FOLDER, QUARTUS, VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived import DerivedSystem
 from fusesoc_firm.system.verilog_bench import translated_unit
+from fusesoc_firm.yaml_text import yaml_data
 
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
@@ -153,7 +154,7 @@ def _value(value: str | Sequence[str]) -> str:
 def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]:
     """The generator's instances of a core."""
     try:
-        content = yaml.safe_load(text.replace("CAPI=2:", "", 1))
+        content = yaml_data(text.replace("CAPI=2:", "", 1))
         instances = dict(content["generate"])
     except (yaml.YAMLError, TypeError, KeyError, ValueError):
         fail(f"{path} is no core with a section 'generate'")

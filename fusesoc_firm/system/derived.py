@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from fractions import Fraction
+from functools import cached_property
 
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName, RosVersion
@@ -263,12 +264,16 @@ class DerivedSystem:
 
     def clock_of(self, block: str) -> Clock | None:
         """The clock that a block runs at; None for that of the system."""
-        name = next((item.clock for item in self.accelerators if item.block == block), "")
+        name = self._accelerators[block].clock if block in self._accelerators else ""
         return next((clock for clock in self.clocks if clock.name == name), None)
 
     def width_of(self, block: str) -> int:
         """The bits of a block's streams."""
-        return next((item.type.width for item in self.accelerators if item.block == block), self.width)
+        return self._accelerators[block].type.width if block in self._accelerators else self.width
+
+    @cached_property
+    def _accelerators(self) -> dict[str, AcceleratorBlock]:
+        return {item.block: item for item in self.accelerators}
 
     @property
     def entity(self) -> str:

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.files import is_file
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.derived import AcceleratorType
 from fusesoc_firm.system.specification import SOFTWARE, SOURCE_SUFFIXES
@@ -47,7 +48,7 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
         hint = "without 'sources' it stands for software elsewhere, which sends when it likes"
         faults.error(message, accelerator.name.source, hint)
         return
-    if not path.is_file() or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:
+    if not is_file(path) or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:
         return
     source = accelerator.sources[0]
     file = _File(_shown(source), path.read_text(encoding="utf-8", errors="replace"))

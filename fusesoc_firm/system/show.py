@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
     """Converters, accelerators and every connection between two ports, as `block/port`."""
+    pins = top_level_pins(system)
     return {
         "System": {
             "name": system.name,
@@ -62,7 +63,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
                 "type": str(block.type.accelerator.type),
                 "sources": [str(source) for source in block.type.accelerator.sources],
                 **_domain(system, block),
-                **_pins(block, top_level_pins(system)),
+                **_pins(block, pins),
             }
             for block in system.accelerators
         ],

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from fusesoc_firm.files import is_file
 from fusesoc_firm.naming import identifier
 from fusesoc_firm.system.specification import Accelerator
 
@@ -51,7 +52,7 @@ def declares_width(accelerator: Accelerator, sources: Iterable[Path]) -> bool:
         return False
     pattern = language.parameters.format(unit=re.escape(identifier(accelerator.name)))
     for source in sources:
-        text = source.read_text(encoding="utf-8", errors="replace") if source.is_file() else ""
+        text = source.read_text(encoding="utf-8", errors="replace") if is_file(source) else ""
         if found := re.search(pattern, language.comment.sub("", text), language.flags):
             return bool(language.width.search(found[1]))
     return False

@@ -38,7 +38,11 @@ _LONGEST_TIME = 2 ** (_MOST_TIME_BITS - _SPARE_TIME_BITS) - 1
 
 _SECONDS = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
 _HERTZ = {"Hz": 1, "kHz": 1000, "MHz": 10**6, "GHz": 10**9}
-_QUANTITY = re.compile(r"(\d+(?:\.\d+)?)\s*([A-Za-z]*)")
+_QUANTITY = re.compile(r"(\d{1,20}(?:\.\d{1,20})?)\s*([A-Za-z]*)", re.ASCII)
+# In Hz: slower is no clock, faster is no FPGA.
+_SLOWEST, _FASTEST = 1, 10**10
+# VHDL's largest integer, to which the scheduler counts.
+_LONGEST_RUN = 2**31 - 1
 
 # What to add to a publisher that lacks a time.
 _PERIOD = "add 'period: <cycles, a time, or a rate>', such as 'period: 100 Hz'"
@@ -147,16 +151,18 @@ def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
 def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
     """A frequency in Hz, or None if what stands at `key` is none, which is noted."""
     found = _QUANTITY.fullmatch(text)
-    if not found or found[2] not in _HERTZ or not Fraction(found[1]):
-        faults.error(f"'{key}' cannot be '{text}'", text.source, "a frequency, such as 100 MHz or 12.5 MHz")
+    hertz = Fraction(found[1]) * _HERTZ[found[2]] if found and found[2] in _HERTZ else Fraction(0)
+    if not _SLOWEST <= hertz <= _FASTEST:
+        hint = "a frequency from 1 Hz to 10 GHz, such as 100 MHz or 12.5 MHz"
+        faults.error(f"'{key}' cannot be '{text}'", text.source, hint)
         return None
-    return Fraction(found[1]) * _HERTZ[found[2]]
+    return hertz
 
 
 def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
-    if project.shortest_run < 1:
+    if not 1 <= project.shortest_run <= _LONGEST_RUN:
         place = project.place("shortest_run")
-        faults.error(f"'shortestRun' cannot be {project.shortest_run}", place, "legal here: 1 and more beats")
+        faults.error(f"'shortestRun' cannot be {project.shortest_run}", place, f"legal here: 1 to {_LONGEST_RUN} beats")
 
 
 def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:

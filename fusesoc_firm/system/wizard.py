@@ -32,6 +32,7 @@ from fusesoc_firm.system.specification import (
     is_core,
 )
 from fusesoc_firm.yaml_sections import Key, Section, keys_of
+from fusesoc_firm.yaml_text import LONGEST_NUMBER, read_yaml
 
 # All messages that can be named, by the specification's `paths`.
 MessageNames = Callable[[Sequence[str]], Sequence[str]]
@@ -43,6 +44,8 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
     """Ask for a specification and write it, or for more of one that is there."""
     check_output(path)
     is_new = not path.exists()
+    if not is_new:
+        read_yaml(path)  # reports what is no YAML, at its place
     before = "" if is_new else path.read_text(encoding="utf-8")
     content = CommentedMap() if is_new else _style(before).load(before)
     _Wizard(asker, message_names, content, is_new, path.parent).run()
@@ -65,12 +68,12 @@ def _style(text: str) -> YAML:
 
 def _word(answer: str) -> Any:
     """An answer as a scalar; in quotes where YAML, or a list around it, would take it for another value."""
-    if answer.isdecimal() and str(int(answer)) == answer:
+    if answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer:
         # A number is as good a word, and reads better without quotes.
         return int(answer)
     try:
         is_plain = pyyaml.safe_load(f"[{answer}]") == [answer]
-    except pyyaml.YAMLError:
+    except (pyyaml.YAMLError, ValueError):
         is_plain = False
     return answer if is_plain else DoubleQuotedScalarString(answer)
 

@@ -2,11 +2,32 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
-from fusesoc_firm.message.model import MessageDefinition, MessageName
+from fusesoc_firm.diagnostics import SourceRef
+from fusesoc_firm.message.model import (
+    ArrayType,
+    ElementType,
+    Field,
+    FieldType,
+    MessageDefinition,
+    MessageName,
+    MessageType,
+    PrimitiveType,
+    RosVersion,
+    SequenceType,
+    StringType,
+)
 
+Definitions = Mapping[MessageName, MessageDefinition]
 _SEPARATOR = "=" * 80
+# Stands for a wstring; a message, as there may be arrays of it.
+_WIDE = MessageName("firm_wide_msgs", "Wide")
+_UNITS = "units"
+_PLACE = SourceRef("", 0, 0)
 
 
 class NoJudgementError(Exception):
@@ -22,3 +43,43 @@ def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefin
     """A message and all below it in one text, parted as ROS's own tools do."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{plain_text(definitions[other])}" for other in definitions if other != name]
     return "\n".join([plain_text(definitions[name]), *others])
+
+
+def with_wide_arrays(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
+    """The same of ROS 2 with `uint32[]` in place of each wstring: the units of UTF-16, in 32 bits each."""
+    field = Field(_UNITS, SequenceType(PrimitiveType("uint32")), _PLACE)
+    made = {_WIDE: MessageDefinition(_WIDE, RosVersion.ROS2, (field,), (), _PLACE)}
+    for name, definition in definitions.items():
+        fields = tuple(replace(field, type=_without_wide(field.type), default=None) for field in definition.fields)
+        made[name] = replace(definition, fields=fields)
+    return made
+
+
+def with_wide_units(
+    definition: MessageDefinition, definitions: Definitions, value: Mapping[str, Any]
+) -> dict[str, Any]:
+    """A value of a message as one of `with_wide_arrays`."""
+    return {field.name: _wide_value(field.type, definitions, value[field.name]) for field in definition.fields}
+
+
+def _without_wide(type_: FieldType) -> FieldType:
+    match type_:
+        case ArrayType() | SequenceType():
+            return replace(type_, element=_element_without_wide(type_.element))
+    return _element_without_wide(type_)
+
+
+def _element_without_wide(type_: ElementType) -> ElementType:
+    return MessageType(_WIDE) if isinstance(type_, StringType) and type_.is_wide else type_
+
+
+def _wide_value(type_: FieldType, definitions: Definitions, value: Any) -> Any:
+    match type_:
+        case MessageType(name):
+            return with_wide_units(definitions[name], definitions, value)
+        case ArrayType(MessageType() | StringType() as element) | SequenceType(MessageType() | StringType() as element):
+            return [_wide_value(element, definitions, item) for item in value]
+        case StringType(is_wide=True):
+            units = value.encode("utf-16-le", "surrogatepass")
+            return {_UNITS: list(struct.unpack(f"<{len(units) // 2}H", units))}
+    return value

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fusesoc_firm.frame.codec import MessageValue
 from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
 from fusesoc_firm.verify import genpy_judge, mcap_judge, rosbags_judge
-from fusesoc_firm.verify.definitions import NoJudgementError
+from fusesoc_firm.verify.definitions import NoJudgementError, with_wide_arrays, with_wide_units
 
 Definitions = Mapping[MessageName, MessageDefinition]
 Serialise = Callable[[MessageName, Definitions, Sequence[MessageValue]], list[bytes]]
@@ -60,6 +60,9 @@ def versions() -> dict[str, str]:
 
 
 def _judge_ros2(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> Judgement:
+    # A wstring lies on the wire as the units of UTF-16 in 32 bits each do, and none of the judges knows it.
+    values = [with_wide_units(definitions[name], definitions, value) for value in values]
+    definitions = with_wide_arrays(definitions)
     payloads = rosbags_judge.serialise(name, definitions, values)
     if not mcap_judge.version():
         return Judgement(tuple(payloads), rosbags_judge.TITLE)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
@@ -39,7 +39,8 @@ def loop_text(frame: Frame, width: int) -> str:
     found = gates(ports, segment_count(frame), has_msg_valid=not frame.is_fixed_size)
     # The fields of a message of fixed size are its only segment.
     fields = ports if frame.is_fixed_size else ()
-    apart = {name for port in ports if port.is_reverse for name in _gated_names(port, ports)}
+    names = {port.name for port in ports}
+    apart = {name for port in ports if port.is_reverse for name in _gated_names(port, names)}
     apart |= {port.name for port in fields}
     streams = [port.name.removesuffix("_axis_tready") for port in ports if _is_stream(port)]
     column = max([len("frame_error_code"), *(len(port.name) for port in ports)])
@@ -137,14 +138,14 @@ def _gate_of(valid: str, ready: str, offered: str, shown: str, gate: int) -> Gat
     )
 
 
-def _gated_names(ready: MessagePort, ports: Sequence[MessagePort]) -> Iterator[str]:
+def _gated_names(ready: MessagePort, names: Container[str]) -> Iterator[str]:
     yield ready.name
     if _is_stream(ready):
         yield f"{ready.name.removesuffix('ready')}valid"
         return
     name = ready.name.removesuffix("_ready")
     yield f"{name}_valid"
-    if any(port.name == f"{name}_segment_valid" for port in ports):
+    if f"{name}_segment_valid" in names:
         yield f"{name}_segment_valid"
 
 

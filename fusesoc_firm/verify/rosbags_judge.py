@@ -22,7 +22,6 @@ from fusesoc_firm.message.model import (
     PrimitiveType,
     RosVersion,
     SequenceType,
-    StringType,
 )
 from fusesoc_firm.verify.definitions import NoJudgementError, plain_text
 
@@ -42,8 +41,6 @@ def serialise(
     name: MessageName, definitions: Mapping[MessageName, MessageDefinition], values: Sequence[MessageValue]
 ) -> list[bytes]:
     """The payload of each value; the padding of CDR is zero. Raises `NoJudgementError` if rosbags cannot read it."""
-    if any(_is_wide(field.type) for definition in definitions.values() for field in definition.fields):
-        raise NoJudgementError("rosbags knows no wstring")
     ros = definitions[name].ros
     texts = {other: plain_text(definition) for other, definition in definitions.items()}
     if ros is RosVersion.ROS1:
@@ -73,11 +70,6 @@ class _Store:
                     raise NoJudgementError(str(error).splitlines()[-1]) from error
                 self._texts[name] = text
         return self._store
-
-
-def _is_wide(type_: FieldType) -> bool:
-    element = type_.element if isinstance(type_, ArrayType | SequenceType) else type_
-    return isinstance(element, StringType) and element.is_wide
 
 
 _stores = {ros: _Store() for ros in RosVersion}

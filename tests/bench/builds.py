@@ -84,8 +84,8 @@ def write_library(folder: Path, cores: int) -> None:
             'filesets: {base: {depend: ["robot:firm:generators"]}}',
             "generate:",
             *(
-                f"  {name}: {{generator: firm, parameters: {{message: {message}, ros: 2, width: {width}}}}}"
-                for name, (message, width) in instances.items()
+                f"  {name}: {{generator: firm, parameters: {{name: {name}, ros: 2, message: {type_}, width: {bits}}}}}"
+                for name, (type_, bits) in instances.items()
             ),
             "targets:",
             f"  default: {{filesets: [base], generate: [{', '.join(instances)}], {_FLOW}}}",

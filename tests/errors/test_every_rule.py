@@ -29,6 +29,8 @@ NOTING_METHODS, NOTING_FUNCTIONS = ("error", "_error", "take"), ("fail", "InputE
 OTHER_FAULTS = {
     ("system/diagram.py", "diagram"): "a program or package that is not installed",
     ("message/library.py", "libraries"): "an option of the command line",
+    ("message/library.py", "_content"): "a message that is no file, in test_hostile_input",
+    ("message/library.py", "_note_depth"): "a message of 65 files, in test_hostile_input",
     ("message/library.py", "_bag"): "the file of a bag",
     ("message/library.py", "_check_equal"): "the file of a bag",
     ("system/board.py", "read_board"): "the file of a board",

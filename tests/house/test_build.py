@@ -184,8 +184,8 @@ def test_programs_are_started_by_firm_tool_unless_the_user_says_otherwise(projec
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All that FuseSoC and generators wrote. GHDL's library holds dates."""
-    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix not in (".cf", ".o"))
+    """All that FuseSoC and generators wrote, but for GHDL's library, which holds dates, and what names the run."""
+    files = (path for path in folder.rglob("*") if path.is_file() and path.suffix not in (".cf", ".o", ".run"))
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
@@ -280,8 +280,8 @@ def test_what_the_store_has_is_answered_in_the_process_of_fusesoc(project: Path,
 def test_many_instances_are_generated_before_fusesoc_asks(project: Path, calls: Path) -> None:
     core = project / "one.core"
     more = [
-        f"  m{width}: {{generator: firm, parameters: {{message: std_msgs/Byte, ros: 1, width: {width}}}}}"
-        for width in (8, 16, 32, 64, 128)
+        f"  m{bits}: {{generator: firm, parameters: {{message: std_msgs/Byte, ros: 1, width: {bits}, name: m{bits}}}}}"
+        for bits in (8, 16, 32, 64, 128)
     ]
     text = core.read_text().replace("targets:\n", "\n".join([*more, "targets:\n"]), 1)
     core.write_text(text.replace("generate: [pose, twist]", "generate: [pose, twist, m8, m16, m32, m64, m128]"))

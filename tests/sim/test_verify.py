@@ -11,8 +11,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -23,9 +26,11 @@ from fusesoc_firm.frame.model import Fixed, Frame
 from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.verify import simulation, task
+from fusesoc_firm.verify import command, simulation, task
+from fusesoc_firm.verify.definitions import NoJudgementError
 from fusesoc_firm.verify.judge import Judgement, judge
 from fusesoc_firm.verify.task import Result, Task, Verdict, verify
+from fusesoc_firm.workers import Workers
 from tests.processes import IGNORING_INTERRUPTS
 from tests.sim.ghdl import CORES, REPOSITORY, Library
 from tests.unit.verify.messages import ROS1, ROS2, standard
@@ -249,24 +254,8 @@ def test_without_ghdl_it_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert "GHDL is not installed" in capsys.readouterr().err
 
 
-def test_a_message_without_a_judge_is_no_success(capsys: Captured, tmp_path: Path) -> None:
-    (tmp_path / "a_msgs").mkdir()
-    (tmp_path / "a_msgs" / "Wide.msg").write_text("wstring w\n")
-    assert main(["message", "verify", "a_msgs/Wide", "--path", str(tmp_path), "--jobs", "1"]) == 1
-    captured = capsys.readouterr()
-    assert "no judge: a_msgs/Wide: rosbags knows no wstring" in captured.out
-    assert "no message could be verified" in captured.err
-
-
-def test_a_failure_is_kept_and_can_be_repeated(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Captured
-) -> None:
-    """The workers are threads here, so that they share what this test breaks."""
-    from concurrent.futures import ThreadPoolExecutor
-    from contextlib import contextmanager
-
-    from fusesoc_firm.verify import command
-    from fusesoc_firm.workers import Workers
+def in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The workers are threads here, so that they share what a test breaks."""
 
     @contextmanager
     def threads(_: int | None = None) -> Iterator[Workers]:
@@ -274,6 +263,31 @@ def test_a_failure_is_kept_and_can_be_repeated(
             yield Workers(executor, 2)
 
     monkeypatch.setattr(command, "local_workers", threads)
+
+
+def test_a_message_without_a_judge_is_no_success(capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> NoReturn:
+        raise NoJudgementError("nobody knows it")
+
+    in_threads(monkeypatch)
+    monkeypatch.setattr(task, "judge", refuse)
+    assert main(["message", "verify", "std_msgs/Bool"]) == 1
+    captured = capsys.readouterr()
+    assert "no judge: std_msgs/Bool: nobody knows it" in captured.out
+    assert "no message could be verified" in captured.err
+
+
+def test_wstrings_are_verified(capsys: Captured, tmp_path: Path) -> None:
+    (tmp_path / "a_msgs").mkdir()
+    (tmp_path / "a_msgs" / "Wide.msg").write_text("uint8 a\nwstring w\nwstring[2] x\nwstring<=3[] y\nfloat64 z\n")
+    assert main(["message", "verify", "a_msgs/Wide", "--path", str(tmp_path), "--jobs", "1"]) == 0
+    assert "1 pass" in capsys.readouterr().out
+
+
+def test_a_failure_is_kept_and_can_be_repeated(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Captured
+) -> None:
+    in_threads(monkeypatch)
     other_frame(monkeypatch, "publisher_files", with_swapped_fields)
     arguments = ["--ros", "1", "--width", "16", "--stimuli", "4", "--seed", "6"]
     assert main(["message", "verify", "geometry_msgs/Point", *arguments, "--keep", str(tmp_path)]) == 1

@@ -184,6 +184,7 @@ def test_files_of_one_name_are_two_and_any_name_can_be_drawn(project: Path, caps
 
 @pytest.mark.skipif(not shutil.which("dot"), reason="Graphviz is not installed")
 def test_graph_as_a_picture(project: Path) -> None:
+    (project / "pictures").mkdir()
     assert main(["graph", "me:p:branch", "-o", "pictures/branch.svg"]) == 0
     assert "</svg>" in (project / "pictures/branch.svg").read_text()
 

@@ -80,7 +80,7 @@ class Project:
             check=False,
         )
         assert done.returncode == 0, done.stdout
-        (self.script,) = folder.glob(f"robot_sys_{core}_*/{board}*/robot_sys_{core}_0?1?0.tcl")
+        (self.script,) = folder.glob(f"robot_sys_{core}_*/{board}*/robot_sys_{core}_[0-9]?[0-9]?[0-9].tcl")
         self.folder = self.script.parent
         self.tool = "quartus" if board == "quartus" else "vivado"
 

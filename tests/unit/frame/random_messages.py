@@ -30,3 +30,15 @@ def _field(ros: RosVersion, chance: random.Random, names: list[str]) -> str:
         type_ = f"string{chance.choice(bounds)}"
     sizes = ["", "", "", "[]", "[]", "[1]", "[2]", "[3]"]
     return type_ + chance.choice([*sizes, "[<=1]", "[<=3]"] if ros is RosVersion.ROS2 else sizes)
+
+
+def deep_texts(ros: RosVersion, chance: random.Random, levels: int) -> dict[str, str]:
+    """Messages `L0` to `L<levels - 1>`, by their names: each holds the one before it, among other fields."""
+    sizes = ["", "[]", "[1]", "[2]", *(["[<=1]", "[<=3]"] if ros is RosVersion.ROS2 else [])]
+    texts = {}
+    for level in range(levels):
+        fields = [_field(ros, chance, []) for _ in range(chance.randint(1, 3))]
+        if level:
+            fields.insert(chance.randint(0, len(fields)), f"L{level - 1}{chance.choice(sizes)}")
+        texts[f"{PACKAGE}/L{level}"] = "".join(f"{type_} f{place}\n" for place, type_ in enumerate(fields))
+    return texts

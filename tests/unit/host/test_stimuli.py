@@ -171,7 +171,7 @@ def test_integers_and_booleans(tmp_path: Path, block: str, word: str, expected: 
 )
 def test_a_value_that_does_not_fit(tmp_path: Path, block: str, word: str, message: str, hint: str) -> None:
     text = faults(tmp_path, f"- point: {{x: 0, y: 0, z: 0}}\n- {block}: {{data: {word}}}\n")
-    column = len(f"- {block}: {{data: ") + 1 if word else len(f"- {block}: {{data:") + 1
+    column = len(f"- {block}: {{data: ") + 1
     assert text.startswith(f"stimuli.yaml:2:{column}: error: {message}")
     assert (f"\n      = {hint}" in text) is bool(hint)
 

@@ -109,10 +109,16 @@ def test_a_message_of_another_definition_gets_another_type() -> None:
         assert rosbags_judge.serialise(message, definitions, [{"a": 5}]) == [bytes.fromhex(payload)]
 
 
-def test_wstrings_have_no_judge() -> None:
-    message, definitions = own(ROS2, {"M": "wstring s\n"})
-    with pytest.raises(NoJudgementError, match="rosbags knows no wstring"):
-        judge.judge(message, definitions, values(message, definitions))
+def test_wstrings_are_judged_as_arrays_of_units() -> None:
+    message, definitions = own(
+        ROS2, {"In": "uint8 a\nwstring<=3 w\n", "M": "wstring s\nwstring[2] t\nIn[] u\nuint8 b\n"}
+    )
+    value = {"s": "a\ud83e", "t": ["", "é"], "u": [{"a": 1, "w": "語🤖"}], "b": 9}
+    found = judge.judge(message, definitions, [value, *values(message, definitions)])
+    texts_on_wire = "02000000 61000000 3ed80000 00000000 01000000 e9000000"
+    elements_on_wire = "01000000 01 000000 03000000 9e8a0000 3ed80000 16dd0000"
+    assert found.payloads[0] == bytes.fromhex(f"00010000 {texts_on_wire} {elements_on_wire} 09")
+    assert found.judge == "rosbags, mcap-ros2-support"
 
 
 @needs_genpy

@@ -1,0 +1,114 @@
+"""How large a message may be. It is checked on the definitions, before any work on what they mean begins.
+
+Each message within another multiplies what a few lines of text can mean. Real messages stay far below: the largest of
+5,900 that were counted have 17 levels, 1,982 fields and 6,049 bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, MutableMapping
+from dataclasses import dataclass
+
+from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.model import (
+    ArrayType,
+    FieldType,
+    MessageDefinition,
+    MessageName,
+    MessageType,
+    PrimitiveType,
+    SequenceType,
+)
+from fusesoc_firm.wire import WireRules
+
+MOST_LEVELS = 64
+MOST_FIELDS = 4096
+MOST_CONSTANTS = 4096
+MOST_NODES = 16384
+MOST_BYTES = 65536
+MOST_FILE_BYTES = 2**18
+"""Bytes of a `.msg`, `.srv` or `.action` file."""
+
+_COUNT_BYTES = 4
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What a message unfolds to.
+
+    `levels` are 1 where no message lies within. `fields` are those of all messages within, too; an array counts once.
+    `nodes` are the same with every element of an array of fixed size, unless it is one of numbers. `bytes` are those
+    on the wire where each string is empty and each variable array has one element, without padding.
+    """
+
+    levels: int = 0
+    fields: int = 0
+    nodes: int = 0
+    bytes: int = 0
+
+    def joined(self, other: Extent) -> Extent:
+        """Both, side by side."""
+        return Extent(
+            max(self.levels, other.levels),
+            self.fields + other.fields,
+            self.nodes + other.nodes,
+            self.bytes + other.bytes,
+        )
+
+
+# The bounds, each with its words.
+_BOUNDS = {
+    "levels": (MOST_LEVELS, "levels of messages within messages"),
+    "fields": (MOST_FIELDS, "fields, with those of all messages within"),
+    "nodes": (MOST_NODES, "fields, with those of every element of its fixed arrays"),
+    "bytes": (MOST_BYTES, "bytes of fixed size"),
+}
+
+
+def check_extents(
+    definitions: Mapping[MessageName, MessageDefinition], known: MutableMapping[MessageName, Extent]
+) -> None:
+    """Raise `InputError` for the first message that is too large, at the field that makes it so.
+
+    `definitions` have each message behind those that it holds. `known` are messages that were checked before; these
+    are added.
+    """
+    for name, definition in definitions.items():
+        if name not in known:
+            known[name] = _extent(definition, known)
+
+
+def _extent(definition: MessageDefinition, known: Mapping[MessageName, Extent]) -> Extent:
+    if len(definition.constants) > MOST_CONSTANTS:
+        what = f"'{definition.name}' has {len(definition.constants)} constants"
+        fail(what, definition.constants[MOST_CONSTANTS].source, f"legal here: up to {MOST_CONSTANTS}")
+    rules = middleware_of(definition.ros).rules
+    extent = Extent(levels=1, bytes=0 if definition.fields else rules.empty_bytes)
+    for field in definition.fields:
+        extent = extent.joined(_of_type(field.type, rules, known))
+        for word, (most, words) in _BOUNDS.items():
+            found = getattr(extent, word)
+            if found > most:
+                what = f"field '{field.name}' makes '{definition.name}' too large: {found} {words}"
+                fail(what, field.source, f"legal here: up to {most}")
+    return extent
+
+
+def _of_type(type_: FieldType, rules: WireRules, known: Mapping[MessageName, Extent]) -> Extent:
+    """What a field of a type adds."""
+    match type_:
+        case PrimitiveType(name) if name in rules.scalars:
+            return Extent(0, 1, 1, rules.scalars[name].size)
+        case PrimitiveType(name):
+            return Extent(0, 1, 1, sum(part.size for _, part in rules.compounds[name]))
+        case MessageType(name):
+            inner = known[name]
+            return Extent(inner.levels + 1, inner.fields + 1, inner.nodes + 1, inner.bytes)
+        case ArrayType(element, length):
+            one = _of_type(element, rules, known)
+            is_of_numbers = isinstance(element, PrimitiveType) and element.name in rules.scalars
+            return Extent(one.levels, one.fields, one.nodes * (1 if is_of_numbers else length), one.bytes * length)
+        case SequenceType(element):
+            return _of_type(element, rules, known).joined(Extent(bytes=_COUNT_BYTES))
+    return Extent(0, 1, 1, _COUNT_BYTES)
