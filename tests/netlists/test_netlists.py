@@ -39,6 +39,25 @@ def test_a_register_that_ghdl_takes_for_a_memory_is_not_lost(
     assert not differences([WITHOUT_MEMORIES], ["icarus"])
 
 
+def test_a_subtraction_is_found_beside_a_package_that_other_files_need(tmp_path: Path) -> None:
+    """GHDL refuses to analyse such a file alone; columns and lines are those of the file, behind tabs too."""
+    file, other, output = tmp_path / "first.vhd", tmp_path / "other.vhd", tmp_path / "first.v"
+    use = "library ieee; use ieee.numeric_std.all; use work.types.all;"
+    file.write_text(
+        "-- Some words on it.\nlibrary ieee; use ieee.numeric_std.all;\n"
+        "package types is subtype word is signed(7 downto 0); end;\n"
+        f"{use} use work.steps.all;\nentity first is port (x : in word; y : out word); end;\n"
+        "architecture rtl of first is begin y\t<= step(5 - (3 - x)); end;\n"
+    )
+    other.write_text(
+        f"{use}\npackage steps is function step(x : word) return word; end;\n"
+        "package body steps is function step(x : word) return word is begin return x + 1; end; end;\n"
+    )
+    sources = {"work": [str(file), str(other)]}
+    assert not translate(Translation("first", str(output), sources, {}), tmp_path / "ghdl")
+    assert len(re.findall(r"= 8'h[53] - \w+;", output.read_text())) == 2
+
+
 def test_a_constant_that_ghdl_loses_is_refused() -> None:
     found = {item.design.name: item.message for item in differences(LOST, ["icarus"])}
     assert found.keys() == {item.name for item in LOST}
