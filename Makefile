@@ -46,15 +46,19 @@ DEBIAN_MODULES := /usr/lib/python3/dist-packages
 ROS1 := pkg-config rosmaster:python3-rosmaster /usr/include/ros/ros.h:libroscpp-dev \
   $(foreach name,rospy std_msgs geometry_msgs sensor_msgs,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
 
+# Designs of make fuzz-netlist, and further options, such as FUZZ_OPTIONS='--judges icarus'.
+DESIGNS ?= 10000
+FUZZ_OPTIONS ?=
+
 # Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip leaves out why it failed.
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
-.PHONY: help sim test ros bitstream bench matrix proofs corpus lint setup tools clean distclean
+.PHONY: help sim test ros bitstream bench matrix proofs corpus fuzz-netlist lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # Without what make and Edalize say about folders, the result is the last line.
 sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED=N, WAVES=1, SIM_OPTIONS='...'
@@ -103,6 +107,10 @@ matrix: tools $(VENV)/.extra-matrix ## Try each supported Python with the oldest
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
 	@$(BIN)/python -m tests.proofs
+
+fuzz-netlist: TOOLS = iverilog verilator
+fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
+	@$(BIN)/python -m tests.netlists --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
 lint: setup ## Check style and types
 	@$(BIN)/ruff check .

@@ -19,7 +19,7 @@ VHDL_KEYWORDS = frozenset(
     restrict_guarantee return rol ror select sequence severity shared signal sla sll sra srl strong subtype then to
     transport type unaffected units until use variable vmode vprop vunit wait when while with xnor xor""".split()
 )
-_VERILOG_KEYWORDS = frozenset(
+VERILOG_KEYWORDS = frozenset(
     """accept_on alias always always_comb always_ff always_latch and assert assign assume automatic before begin bind
     bins binsof bit break buf bufif0 bufif1 byte case casex casez cell chandle checker class clocking cmos config const
     constraint context continue cover covergroup coverpoint cross deassign default defparam design disable dist do edge
@@ -38,7 +38,7 @@ _VERILOG_KEYWORDS = frozenset(
     tri tri0 tri1 triand trior trireg type typedef union unique unique0 unsigned until until_with untyped use uwire var
     vectored virtual void wait wait_order wand weak weak0 weak1 while wildcard wire with within wor xnor xor""".split()
 )
-KEYWORDS = VHDL_KEYWORDS | _VERILOG_KEYWORDS
+KEYWORDS = VHDL_KEYWORDS | VERILOG_KEYWORDS
 
 # What std.standard, std_logic_1164 and numeric_std declare, and the libraries: a constant of such a name in a package
 # that is used as a whole would hide both, so that `severity error` no longer compiled.

@@ -40,7 +40,7 @@ ALLOWED: dict[str, set[str]] = {
     # The cores of its bench lie in the library.
     "verify": _SYSTEM | {"library_path", "outputs", "workers"},
     # Edalize's tool runs it beside a build, which knows files and no systems.
-    "netlist": {"launcher", "manifest", "tools"},
+    "netlist": {"launcher", "manifest", "naming", "tools"},
     "quoting": set(),
     "render": {"quoting"},
     "own_code": {"render"},

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from fusesoc_firm.manifest import note
-from fusesoc_firm.netlist.repair import NetlistError
+from fusesoc_firm.netlist.model import NetlistError
 from fusesoc_firm.netlist.translation import Translation, translate
 
 

@@ -6,23 +6,33 @@ translation where it means that logic is lost.
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 import re
 import shutil
 import subprocess
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from itertools import pairwise
+import tempfile
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.launcher import starts_everything
-from fusesoc_firm.netlist.repair import NetlistError, repair
+from fusesoc_firm.netlist import dump, lost_constants, verilog
+from fusesoc_firm.netlist.corrections import correct, doubts, places_of
+from fusesoc_firm.netlist.model import LostRegisterError, Module, Modules, NetlistError
+from fusesoc_firm.netlist.sources import is_resize, of_signed, subtractions_from_integers
 from fusesoc_firm.tools import explanation, missing
 
-_UNBOUND = re.compile(r'instance "(.*?)" of component "(.*?)" is not bound')
 _MODULE = r"^[ \t]*module\s+({name})\b"
-_EMPTY_MODULE = r"^module\s+({name})\b[^;]*;\s*endmodule\n*"
+_DEFINITION = re.compile(r"^module (\S+)(.*?)^endmodule", re.MULTILINE | re.DOTALL)
+_GENERIC_MAP = re.compile(r"^  \S+ #\(\n(.*?)\)\n +(\S+) \($", re.MULTILINE | re.DOTALL)
+_GENERIC = re.compile(r"^ +\.(\w+)\((.*?)\),?$", re.MULTILINE)
 # GHDL compares with bounds that a number cannot leave, and puts what is in no loop into one vector; a module may have
 # ports that a message has in another ROS version only. A linter is to look at what people wrote.
 _WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT", "PINMISSING")
@@ -32,6 +42,16 @@ _HEADER = "\n".join(
 _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 # What GHDL says of logic that is not there afterwards; the words are those of its sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
+
+_GULP = 1 << 20
+_PAUSE = 0.005
+
+# GHDL's option for that; it loses registers of which it wanted to make memories.
+_NO_MEMORIES = "-dm"
+_WITHOUT_MEMORIES = (
+    "; GHDL loses a register that is written by a dynamic index and read by a constant one. So all memories of this "
+    "netlist are registers; read that one by dynamic indices alone, or write it by constant ones, to get memories."
+)
 
 
 @dataclass(frozen=True)
@@ -94,19 +114,38 @@ def translate(translation: Translation, folder: Path) -> str:
         if files:
             ghdl.run("-i", f"--work={library}", *files)
     ghdl.run("-m", f"--work={translation.library}", translation.unit)
-    netlist, warnings = ghdl.synthesise("verilog")
+    try:
+        netlist, warnings = _netlist(ghdl)
+    except LostRegisterError as error:
+        if _NO_MEMORIES in translation.options:
+            raise
+        ghdl = _Ghdl(replace(translation, options=[*translation.options, _NO_MEMORIES]), folder)
+        netlist, warnings = _netlist(ghdl)
+        warnings = f"{error.args[0].replace('error', 'warning', 1)}{_WITHOUT_MEMORIES}\n{warnings}"
+    part = output.with_name(f"{output.name}.part")
+    part.write_text(netlist, encoding="utf-8")
+    part.replace(output)
+    return warnings
+
+
+def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
+    """The netlist in Verilog, and what GHDL warns of that is of interest."""
+    text, warnings = ghdl.synthesise("dump")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
         raise NetlistError(
             "\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"])
         )
-    black_boxes = _black_boxes(warnings, translation.verilog)
-    vhdl, _ = ghdl.synthesise("vhdl")
-    netlist = _HEADER + repair(_without(netlist, black_boxes), vhdl, translation.unit) + _FOOTER
-    part = output.with_name(f"{output.name}.part")
-    part.write_text(netlist, encoding="utf-8")
-    part.replace(output)
-    return _other_warnings(warnings)
+    modules = dump.read(text)
+    components = _components(modules, ghdl.translation.verilog)
+    # The dump has all but these.
+    generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
+    lost_constants.check(modules, chain.from_iterable(ghdl.translation.libraries.values()))
+    resized = {place for place in places_of(modules, "$strunc") if is_resize(place)}
+    correct(modules, ghdl.swapped(places_of(modules, "$sub")), resized)
+    return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(
+        filter(None, [_other_warnings(warnings), *doubts(modules)])
+    )
 
 
 @dataclass(frozen=True)
@@ -119,12 +158,38 @@ class _Ghdl:
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
         """What it prints on its two streams."""
         options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
-        done = subprocess.run(
-            ["ghdl", command, *options, *arguments], capture_output=True, text=True, errors="replace", check=False
-        )
-        if done.returncode:
-            raise NetlistError((done.stdout + done.stderr).rstrip())
-        return done.stdout, done.stderr
+        with (
+            tempfile.TemporaryFile() as errors,
+            subprocess.Popen(["ghdl", command, *options, *arguments], stdout=subprocess.PIPE, stderr=errors) as process,
+        ):
+            assert process.stdout
+            printed = _gulps(process.stdout.fileno()).decode("latin-1")
+            process.wait()
+            errors.seek(0)
+            said = errors.read().decode("latin-1")
+        if process.returncode:
+            raise NetlistError(_errors(printed + said))
+        return printed, said
+
+    def swapped(self, places: Iterable[str]) -> set[str]:
+        """Among places of subtractions, those of `integer - signed`."""
+        files = {place.rsplit(":", 2)[0] for place in places}
+        found: set[str] = set()
+        for library, names in self.translation.libraries.items():
+            analyse = partial(self.messages, "-s", f"--work={library}")
+            for file in sorted(files & set(of_signed(names))):
+                (index,) = self.folder.glob(f"{library}-obj*.cf")
+                text = index.read_text(encoding="latin-1")
+                found.update(subtractions_from_integers(file, text, analyse, self.folder))
+        return found
+
+    def messages(self, command: str, *arguments: str | Path) -> str:
+        """The errors that it reports; none if it succeeds."""
+        try:
+            self.run(command, *map(str, arguments))
+        except NetlistError as error:
+            return str(error)
+        return ""
 
     def synthesise(self, language: str) -> tuple[str, str]:
         """The netlist, and what GHDL says about it."""
@@ -135,17 +200,40 @@ class _Ghdl:
         )
 
 
-def _black_boxes(warnings: str, verilog: Sequence[str]) -> set[str]:
-    """The components without an entity, each of which must be a module; in the case that Verilog has them."""
-    found: set[str] = set()
-    for instance, component in set(_UNBOUND.findall(warnings)):
-        name = component.strip("\\")
-        if not (module := _module(name, verilog)):
-            raise NetlistError(
-                f"error: instance '{instance}' is of '{name}', which is neither an entity of this build's VHDL nor a "
-                f"module of its Verilog ({', '.join(verilog) or 'it has none'})"
+def _gulps(pipe: int) -> bytes:
+    """All that comes through a pipe. GHDL writes a word at a time; to be woken for each takes longer than its work."""
+    with suppress(OSError):
+        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _GULP)
+    parts = []
+    while part := os.read(pipe, _GULP):
+        parts.append(part)
+        time.sleep(_PAUSE)
+    return b"".join(parts)
+
+
+def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
+    """The components without an entity, each of which must be a module of the Verilog, and gets its name."""
+    found: dict[str, Module] = {}
+    for instance in (instance for module in modules.values() for instance in module.instances):
+        module = modules.get(instance.kind)
+        if module is None or module.is_defined or instance.kind in found:
+            continue
+        if not (name := _module(module.name, sources)):
+            raise instance.error(
+                f"instance '{instance.name}' is of '{module.name}', which is neither an entity of this build's VHDL "
+                f"nor a module of its Verilog ({', '.join(sources) or 'it has none'})"
             )
-        found.add(module)
+        module.name = name
+        found[instance.kind] = module
+    return list(found.values())
+
+
+def _generics(netlist: str) -> dict[tuple[str, str], dict[str, str]]:
+    """The generics of instances in GHDL's own Verilog, by the enclosing module and the instance."""
+    found: dict[tuple[str, str], dict[str, str]] = {}
+    for name, text in _DEFINITION.findall(netlist):
+        for values, instance in _GENERIC_MAP.findall(text):
+            found[name, instance] = dict(_GENERIC.findall(values))
     return found
 
 
@@ -158,22 +246,27 @@ def _module(name: str, verilog: Sequence[str]) -> str | None:
     return None
 
 
-def _without(netlist: str, modules: set[str]) -> str:
-    """A netlist without the empty modules that GHDL writes for components."""
-    for name in modules:
-        pattern = _EMPTY_MODULE.format(name=re.escape(name))
-        netlist = re.sub(pattern, "", netlist, flags=re.MULTILINE | re.IGNORECASE)
-    return netlist
+def _errors(text: str) -> str:
+    """What GHDL says of an end without success, without its notes and warnings; all if there is nothing else."""
+    found = "\n".join(line for item in _messages(text) if not re.search(r":(note|warning):", item[0]) for line in item)
+    return (found or text).rstrip()
 
 
 def _other_warnings(text: str) -> str:
-    """What GHDL warns of besides components without an entity; each warning is a line, and the source with a caret."""
-    lines = text.splitlines()
-    starts = [number for number, line in enumerate(lines) if re.match(r"\S+:\d+:\d+:", line)]
-    warnings = [lines[start:end] for start, end in pairwise([*starts, len(lines)])]
+    """What GHDL warns of besides components without an entity."""
     kept = [
         item
-        for item in warnings
+        for item in _messages(text)
         if ":warning:" in item[0] and "is not bound" not in item[0] and "(in default configuration" not in item[0]
     ]
     return "\n".join(line for item in kept for line in item)
+
+
+def _messages(text: str) -> list[list[str]]:
+    """GHDL's messages: each is a line, and may be followed by the source with a caret, or by more about a crash."""
+    messages: list[list[str]] = []
+    for line in text.splitlines():
+        if not messages or not line.startswith("  "):
+            messages.append([])
+        messages[-1].append(line)
+    return messages

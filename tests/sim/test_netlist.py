@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.netlist.repair import NetlistError
+from fusesoc_firm.netlist.model import NetlistError
 from tests.sim.ghdl import Library
 from tests.sim.verilog import compile_verilog, netlist
 
@@ -161,7 +161,7 @@ INSTANCE = "u : Inner port map (d => a, Q => q);"
         (entity("process (a, enable) begin if enable = '1' then q <= a; end if; end process;"), "latch"),
         (entity("q <= a and b;"), 'no declaration for "b"'),
         (entity("q <= a;").replace("entity top", "entity other").replace("of top", "of other"), "top"),
-        (entity(INSTANCE, COMPONENT), "'inner', which is neither an entity of this build's VHDL nor a module"),
+        (entity(INSTANCE, COMPONENT), "'Inner', which is neither an entity of this build's VHDL nor a module"),
         (entity("q(6 downto 0) <= a(6 downto 0);"), "no assignment for"),
     ],
 )

@@ -1,0 +1,129 @@
+"""Reads a netlist as `ghdl --synth --out=dump` prints it: every gate with its kind, its parameters and its nets.
+
+GHDL's netlists in VHDL and Verilog are translations of this one. The one in Verilog loses much on the way; here
+nothing is lost but the generics of components without an entity.
+"""
+
+from __future__ import annotations
+
+import re
+
+from fusesoc_firm.netlist.model import Instance, Module, Modules, Net, NetlistError, Port
+
+# A name is parts with dots: of the VHDL (which may be an extended identifier), of GHDL, or a number.
+_PART = re.compile(r"\\(\\(?:[^\\]|\\\\)*\\|[^\\.\s{\[:;]+)|\$(\w+)|%(\d+)")
+_NET = re.compile(r"(\S.*?)\{n(\d+)w(\d+)\}")
+_DRIVER = re.compile(r".* <- (?:.*\{n(\d+)w(\d+)\})?")
+_PORT = re.compile(r"(input|output) (.*?)(?:\[(?:(\d+):0|(\?))\])?;")
+_INSTANCE = re.compile(r"instance (.*?)\{i\d+\}: (.*)")
+# Who reads a net is known from the readers' inputs.
+_NOT_NEEDED = ("connect ", "attribute ")
+_MODULE = re.compile(r"module \{m\d+\} (.*)")
+_LOCATION = re.compile(r"# (.*:\d+:\d+)")
+
+
+def read(text: str) -> Modules:
+    """The modules of a netlist by name, as GHDL orders them; without GHDL's gates."""
+    reader = _Reader()
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.lstrip().startswith(_NOT_NEEDED):
+            continue
+        try:
+            reader.line(line)
+        except (ValueError, IndexError) as error:
+            raise NetlistError(f"line {number} of the netlist that GHDL dumps is not understood: {line}") from error
+    return {name: module for name, module in reader.modules.items() if not name.startswith("$")}
+
+
+class _Reader:
+    """What the lines so far say; a line belongs to what is less indented before it."""
+
+    def __init__(self) -> None:
+        self.modules: dict[str, Module] = {}
+        self._stack: list[Module] = []
+        self._instance: Instance | None = None
+        self._module: Module | None = None
+        self._location = ""
+
+    def line(self, line: str) -> None:
+        """Read the next line."""
+        text = line.lstrip()
+        depth = (len(line) - len(text)) // 2
+        word = text.partition(" ")[0]
+        if word == "module":
+            self._begin_module(depth, text)
+        elif word == "instance":
+            self._begin_instance(self._stack[depth - 1], text)
+        elif word == "#":
+            self._location = _matched(_LOCATION, text)[1]
+        elif word == "parameter":
+            self._stack[-1].parameters.append(_name(text.split()[1].rstrip(":")))
+        elif word == "parameters" and self._instance:
+            self._instance.parameters = text.split()[1:]
+        elif word in {"input", "output"} and " <- " not in text:
+            self._port(text)
+        elif word == "input":
+            number, width = _matched(_DRIVER, text).groups()
+            self._connect(Net(int(number), int(width)) if number else None)
+        elif word == "outputs":
+            self._drive(
+                [Net(int(number), int(width), _name(name)) for name, number, width in _NET.findall(text, len(word))]
+            )
+        elif text:
+            raise ValueError(text)
+
+    def _begin_module(self, depth: int, text: str) -> None:
+        name = _matched(_MODULE, text)[1]
+        # A gate keeps its dollar sign, so that it is no module of the user.
+        module = Module(name if name.startswith("$") else _name(name))
+        self._stack = [*self._stack[:depth], module]
+        self.modules[module.name] = module
+
+    def _port(self, text: str) -> None:
+        direction, name, high, is_empty = _matched(_PORT, text).groups()
+        module = self._stack[-1]
+        port = Port(_name(name), 0 if is_empty else int(high or 0) + 1)
+        (module.inputs if direction == "input" else module.outputs).append(port)
+
+    def _begin_instance(self, module: Module, text: str) -> None:
+        name, kind = _matched(_INSTANCE, text).groups()
+        instance = Instance(_name(name), kind if kind.startswith("$") else _name(kind), self._location)
+        self._location = ""
+        self._instance = instance
+        self._module = None
+        if instance.kind == module.name:
+            # A module seen from within: its outputs are inputs there.
+            module.is_defined = True
+            self._module = module
+        else:
+            module.instances.append(instance)
+
+    def _connect(self, net: Net | None) -> None:
+        if self._module:
+            self._module.results = [*self._module.results, net]
+        elif self._instance:
+            self._instance.inputs.append(net)
+
+    def _drive(self, nets: list[Net]) -> None:
+        if self._module:
+            self._module.arguments = nets
+        elif self._instance:
+            self._instance.outputs = nets
+
+
+def _matched(pattern: re.Pattern[str], text: str) -> re.Match[str]:
+    if not (found := pattern.fullmatch(text)):
+        raise ValueError(text)
+    return found
+
+
+def _name(text: str) -> str:
+    r"""A name as GHDL's own netlists write it: `\sum.%3` is `sum_n3`; an extended identifier loses its backslashes."""
+    parts = [_plain(user) if user else own or f"n{number}" for user, own, number in _PART.findall(text)]
+    if not parts:
+        raise ValueError(text)
+    return "_".join(parts)
+
+
+def _plain(identifier: str) -> str:
+    return identifier[1:-1].replace("\\\\", "\\") if identifier.startswith("\\") else identifier
