@@ -157,7 +157,7 @@ def test_a_bad_specification_ends_the_run_with_its_place(project: Path) -> None:
 
 
 def generated_files(build_root: Path) -> dict[str, bytes]:
-    """All that generators wrote, by core and path, but for calls of FuseSoC, which hold paths, and what names the run."""
+    """All that generators wrote, by core and path, but for FuseSoC's calls, which hold paths, and names of runs."""
     found = {}
     for path in build_root.rglob("generator_cache/*/**/*"):
         if path.is_file() and not path.name.endswith(("_input.yml", ".run")):
