@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import defaultdict
 from pathlib import PurePosixPath
 
 import pytest
@@ -16,12 +16,12 @@ def folder_of(test: str) -> str:
 
 
 def pytest_terminal_summary(terminalreporter: TerminalReporter) -> None:
-    seconds: Counter[str] = Counter()
+    seconds: dict[str, float] = defaultdict(float)
     for reports in terminalreporter.stats.values():
         for report in reports:
             if isinstance(report, pytest.TestReport):
                 seconds[folder_of(report.nodeid)] += report.duration
     terminalreporter.section("seconds by folder, of all processes")
-    for folder, total in seconds.most_common():
+    for folder, total in sorted(seconds.items(), key=lambda item: -item[1]):
         terminalreporter.line(f"{total:8.1f}  {folder}")
-    terminalreporter.line(f"{seconds.total():8.1f}  in all")
+    terminalreporter.line(f"{sum(seconds.values()):8.1f}  in all")

@@ -157,10 +157,10 @@ def test_a_bad_specification_ends_the_run_with_its_place(project: Path) -> None:
 
 
 def generated_files(build_root: Path) -> dict[str, bytes]:
-    """All that generators wrote, by core and path in it; FuseSoC's own call of them, which holds paths, is left out."""
+    """All that generators wrote, by core and path, but for FuseSoC's calls, which hold paths, and names of runs."""
     found = {}
     for path in build_root.rglob("generator_cache/*/**/*"):
-        if path.is_file() and not path.name.endswith("_input.yml"):
+        if path.is_file() and not path.name.endswith(("_input.yml", ".run")):
             core, *parts = path.parts[path.parts.index("generator_cache") + 1 :]
             found["/".join([core.rpartition("-")[0], *parts])] = path.read_bytes()
     return found
