@@ -8,6 +8,7 @@ import pytest
 
 from tests.sim.frames import Frame, random_frames, traffic, write_expected, write_stimulus
 from tests.sim.ghdl import Library, core_files
+from tests.sim.managers import manager_library
 
 WIDTHS = [8, 64, 512]
 CHANNELS = [1, 2, 3, 5, 16]
@@ -21,25 +22,7 @@ LONGEST_LATENCY = 6
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return _library(tmp_path_factory.mktemp("manager"))
-
-
-def _library(directory: Path) -> Library:
-    library = Library("firm", directory)
-    library.analyse(
-        core_files(
-            "axis/package",
-            "axis/axis",
-            "sched/package",
-            "sched/fixed_priority",
-            "manager/manager",
-            "sim/host",
-            "sim/parts",
-            "sim/echo",
-        )
-    )
-    library.analyse(core_files("manager/manager", fileset="tb"))
-    return library
+    return manager_library(tmp_path_factory.mktemp("manager"))
 
 
 def _write_files(directory: Path, frames: list[Frame], subscribers: int, publishers: int) -> int:
@@ -112,7 +95,7 @@ def test_a_frame_that_is_only_an_id_is_swallowed(library: Library, tmp_path: Pat
 
 @pytest.mark.parametrize(("width", "subscribers", "publishers"), [(8, 1, 1), (8, 5, 3), (64, 3, 5)])
 def test_the_netlist_does_the_same(tmp_path: Path, width: int, subscribers: int, publishers: int) -> None:
-    library = _library(tmp_path)
+    library = manager_library(tmp_path)
     sizes = {"WIDTH": width, "SUBSCRIBERS": subscribers, "PUBLISHERS": publishers}
     library.replace_by_netlist("firm_manager", sizes)
     library.replace_by_netlist("firm_sched_fixed_priority", {"REQUESTERS": publishers})

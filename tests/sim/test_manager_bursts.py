@@ -10,6 +10,7 @@ import pytest
 
 from fusesoc_firm.host.bursts import BurstJoiner
 from tests.sim.ghdl import CORES, Generic, Library, core_files
+from tests.sim.managers import manager_library
 
 BENCH = "firm_manager_burst_tb"
 WIDTHS = [8, 64, 512]
@@ -25,25 +26,7 @@ LATENCY = 2
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return _library(tmp_path_factory.mktemp("bursts"))
-
-
-def _library(directory: Path) -> Library:
-    library = Library("firm", directory)
-    library.analyse(
-        core_files(
-            "axis/package",
-            "axis/axis",
-            "sched/package",
-            "sched/fixed_priority",
-            "manager/manager",
-            "sim/host",
-            "sim/parts",
-            "sim/echo",
-        )
-    )
-    library.analyse(core_files("manager/manager", fileset="tb"))
-    return library
+    return manager_library(tmp_path_factory.mktemp("bursts"))
 
 
 @dataclass(frozen=True)
@@ -170,7 +153,7 @@ def test_the_channel_is_used_if_there_is_something_to_send(
 
 @pytest.mark.parametrize(("width", "publishers"), [(8, 1), (8, 5), (64, 16)])
 def test_the_netlist_does_the_same(tmp_path: Path, width: int, publishers: int) -> None:
-    library = _library(tmp_path)
+    library = manager_library(tmp_path)
     sizes: dict[str, Generic] = {"WIDTH": width, "SUBSCRIBERS": 1, "PUBLISHERS": publishers, "PREEMPTIVE": True}
     library.replace_by_netlist("firm_manager", sizes)
     library.analyse(core_files("manager/manager", fileset="tb"))
