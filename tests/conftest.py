@@ -20,7 +20,7 @@ import psutil
 import pytest
 from hypothesis import settings
 
-from fusesoc_firm.interrupts import accept_interrupts
+from fusesoc_firm.tools.interrupts import accept_interrupts
 
 pytest_plugins = ["tests.time_report"]
 

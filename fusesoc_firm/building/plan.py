@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.building.place_lock import PlaceLock
-from fusesoc_firm.diagnostics import Diagnostics, fail
-from fusesoc_firm.generation import GeneratorCall
+from fusesoc_firm.request.request import GeneratorCall
+from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 
 @dataclass(frozen=True)

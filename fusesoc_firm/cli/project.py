@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import add_picture, command
-from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.text.diagnostics import InputError, fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.gapi import MessageCores
-    from fusesoc_firm.generation import Request
-    from fusesoc_firm.lock import Lock
-    from fusesoc_firm.project import Instance, ProjectCore
-    from fusesoc_firm.reads import Input
+    from fusesoc_firm.building.cores import Instance, ProjectCore
+    from fusesoc_firm.plugin.gapi import MessageCores
+    from fusesoc_firm.plugin.lock import Lock
+    from fusesoc_firm.request.request import Request
+    from fusesoc_firm.store.reads import Input
 
 
 def add_project(commands: Any) -> None:
@@ -53,8 +53,8 @@ def add_project(commands: Any) -> None:
 
 
 def _draw_cores(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.pictures import check_picture, draw
-    from fusesoc_firm.project import core_graph
+    from fusesoc_firm.building.cores import core_graph
+    from fusesoc_firm.tools.pictures import check_picture, draw
 
     def sources(instance: Instance) -> list[str]:
         request = _request(instance)
@@ -66,7 +66,7 @@ def _draw_cores(arguments: argparse.Namespace) -> None:
 
 
 def _list_affected(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.project import affected, changed_files, project_cores
+    from fusesoc_firm.building.cores import affected, changed_files, project_cores
 
     changed = dict.fromkeys(path.resolve() for path in changed_files(arguments.since, Path.cwd()))
     found = affected(project_cores(), _touched(changed))
@@ -80,8 +80,8 @@ def check_locked(core: str) -> Path:
 
     Where that file is missing, there is nothing to hold the core to, which is a fault, too.
     """
-    from fusesoc_firm.lock import check_lock, lock_path, read_lock
-    from fusesoc_firm.project import dependencies
+    from fusesoc_firm.building.cores import dependencies
+    from fusesoc_firm.plugin.lock import check_lock, lock_path, read_lock
 
     found, depends = dependencies(core)
     path = lock_path(found)
@@ -91,9 +91,9 @@ def check_locked(core: str) -> Path:
 
 
 def _lock(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.lock import lock_path, lock_text
-    from fusesoc_firm.outputs import write
-    from fusesoc_firm.project import dependencies
+    from fusesoc_firm.building.cores import dependencies
+    from fusesoc_firm.plugin.lock import lock_path, lock_text
+    from fusesoc_firm.text.outputs import write
 
     if arguments.locked:
         print(f"{shown(check_locked(arguments.core))}: nothing differs")
@@ -105,7 +105,7 @@ def _lock(arguments: argparse.Namespace) -> None:
 
 def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
     """What a core uses now."""
-    from fusesoc_firm.lock import lock_of
+    from fusesoc_firm.plugin.lock import lock_of
 
     calls = {core.vlnv: [*_calls(core)]}
     for item in depends:
@@ -116,7 +116,7 @@ def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
 
 
 def _calls(core: ProjectCore) -> Iterator[tuple[Request, Sequence[Input]]]:
-    from fusesoc_firm.gapi import GENERATORS, MESSAGES
+    from fusesoc_firm.plugin.gapi import GENERATORS, MESSAGES
 
     for instance in core.instances:
         if instance.generator != MESSAGES and (request := _request(instance)):
@@ -142,8 +142,8 @@ def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
 
 def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
     """All that a generated core is made of, our own files too."""
-    from fusesoc_firm.gapi import GENERATORS, used_before
-    from fusesoc_firm.own_code import PACKAGE, digests
+    from fusesoc_firm.plugin.gapi import GENERATORS, used_before
+    from fusesoc_firm.store.own_code import PACKAGE, digests
 
     try:
         request = _request(instance)
@@ -161,7 +161,7 @@ def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
 
 def _request(instance: Instance) -> Request | None:
     """The request that FuseSoC would make; None for a generator that is not ours."""
-    from fusesoc_firm.gapi import GENERATORS, Call, make_request
+    from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
 
     if instance.generator not in GENERATORS:
         return None
@@ -172,9 +172,9 @@ def _request(instance: Instance) -> Request | None:
 
 def message_folders(names: MessageCores) -> tuple[Path, ...]:
     """The folders of cores that carry messages, where these lie: there is no run that copies them."""
-    from fusesoc_firm.gapi import MESSAGES
-    from fusesoc_firm.message_core import folders
-    from fusesoc_firm.project import project_cores
+    from fusesoc_firm.building.cores import project_cores
+    from fusesoc_firm.plugin.gapi import MESSAGES
+    from fusesoc_firm.request.message_core import folders
 
     found: list[Path] = []
     cores = {name: core for core in project_cores() for name in core.names}
@@ -189,7 +189,7 @@ def message_folders(names: MessageCores) -> tuple[Path, ...]:
 
 def _input_files(request: Request) -> list[Path]:
     """The files that a request depends on, be it in part."""
-    from fusesoc_firm.gapi import GENERATORS
+    from fusesoc_firm.plugin.gapi import GENERATORS
 
     found = (item if isinstance(item, Path) else item.path for item in GENERATORS[request.command].inputs(request))
     return [*dict.fromkeys(path.resolve() for path in found)]

@@ -15,10 +15,10 @@ from typing import Any
 
 import yaml
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.library import libraries
-from fusesoc_firm.system.generator import CoreFolders, LoadedSystem, load_system, no_core_folders, with_paths
-from fusesoc_firm.yaml_text import yaml_data
+from fusesoc_firm.system.system_core import CoreFolders, LoadedSystem, load_system, no_core_folders, with_paths
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.yaml_text import yaml_data
 
 
 @dataclass(frozen=True)

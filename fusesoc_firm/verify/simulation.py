@@ -15,8 +15,8 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.verify.loop import ENTITY
 
 STIMULUS_FILE, EXPECTED_FILE, OUTPUT_FILE = "stimulus.txt", "expected.txt", "output.txt"

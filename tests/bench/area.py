@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.bench.designs import CORES, PUBLISHER, SUBSCRIBER, Converter, NotConvertedError, generate
 from tests.bench.tables import FAILED, MET, MISSED, NOT_CONVERTED, Table, Tell
 from tests.bench.yosys import Cells, SynthesisError, Yosys

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.generation import Request
+from fusesoc_firm.request.request import Request
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.sim import systems
 from tests.sim.applications import SPECS

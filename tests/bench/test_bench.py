@@ -15,7 +15,7 @@ from fusesoc_firm.frame.values import CodecError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.system_core import load_system
 from tests import yowasp
 from tests.bench import figures, fuzz, store, systems
 from tests.bench.cycles import cycles_of

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.bench import schedulers
 from tests.bench.area import Subject
 from tests.bench.nextpnr import Nextpnr

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.generation import Plain
+from fusesoc_firm.request.request import Plain
 from tests.sim.ghdl import REPOSITORY
 from tests.sim.systems import GeneratedSystem, build, call
 

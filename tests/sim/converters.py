@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.generator import publisher_files, subscriber_files
+from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.frame.codec import used_bytes
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.sim.frames import write_expected, write_stimulus
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.unit.frame.oracle import Oracle

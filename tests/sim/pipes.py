@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.host.transport.simulator import Simulator
+from fusesoc_firm.node.transport.simulator import Simulator
 from tests.sim.ghdl import Generic, Library, core_files
 from tests.sim.verilog import compile_verilog
 

@@ -30,7 +30,7 @@ from fusesoc_firm.frame.model import Data, DataKind, Frame, FrameField, Loop, No
 from fusesoc_firm.frame.values import leaf_of, part_of, units_of
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL, Stimuli
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.unit.frame.oracle import Oracle

@@ -25,7 +25,7 @@ from fusesoc_firm.converter.variable_subscriber import (
     variable_subscriber_configuration,
 )
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Path, Step
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.sim.ghdl import Generic, Library, core_files
 
 LENGTH_BYTES = 4

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.generation import GeneratedCore, Plain, Request
-from fusesoc_firm.host import simulation
-from fusesoc_firm.system import generator
+from fusesoc_firm.request.request import GeneratedCore, Plain, Request
+from fusesoc_firm.simulation import simulation_core
+from fusesoc_firm.system import system_core
 from tests.sim.ghdl import Generic, Library, RunResult, core_files
 from tests.sim.schedulers import POLICY_CORES
 
@@ -77,9 +77,9 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
     Raises `InputError` and `GhdlError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    *kernels, bench = _write(simulation.generate(request), folder)
+    *kernels, bench = _write(simulation_core.generate(request), folder)
     # A kernel before the wrapper that instantiates it, the test bench last.
-    vhdl = [*kernels, *_write(generator.generate(request), folder), bench]
+    vhdl = [*kernels, *_write(system_core.generate(request), folder), bench]
     Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
     Library("work", folder).analyse(vhdl)
     return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
@@ -88,7 +88,7 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
 def generate_system(spec: Path, folder: Path) -> list[Path]:
     """Generate a system without its simulation into `folder`: its VHDL, in order. Raises `InputError`."""
     parameters: dict[str, Plain] = {"spec": spec.name, "product": "system", "paths": None, "distro": None}
-    return _write(generator.generate(Request("far", "test:sys:system:0", spec.parent, parameters)), folder)
+    return _write(system_core.generate(Request("far", "test:sys:system:0", spec.parent, parameters)), folder)
 
 
 def _write(core: GeneratedCore, folder: Path) -> list[Path]:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import manifest
-from fusesoc_firm.tools import missing
+from fusesoc_firm.tools import manifest
+from fusesoc_firm.tools.programs import missing
 from tests.sim.ghdl import REPOSITORY, Library
 from tests.sim.systems import build, call
 

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 import yaml
 
-from fusesoc_firm.system.generator import load_system
-from fusesoc_firm.system.sides import accelerator_ports
+from fusesoc_firm.system.derived.sides import accelerator_ports
+from fusesoc_firm.system.system_core import load_system
 from tests.sim.crossing_paths import Domains, unsynchronised
 from tests.sim.ghdl import Library, core_files
 from tests.sim.images import Message, copied, fed, image, odd_images, random_images

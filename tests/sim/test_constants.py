@@ -15,7 +15,7 @@ import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores
 
-from fusesoc_firm.converter.generator import constants_files
+from fusesoc_firm.converter.converter_core import constants_files
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name

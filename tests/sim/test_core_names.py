@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.gapi import GENERATORS, Call, make_request
+from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
 from tests.sim.ghdl import REPOSITORY, core_files
 
 MESSAGE = "geometry_msgs/Point"

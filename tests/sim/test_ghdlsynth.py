@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm import manifest
+from fusesoc_firm.tools import manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 

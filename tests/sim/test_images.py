@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.analysis import derive
-from fusesoc_firm.system.specification import read_specification
+from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.written.specification import read_specification
+from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.sim.ghdl import Library, core_files
 from tests.sim.images import (
     SPECS,

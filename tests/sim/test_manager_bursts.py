@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.host.bursts import BurstJoiner
+from fusesoc_firm.node.bursts import BurstJoiner
 from tests.sim.ghdl import CORES, Generic, Library, core_files
 from tests.sim.managers import manager_library
 

@@ -22,7 +22,7 @@ from fusesoc_firm.frame.select import select
 from fusesoc_firm.frame.values import part_of, units_of
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.stimuli import KINDS, Stimuli
 from tests.sim.ghdl import Library
 from tests.unit.frame.oracle import Oracle

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.host.bursts import BurstJoiner, JoinedFrame
 from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.node.bursts import BurstJoiner, JoinedFrame
 from tests.sim.applications import SPECS
 from tests.sim.images import image
 from tests.sim.pass_through import QUIET, PassThrough, received, systems_of_all

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 import yaml
 
-from fusesoc_firm.generation import Plain
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.request.request import Plain
 from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
 from tests.sim.applications import SPECS, for_ros2, simulation
 from tests.sim.ghdl import Library, core_files

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.system.specification import SCHEDULERS
+from fusesoc_firm.system.written.specification import SCHEDULERS
 from tests.sim.systems import GeneratedSystem, build, call
 
 SEED = 20241008

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.host.transport.simulator import ErrorPulse, Event, Simulator, Taken
-from fusesoc_firm.host.transport.transport import Burst, TransportError
+from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Simulator, Taken
+from fusesoc_firm.node.transport.transport import Burst, TransportError
 from tests.sim.frames import random_frames
 from tests.sim.pipes import TOOLS, PipeBench, pipe_bench
 
@@ -228,7 +228,7 @@ def test_without_pipes_it_says_so(bench: PipeBench) -> None:
 
 _HOST = """
 import sys, time
-from fusesoc_firm.host.transport.simulator import Simulator
+from fusesoc_firm.node.transport.simulator import Simulator
 simulator = Simulator(sys.argv[1:])
 print(simulator._process.pid, flush=True)
 simulator.run(1)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.text.diagnostics import InputError
 from tests.sim.images import SPECS, broken_images, built, copied, fed, image, load_model, odd_images
 from tests.sim.systems import DATA, GeneratedSystem, build, call
 

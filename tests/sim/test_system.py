@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 import yaml
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.host import simulation
+from fusesoc_firm.simulation import simulation_core
+from fusesoc_firm.text.diagnostics import InputError
 from tests.sim.frames import traffic
 from tests.sim.ghdl import CORES, REPOSITORY, GhdlError, Library, core_files
 from tests.sim.systems import DATA, GeneratedSystem, build, call
@@ -278,7 +278,7 @@ def test_no_path_gets_into_a_compiled_function(typed: GeneratedSystem, tmp_path:
     shutil.copytree(DATA, copy)
     stimuli = write_stimuli(tmp_path / "stimuli.yaml", list(typed_stimuli()))
     request = call(copy / "typed.yaml", stimuli, copy / "typed_model.py", paths=["typed_msgs"])
-    files = simulation.generate(request).files
+    files = simulation_core.generate(request).files
     for name in ("libnegate.so", "libcopy.so", "libdifference.so"):
         assert files[name].content == (typed.folder / name).read_bytes()
 
@@ -292,7 +292,7 @@ def kernel_fault(folder: Path, code: str) -> str:
     (folder / "model.py").write_text("def respond(_, message):\n    return [('pub', message)]\n", encoding="utf-8")
     stimuli = write_stimuli(folder / "stimuli.yaml", [("sub", {"data": 0})])
     with pytest.raises(InputError) as raised:
-        simulation.generate(call(spec, stimuli, folder / "model.py"))
+        simulation_core.generate(call(spec, stimuli, folder / "model.py"))
     assert f"{spec}:5:14: error: " in str(raised.value)
     return str(raised.value)
 

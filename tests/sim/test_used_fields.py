@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.converter.generator import publisher_files, subscriber_files
+from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.message.model import RosVersion
 from tests.sim.converters import EVERYTHING, ConverterBench, Selection, printed, troubled_frames

@@ -20,7 +20,7 @@ from fusesoc_firm.converter.variable_publisher import (
 )
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL
 from tests.sim.ghdl import Library, core_files
 from tests.sim.publishers import ID, SHORT, Publisher, PublisherBench

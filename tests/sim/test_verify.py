@@ -19,18 +19,18 @@ from typing import NoReturn
 
 import pytest
 
-from fusesoc_firm import workers
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Fixed, Frame
-from fusesoc_firm.generation import GeneratedFile
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.request.request import GeneratedFile
+from fusesoc_firm.tools import workers
+from fusesoc_firm.tools.workers import Workers
 from fusesoc_firm.verify import command, simulation, task
 from fusesoc_firm.verify.definitions import NoJudgementError
 from fusesoc_firm.verify.judge import Judgement, judge
 from fusesoc_firm.verify.task import Result, Task, Verdict, verify
-from fusesoc_firm.workers import Workers
 from tests.processes import IGNORING_INTERRUPTS
 from tests.sim.ghdl import CORES, REPOSITORY, Library
 from tests.unit.verify.messages import ROS1, ROS2, standard

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.text.diagnostics import InputError
 from tests.sim import systems
 from tests.sim.first_versions import BOARD, IMAGE_STIMULUS, ZEROS, write_messages
 from tests.sim.verilog import Icarus, build

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.generation import Request
-from fusesoc_firm.host import simulation
 from fusesoc_firm.netlist.translation import Translation, translate
-from fusesoc_firm.system import generator
+from fusesoc_firm.request.request import Request
+from fusesoc_firm.simulation import simulation_core
+from fusesoc_firm.system import system_core
 from tests.processes import limited
 from tests.sim.ghdl import CORES, Generic, RunResult, core_files
 from tests.sim.systems import RUNTIME
@@ -93,7 +93,7 @@ def translated(request: Request, folder: Path, *cores: str) -> tuple[str, list[P
     request = Request(request.command, request.vlnv, request.files_root, {**request.parameters, "simulator": "icarus"})
     work: list[Path] = []
     verilog: list[Path] = []
-    for core in (generator.generate(request), simulation.generate(request)):
+    for core in (system_core.generate(request), simulation_core.generate(request)):
         for name, file in core.files.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.batch import prepare
-from fusesoc_firm.generation import GeneratorCall
+from fusesoc_firm.plugin.batch import prepare
+from fusesoc_firm.request.request import GeneratorCall
 from tests.sim.ghdl import REPOSITORY
 
 # Of variable and of fixed size, which use other templates.

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.store import Key, Made, default_store
+from fusesoc_firm.store.store import Key, Made, default_store
 
 Captured = pytest.CaptureFixture[str]
 

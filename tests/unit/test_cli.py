@@ -15,7 +15,7 @@ import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.cli.message import STAGES
-from fusesoc_firm.library_path import demos_root, library_root
+from fusesoc_firm.tools.library_path import demos_root, library_root
 
 ROOT = Path(__file__).resolve().parents[2]
 SPEC = ROOT / "specs" / "quat2euler" / "quat2euler.yaml"

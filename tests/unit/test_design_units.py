@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.design_units import units_of
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.store.design_units import units_of
+from fusesoc_firm.tools.library_path import library_root
 
 CORE = """\
 CAPI=2:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, fail, nearest
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, fail, nearest
 
 PLACE = SourceRef("a.msg", 3, 7, "uint8 fo o", 4)
 

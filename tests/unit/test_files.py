@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.files import read_file, write_if_changed, write_whole
+from fusesoc_firm.text.files import read_file, write_if_changed, write_whole
 
 
 def test_write_if_changed_keeps_an_unchanged_file(tmp_path: Path) -> None:

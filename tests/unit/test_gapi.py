@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import yaml
 
-from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.gapi import GENERATORS, Generator, main
-from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request
-from fusesoc_firm.parameters import Parameter
+from fusesoc_firm.plugin.gapi import GENERATORS, Generator, main
+from fusesoc_firm.request.parameters import Parameter
+from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
+from fusesoc_firm.text.diagnostics import fail
 
 CORE = """\
 CAPI=2:
@@ -145,7 +145,7 @@ def test_the_core_is_written_last(bench: Bench, monkeypatch: pytest.MonkeyPatch)
         written.append(str(path))
         return True
 
-    monkeypatch.setattr("fusesoc_firm.gapi.write_if_changed", note)
+    monkeypatch.setattr("fusesoc_firm.plugin.gapi.write_if_changed", note)
     bench.run(spec="spec.yaml")
     bench.run(spec="spec.yaml")
     assert written == ["rtl/b.vhd", "a.bin", "arm-system.core"] * 2
@@ -162,7 +162,7 @@ def test_a_full_disk_is_a_fault_and_leaves_no_core(
         written.append(path.name)
         return True
 
-    monkeypatch.setattr("fusesoc_firm.gapi.write_if_changed", fill)
+    monkeypatch.setattr("fusesoc_firm.plugin.gapi.write_if_changed", fill)
     assert bench.run(spec="spec.yaml") == 1
     assert capsys.readouterr().err == f"error: cannot write {bench.work / 'a.bin'}: No space left on device\n"
     assert not list(bench.work.glob("*.core"))

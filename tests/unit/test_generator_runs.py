@@ -21,8 +21,8 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main as firm
-from fusesoc_firm.own_code import PACKAGE
-from fusesoc_firm.store_files import CALL, ENTRY, USES
+from fusesoc_firm.store.layout import CALL, ENTRY, USES
+from fusesoc_firm.store.own_code import PACKAGE
 from tests.processes import IGNORING_INTERRUPTS
 
 ROOT = PACKAGE.parent

@@ -21,11 +21,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.gapi import main
-from fusesoc_firm.own_code import PACKAGE
-from fusesoc_firm.project import Instance, project_cores
-from fusesoc_firm.reads import Reads, noted
-from fusesoc_firm.store_files import CALL
+from fusesoc_firm.building.cores import Instance, project_cores
+from fusesoc_firm.plugin.gapi import main
+from fusesoc_firm.store.layout import CALL
+from fusesoc_firm.store.own_code import PACKAGE
+from fusesoc_firm.store.reads import Reads, noted
 
 SPECS = PACKAGE.parent / "specs"
 # Fixed and variable sizes, streams, both versions of ROS, a service.
@@ -39,7 +39,7 @@ CONVERTERS: tuple[Mapping[str, object], ...] = (
 # What is answered first may leave something behind in the process.
 GENERATE = """
 import json, os, sys
-from fusesoc_firm.gapi import main
+from fusesoc_firm.plugin.gapi import main
 for folder, command in json.load(sys.stdin):
     os.chdir(folder)
     if main(command, ["call.yml"]):

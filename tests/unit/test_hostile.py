@@ -23,11 +23,11 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.gapi import GENERATORS
-from fusesoc_firm.generation import GeneratedCore, GeneratedFile, Request, as_files
-from fusesoc_firm.host.simulator import _build_folder
-from fusesoc_firm.system.board import read_board
+from fusesoc_firm.plugin.gapi import GENERATORS
+from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request, as_files
+from fusesoc_firm.simulation.simulator import _build_folder
+from fusesoc_firm.system.boards.board import read_board
+from fusesoc_firm.text.diagnostics import InputError
 
 CANARY = "hostile_canary"
 # Printable, so legal; each means something to one language or another.
@@ -382,8 +382,8 @@ def test_pictures(project: Project) -> None:
 
 def test_a_picture_of_a_trace(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
-    from fusesoc_firm.host.node.trace import COLUMNS
-    from fusesoc_firm.host.node.trace_picture import draw_trace
+    from fusesoc_firm.node.trace import COLUMNS
+    from fusesoc_firm.node.trace_picture import draw_trace
 
     rows = [",".join(COLUMNS)]
     for name in ("$\\bad{$", "$x$ \\alpha"):

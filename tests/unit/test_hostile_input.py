@@ -21,17 +21,17 @@ from hypothesis import strategies as st
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.converter.config_file import read_config
-from fusesoc_firm.diagnostics import Diagnostics, InputError
-from fusesoc_firm.host.stimuli import read_stimuli
-from fusesoc_firm.lock import read_lock
 from fusesoc_firm.message.bounds import MOST_FIELDS, MOST_LEVELS
 from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_message, parse_name
-from fusesoc_firm.system.board import read_board
-from fusesoc_firm.system.specification import read_specification
-from fusesoc_firm.yaml_text import yaml_data
+from fusesoc_firm.plugin.lock import read_lock
+from fusesoc_firm.simulation.stimuli import read_stimuli
+from fusesoc_firm.system.boards.board import read_board
+from fusesoc_firm.system.written.specification import read_specification
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.yaml_text import yaml_data
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 # Seconds of the processor that a child has; each takes one or two. One that waits for ever is ended, too.

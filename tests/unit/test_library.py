@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from fusesoc_firm import __version__
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.tools.library_path import library_root
 
 ROOT = Path(__file__).resolve().parents[2]
 GENERATORS = "robot:firm:generators"

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import launcher, manifest, tools
+from fusesoc_firm.tools import launcher, manifest, programs
 from tests.sim.ghdl import REPOSITORY
 
 SHOW = 'if [ "$1" = --version ]; then echo "A simulator"; echo "of version {}, built with care"; else exit {}; fi'
@@ -109,12 +109,12 @@ def test_what_cannot_be_read_is_written_anew(work: Path, content: str) -> None:
 
 
 def test_programs_are_noted_at_the_same_time(work: Path) -> None:
-    names = [name for name in tools.PROGRAMS if name not in ("icepack", "icetime")]
+    names = [name for name in programs.PROGRAMS if name not in ("icepack", "icetime")]
     for name in names:
         install(work.parent / "bin", name, "1")
 
     def start(name: str) -> int:
-        command = [sys.base_prefix + "/bin/python3", "-m", "fusesoc_firm.launcher", name]
+        command = [sys.base_prefix + "/bin/python3", "-m", "fusesoc_firm.tools.launcher", name]
         return subprocess.run(command, check=False, env=environment).returncode
 
     environment = {"PATH": str(work.parent / "bin"), "PYTHONPATH": f"{REPOSITORY}:{':'.join(sys.path)}"}

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.tools.library_path import library_root
 
 BASE = """\
 CAPI=2:

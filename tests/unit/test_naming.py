@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fusesoc_firm.naming import (
+from fusesoc_firm.text.naming import (
     KEYWORDS,
     VHDL_KEYWORDS,
     VHDL_PREDEFINED,

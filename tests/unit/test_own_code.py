@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.own_code import PACKAGE, digests, used_code
+from fusesoc_firm.store.own_code import PACKAGE, digests, used_code
 
 
 def test_modules_templates_and_data_count_but_not_the_library(tmp_path: Path) -> None:
@@ -38,7 +38,7 @@ def test_modules_templates_and_data_count_but_not_the_library(tmp_path: Path) ->
 
 def test_what_is_used_is_counted() -> None:
     used = used_code()
-    assert "own_code.py" in used
+    assert "store/own_code.py" in used
     assert set(used) <= digests().keys()
 
 
@@ -62,7 +62,7 @@ class Project:
         parameters = {"message": message, "ros": 2, "paths": ["msgs"]}
         call = {"files_root": str(self.folder), "vlnv": f"a:b:c-{message.rpartition('/')[2].lower()}:1"}
         (work / "call.yml").write_text(yaml.safe_dump(call | {"parameters": parameters}))
-        script = "import sys; from fusesoc_firm.gapi import main; sys.exit(main('firm', sys.argv[1:]))"
+        script = "import sys; from fusesoc_firm.plugin.gapi import main; sys.exit(main('firm', sys.argv[1:]))"
         done = subprocess.run(
             [sys.executable, "-c", script, "call.yml"],
             cwd=work,
@@ -96,7 +96,7 @@ def test_an_edit_makes_just_its_dependants_anew(project: Project) -> None:
     assert project.origins() == [found, made, found]
     project.edit("templates/vhdl/subscriber.vhd.mustache")
     assert project.origins() == [made, made, found]
-    project.edit("host/bursts.py")
+    project.edit("node/bursts.py")
     assert project.origins() == [found, found, found]
     project.edit("naming.py")
     assert project.origins() == [made, made, made]

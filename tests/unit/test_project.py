@@ -13,12 +13,12 @@ import pytest
 import yaml
 
 from fusesoc_firm import __version__
+from fusesoc_firm.building.cores import project_cores
 from fusesoc_firm.cli import main
-from fusesoc_firm.gapi import main as generate
-from fusesoc_firm.library_path import library_root
-from fusesoc_firm.own_code import PACKAGE
-from fusesoc_firm.project import project_cores
-from fusesoc_firm.tools import Program
+from fusesoc_firm.plugin.gapi import main as generate
+from fusesoc_firm.store.own_code import PACKAGE
+from fusesoc_firm.tools.library_path import library_root
+from fusesoc_firm.tools.programs import Program
 
 LEAF = """\
 CAPI=2:
@@ -127,12 +127,12 @@ def test_our_own_files_count_where_they_were_used(
     project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def edited(name: str) -> dict[str, str]:
-        monkeypatch.setattr("fusesoc_firm.project.changed_files", lambda *_: [PACKAGE / name])
+        monkeypatch.setattr("fusesoc_firm.building.cores.changed_files", lambda *_: [PACKAGE / name])
         return touched(capsys)
 
     # What was never made may use any of them.
     assert "top" in edited("templates/core/system.core.mustache")
-    monkeypatch.setattr("fusesoc_firm.gapi.used_before", lambda *_: ["naming.py"])
+    monkeypatch.setattr("fusesoc_firm.plugin.gapi.used_before", lambda *_: ["naming.py"])
     assert edited("templates/core/system.core.mustache") == {}
     assert list(edited("naming.py"))[-1] == "top"
 
@@ -278,7 +278,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
         program.write_text(f"#!/bin/sh\necho {text}\n")
         program.chmod(0o755)
 
-    monkeypatch.setattr("fusesoc_firm.tools.PROGRAMS", {"ghdl": Program("ghdl")})
+    monkeypatch.setattr("fusesoc_firm.tools.programs.PROGRAMS", {"ghdl": Program("ghdl")})
     monkeypatch.setenv("PATH", str(project / "bin"))
     install("GHDL 2.0.0")
     main(["lock", "me:p:top"])
@@ -292,7 +292,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     capsys.readouterr()
     install("GHDL 2.0.0")
     assert locked(capsys) == []
-    monkeypatch.setattr("fusesoc_firm.own_code.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.store.own_code.digests", lambda: {"naming.py": "edited"})
     (found,) = locked(capsys)
     assert found.startswith("tool fusesoc-firm: sha256 is ")
 
@@ -357,7 +357,7 @@ def test_a_generator_refuses_what_is_not_locked(
     size.write_text("uint8 a\n")
     # It is in the store, and compared all the same.
     assert call(project, **more) == 0
-    monkeypatch.setattr("fusesoc_firm.own_code.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.store.own_code.digests", lambda: {"naming.py": "edited"})
     assert call(project, **more) == 1
     assert "tool fusesoc-firm: sha256 is " in capsys.readouterr().err
     monkeypatch.undo()

@@ -9,8 +9,8 @@ from prompt_toolkit.application import create_app_session
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.prompts import PipeAsker, Question, TerminalAsker
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.prompts import PipeAsker, Question, TerminalAsker
 
 COLOUR = Question("colour", "the lamp's colour", ("red", "green"), is_choice=True, default="red")
 NAME = Question("name", "what it is called", is_required=True, check=lambda answer: "too long" if answer[4:] else None)

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm import quoting
-from fusesoc_firm.render import TEMPLATES, TemplateError, render
+from fusesoc_firm.text import quoting
+from fusesoc_firm.text.render import TEMPLATES, TemplateError, render
 
 # Text that means something in one language or another, and characters that end a line somewhere.
 PIECES = (

@@ -6,14 +6,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fusesoc_firm.own_code import PACKAGE
+from fusesoc_firm.store.own_code import PACKAGE
 
 # A process of its own, so that nothing has asked for Python's paths yet. Since Python 3.13, `sysconfig` opens files to
 # answer; here it does so in every version.
 PROGRAM = """
 import sys
 import sysconfig
-from fusesoc_firm.reads import Reads, noted
+from fusesoc_firm.store.reads import Reads, noted
 
 asked = sysconfig.get_paths
 

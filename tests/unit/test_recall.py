@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm import recall
-from fusesoc_firm.gapi import main
-from fusesoc_firm.own_code import PACKAGE
-from fusesoc_firm.recall import answer
-from fusesoc_firm.store_files import CALL, ENTRY, USES, read_note, write_json
+from fusesoc_firm.plugin.gapi import main
+from fusesoc_firm.store import recall
+from fusesoc_firm.store.layout import CALL, ENTRY, USES, read_note, write_json
+from fusesoc_firm.store.own_code import PACKAGE
+from fusesoc_firm.store.recall import answer
 
 QUAT2EULER = Path(__file__).resolve().parents[2] / "specs" / "quat2euler"
 
@@ -154,7 +154,7 @@ def test_other_parameters_are_another_call(calls: Calls) -> None:
 def test_an_edit_of_a_module_or_template_of_ours_counts(calls: Calls, tmp_path: Path) -> None:
     # Those that other tests read count in this process.
     for name in ("_READ", "_RENDERED"):
-        calls.monkeypatch.setattr(f"fusesoc_firm.render.{name}", set())
+        calls.monkeypatch.setattr(f"fusesoc_firm.text.render.{name}", set())
     arguments = calls.converter()
     main("firm", arguments)
     (note,) = calls.store.rglob(f"*{CALL}")
@@ -265,7 +265,7 @@ def test_what_is_edited_while_the_facts_are_noted_is_not_noted(calls: Calls, is_
             calls.write("msgs/second/my_msgs/msg/Size.msg", text)
         return recall.facts(kind, names)
 
-    calls.monkeypatch.setattr("fusesoc_firm.gapi.facts", edit_after)
+    calls.monkeypatch.setattr("fusesoc_firm.plugin.gapi.facts", edit_after)
     assert main("firm", arguments) == 0
     assert not answer("firm", arguments)
     assert [*calls.store.rglob(f"*{CALL}")] == []
@@ -307,7 +307,7 @@ def test_next_to_nothing_is_imported(calls: Calls) -> None:
     """Time is lost with imports: those that an answer cannot do without are all there are."""
     main("firm", calls.converter())
     script = (
-        "import sys; before = {*sys.modules}; from fusesoc_firm.recall import answer; "
+        "import sys; before = {*sys.modules}; from fusesoc_firm.store.recall import answer; "
         "print(answer('firm', ['call.yml'])); print(*sorted({*sys.modules} - before))"
     )
     environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}

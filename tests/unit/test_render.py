@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.render import TemplateError, render
+from fusesoc_firm.text.render import TemplateError, render
 
 Expand = Callable[..., str]
 

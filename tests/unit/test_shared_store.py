@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.store import Key, Made, Store
-from fusesoc_firm.store_files import ENTRY, LAYOUT, LOCK, USES, place, read_entry, read_note, read_uses
+from fusesoc_firm.store.layout import ENTRY, LAYOUT, LOCK, USES, place, read_entry, read_note, read_uses
+from fusesoc_firm.store.store import Key, Made, Store
 
 REQUEST = "ab" + "0" * 62
 FILES = {"rtl/a.vhd": b"entity a\n", "top.core": b"CAPI=2:\n"}

@@ -17,10 +17,10 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm import shared_files
-from fusesoc_firm import store as store_module
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.store import (
+from fusesoc_firm.store import shared_files
+from fusesoc_firm.store import store as store_module
+from fusesoc_firm.store.layout import default_root, read_entry
+from fusesoc_firm.store.store import (
     Entry,
     Key,
     Made,
@@ -29,7 +29,7 @@ from fusesoc_firm.store import (
     parse_size,
     request_digest,
 )
-from fusesoc_firm.store_files import default_root, read_entry
+from fusesoc_firm.text.diagnostics import InputError
 
 REQUEST = "ab" + "0" * 62
 CODE = {"render.py": "1", "frame.py": "2", "a.mustache": "3"}
@@ -161,7 +161,7 @@ def test_a_store_that_can_only_be_read_gives_what_it_has(
 FULL = """
 import resource, sys
 from pathlib import Path
-from fusesoc_firm.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Made, Store
 resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000))
 files = {"a.vhd": bytes(20_000)}
 store = Store(Path(sys.argv[1]), 2**30)
@@ -179,7 +179,7 @@ def test_a_full_disk_is_done_without(tmp_path: Path) -> None:
 OBTAIN = """
 import sys
 from pathlib import Path
-from fusesoc_firm.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Made, Store
 root, log, request = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
 FILES = {f"{n}.vhd": bytes([n]) * 100_000 for n in range(20)}
 def build():
@@ -235,7 +235,7 @@ def test_processes_at_once(tmp_path: Path, script: str) -> None:
 HANG_IN_BUILD = """
 import sys
 from pathlib import Path
-from fusesoc_firm.store import Key, Store
+from fusesoc_firm.store.store import Key, Store
 def build():
     print("in the middle", flush=True)
     sys.stdin.read()
@@ -244,7 +244,7 @@ Store(Path(sys.argv[1]), 2**30).obtain(lambda: Key(sys.argv[2], {}), build)
 HANG_BEFORE_RENAME = """
 import os, sys
 from pathlib import Path
-from fusesoc_firm.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Made, Store
 def replace(*_, **__):
     print("in the middle", flush=True)
     sys.stdin.read()
@@ -307,7 +307,7 @@ def test_what_is_gone_while_it_is_read_is_made(tmp_path: Path, monkeypatch: pyte
 FILL = """
 import itertools, sys
 from pathlib import Path
-from fusesoc_firm.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Made, Store
 store = Store(Path(sys.argv[1]), int(sys.argv[2]))
 print("running", flush=True)
 for number in itertools.count():

@@ -10,9 +10,9 @@ import yaml
 
 from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
-from fusesoc_firm.gapi import GENERATORS, Call, make_request
-from fusesoc_firm.generation import as_files
-from fusesoc_firm.render import TEMPLATES, Rendering, recorded, render, traced_lines
+from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
+from fusesoc_firm.request.request import as_files
+from fusesoc_firm.text.render import TEMPLATES, Rendering, recorded, render, traced_lines
 
 SPECS = Path(__file__).resolve().parents[2] / "specs"
 APPLICATIONS = ("quat2euler", "image_pipeline", "mobile_robot")

@@ -17,9 +17,9 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm import workers
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools import workers
 from tests.processes import IGNORING_INTERRUPTS
 from tests.sim.ghdl import REPOSITORY
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
-from fusesoc_firm.yaml_text import Text, YamlText, is_null, items, kind, parse_yaml, read_yaml
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.yaml_text import Text, YamlText, is_null, items, kind, parse_yaml, read_yaml
 
 
 def parse(text: str) -> tuple[YamlText, str]:

@@ -15,9 +15,9 @@ from fusesoc_firm.converter.configuration import (
 from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoredBytes, StoreMap, Stream, ranges, stores_of
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.naming import KEYWORDS
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.naming import KEYWORDS
 from tests.unit.frame.samples import AWKWARD
 from tests.unit.frame.test_layout import layout
 

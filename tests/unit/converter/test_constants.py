@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.converter.generator import constants_files, generate
-from fusesoc_firm.generation import Plain, Request
+from fusesoc_firm.converter.converter_core import constants_files, generate
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
+from fusesoc_firm.request.request import Plain, Request
 from tests.expected import check_expected
 from tests.unit.frame.oracle import parsed
 

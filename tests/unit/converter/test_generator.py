@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.converter.generator import generate, inputs
+from fusesoc_firm.converter.converter_core import generate, inputs
 from fusesoc_firm.converter.interfaces import interface_configuration
 from fusesoc_firm.converter.order import order_of_config
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.generation import GeneratedCore, Plain, Request
 from fusesoc_firm.message.library import libraries
+from fusesoc_firm.request.request import GeneratedCore, Plain, Request
+from fusesoc_firm.text.diagnostics import InputError
 from tests.expected import check_expected
 
 GOLDEN = Path(__file__).parents[2] / "golden"

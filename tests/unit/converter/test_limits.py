@@ -8,11 +8,11 @@ import pytest
 
 from fusesoc_firm.converter.configuration import publisher_configuration, subscriber_configuration
 from fusesoc_firm.converter.limits import check_fixed_size
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.text.diagnostics import InputError
 
 TEXTS = {
     "Main": "uint8 a\nstring<=3 b\nPart[2] c\nPart[] d\nstring[2] e\nPart f\n",

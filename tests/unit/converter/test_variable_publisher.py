@@ -13,11 +13,11 @@ from fusesoc_firm.converter.variable_publisher import (
     Configuration,
     variable_publisher_configuration,
 )
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.render import TEMPLATES, render
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.render import TEMPLATES, render
 from tests.unit.frame.test_layout import layout
 
 ROS1, ROS2 = RosVersion

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.converter.generator import publisher_files, subscriber_files
+from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import RosVersion
 from tests.expected import check_expected

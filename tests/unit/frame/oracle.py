@@ -21,12 +21,12 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.base import normalize_fieldname
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_message, parse_name
+from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.typestores import typestore
 
 _STORES = {RosVersion.ROS1: Stores.ROS1_NOETIC, RosVersion.ROS2: Stores.ROS2_JAZZY}

@@ -16,7 +16,6 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode, encode, used_bytes
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
@@ -33,6 +32,7 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.stores import distributions
+from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.verify.stimuli import EMPTY, KINDS, Stimuli
 from tests.unit.frame.genpy_oracle import GenpyOracle, has_genpy
 from tests.unit.frame.oracle import DefinitionsOracle, Oracle, is_same

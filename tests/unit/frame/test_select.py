@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError, SourceRef
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Pad, all_nodes
 from fusesoc_firm.frame.select import select
+from fusesoc_firm.text.diagnostics import InputError, SourceRef
 from tests.unit.frame.test_codec_of_any_message import image
 from tests.unit.frame.test_nodes import ROS1, ROS2, frame, outline, standard
 

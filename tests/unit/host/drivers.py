@@ -1,4 +1,4 @@
-"""Programs that speak for `fusesoc_firm/host/cpp` and `fusesoc_firm/host/c`: lines in, lines out."""
+"""Programs that speak for `fusesoc_firm/node/cpp` and `fusesoc_firm/node/c`: lines in, lines out."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import fusesoc_firm.host
+import fusesoc_firm.node
 
 HERE = Path(__file__).resolve().parent
-HEADERS = Path(fusesoc_firm.host.__file__).resolve().parent / "cpp"
+HEADERS = Path(fusesoc_firm.node.__file__).resolve().parent / "cpp"
 C_FOLDER = HEADERS.parent / "c"
 _OPTIONS = ["-std=c++17", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow"]
 _OPTIONS += ["-Wconversion", "-Wsign-conversion", "-Werror", "-pthread"]

@@ -10,13 +10,13 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.node.carrier import CarrierError, Published, Taken
-from fusesoc_firm.host.node.description import NodeDescription
-from fusesoc_firm.host.node.node import HardwareListener, Node, NodeSettings, OpenTransport
-from fusesoc_firm.host.node.software import NodeSoftware
-from fusesoc_firm.host.node.trace import Trace
-from fusesoc_firm.host.transport.transport import Burst, TransportError
-from fusesoc_firm.system.generator import LoadedSystem, load_system
+from fusesoc_firm.node.carrier import CarrierError, Published, Taken
+from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.engine import HardwareListener, Node, NodeSettings, OpenTransport
+from fusesoc_firm.node.software import NodeSoftware
+from fusesoc_firm.node.trace import Trace
+from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from tests.unit.system.systems import LIBRARIES, accelerator, converter, instance, specification
 
 # What a frame leads to.

@@ -14,7 +14,7 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
-from fusesoc_firm.host.bursts import split_frame
+from fusesoc_firm.node.bursts import split_frame
 
 FAULTS = ("exit", "kill", "cut", "garbage", "hang", "unsent", "backwards", "long", "deaf", "error")
 

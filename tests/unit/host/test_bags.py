@@ -15,17 +15,17 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.bags.routes import routes_of
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.host.routes import routes_of
-from fusesoc_firm.host.stimuli import Stimulus, read_stimuli
 from fusesoc_firm.message.bags import open_bag
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.system.derived import Converter
+from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
+from fusesoc_firm.system.derived.model import Converter
+from fusesoc_firm.text.diagnostics import InputError
 from tests.typestores import typestore
 
 KINDS = ("ros1", "sqlite3", "mcap")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.host.node.bridge import MESSAGE, Channel
-from fusesoc_firm.host.node.carrier import CarrierError, RosCarrier, RosOptions
-from fusesoc_firm.host.node.description import NodeDescription
+from fusesoc_firm.node.bridge import MESSAGE, Channel
+from fusesoc_firm.node.carrier import CarrierError, RosCarrier, RosOptions
+from fusesoc_firm.node.description import NodeDescription
 
 
 def test_a_channel_that_is_closed_holds_no_file() -> None:

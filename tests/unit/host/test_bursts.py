@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.bursts import WIDTHS, BurstError, BurstJoiner, JoinedFrame, split_frame
+from fusesoc_firm.node.bursts import WIDTHS, BurstError, BurstJoiner, JoinedFrame, split_frame
 from tests.unit.host.drivers import Driver, compile_driver
 
 SEED = 20240612

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.bursts import BurstError, BurstJoiner
-from fusesoc_firm.host.queues import ClosedError, EmptyError, SubscriberQueues
+from fusesoc_firm.node.bursts import BurstError, BurstJoiner
+from fusesoc_firm.node.queues import ClosedError, EmptyError, SubscriberQueues
 from tests.unit.host.drivers import C_FOLDER, HERE, Driver, compile_c_driver
 from tests.unit.host.test_bursts import _interleaved
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.transport.dma import (
+from fusesoc_firm.node.transport.dma import (
     BUFFER,
     COMPLETE,
     CONTROL,
@@ -33,9 +33,9 @@ from fusesoc_firm.host.transport.dma import (
     DmaTransport,
     Status,
 )
-from fusesoc_firm.host.transport.dma_device import LinuxDmaDevice
-from fusesoc_firm.host.transport.open_transport import open_transport
-from fusesoc_firm.host.transport.transport import Burst, TransportError
+from fusesoc_firm.node.transport.dma_device import LinuxDmaDevice
+from fusesoc_firm.node.transport.open_transport import open_transport
+from fusesoc_firm.node.transport.transport import Burst, TransportError
 
 SEED = 20241103
 ADDRESS = 0x3000_0000

@@ -13,23 +13,23 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.bursts import split_frame
-from fusesoc_firm.host.node.carrier import CarrierError, ros_arguments
-from fusesoc_firm.host.node.description import describe
-from fusesoc_firm.host.node.node import HardwareListener, NodeSettings
-from fusesoc_firm.host.node.options import add_node_options, remappings
-from fusesoc_firm.host.node.run import run_options
-from fusesoc_firm.host.node.software import node_software
-from fusesoc_firm.host.node.source import python_node
-from fusesoc_firm.host.node.steps import are_steps, write_ways
-from fusesoc_firm.host.node.trace import CYCLES, WALL_TIMES, Trace
-from fusesoc_firm.host.node.trace_picture import draw_trace
-from fusesoc_firm.host.queues import Overflow
-from fusesoc_firm.host.transport.transport import Burst, TransportError
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.generator import LoadedSystem
+from fusesoc_firm.node.bursts import split_frame
+from fusesoc_firm.node.carrier import CarrierError, ros_arguments
+from fusesoc_firm.node.description import describe
+from fusesoc_firm.node.engine import HardwareListener, NodeSettings
+from fusesoc_firm.node.options import add_node_options, remappings
+from fusesoc_firm.node.queues import Overflow
+from fusesoc_firm.node.run import run_options
+from fusesoc_firm.node.software import node_software
+from fusesoc_firm.node.source import python_node
+from fusesoc_firm.node.steps import are_steps, write_ways
+from fusesoc_firm.node.trace import CYCLES, WALL_TIMES, Trace
+from fusesoc_firm.node.trace_picture import draw_trace
+from fusesoc_firm.node.transport.transport import Burst, TransportError
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.host.fake_node import FakeHardware, Run, echo, loaded, pairs, until
 from tests.unit.system.systems import accelerator, converter, instance, specification
 

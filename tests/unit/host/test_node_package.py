@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.gapi import GENERATORS
-from fusesoc_firm.generation import Request
-from fusesoc_firm.host.node_package import cpp_package, generated_files, headers
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.generator import LoadedSystem, load_system
+from fusesoc_firm.node.package import cpp_package, generated_files, headers
+from fusesoc_firm.plugin.gapi import GENERATORS
+from fusesoc_firm.request.request import Request
+from fusesoc_firm.system.system_core import LoadedSystem, load_system
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import accelerator, converter, instance, messages, specification
 
 SPECS = Path(__file__).parents[3] / "specs"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from fusesoc_firm.host.queues import (
+from fusesoc_firm.node.queues import (
     ClosedError,
     EarliestDeadlineFirst,
     EmptyError,

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.host.reference import Response, responses
-from fusesoc_firm.host.stimuli import Stimulus
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived import Converter
+from fusesoc_firm.simulation.reference import Response, responses
+from fusesoc_firm.simulation.stimuli import Stimulus
+from fusesoc_firm.system.derived.model import Converter
+from fusesoc_firm.text.diagnostics import InputError
 
 POINT = parse_name("geometry_msgs/Point")
 FRAME = frame_of(POINT, MessageLibrary(RosVersion.ROS1).closure(POINT))

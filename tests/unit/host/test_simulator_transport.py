@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.host.transport.open_transport import open_transport
-from fusesoc_firm.host.transport.simulator import Event, Pace, Simulator, SimulatorTransport, Taken
-from fusesoc_firm.host.transport.transport import Burst, Transport, TransportError, TransportResetError
+from fusesoc_firm.node.transport.open_transport import open_transport
+from fusesoc_firm.node.transport.simulator import Event, Pace, Simulator, SimulatorTransport, Taken
+from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
 
 # An echo: a frame is taken and comes back a cycle after it; of the bytes of a frame's payload, some are orders.
 _MODEL = """

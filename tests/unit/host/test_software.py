@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import encode
-from fusesoc_firm.host.reference import responses
-from fusesoc_firm.host.software import Traffic, answered, stimulated, traffic
-from fusesoc_firm.host.stimuli import Stimulus
-from fusesoc_firm.system.derived import DerivedSystem
+from fusesoc_firm.simulation.reference import responses
+from fusesoc_firm.simulation.software import Traffic, answered, stimulated, traffic
+from fusesoc_firm.simulation.stimuli import Stimulus
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import accelerator, converter, derived, instance, specification
 
 Message = dict[str, Any]

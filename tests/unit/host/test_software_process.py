@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode, encode, pack_frame
-from fusesoc_firm.host.software_process import SoftwarePorts, serve, software_ports
-from fusesoc_firm.system.derived import DerivedSystem
+from fusesoc_firm.node.software_process import SoftwarePorts, serve, software_ports
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.host.drivers import Driver
 from tests.unit.host.test_cpp_node import puts, run
 from tests.unit.host.test_software import elsewhere, point, soft
@@ -93,7 +93,7 @@ def test_a_row_that_is_no_frames_is_refused(tmp_path: Path, row: bytes, error: s
 
 def _command(folder: Path) -> str:
     made(folder)
-    words = [sys.executable, "-m", "fusesoc_firm.host.software_process", str(folder / "spec.yaml")]
+    words = [sys.executable, "-m", "fusesoc_firm.node.software_process", str(folder / "spec.yaml")]
     return shlex.join(words)
 
 
@@ -133,7 +133,7 @@ def test_a_process_that_talks_nonsense_ends_the_node(node_driver: Driver) -> Non
 
 
 def test_faults_of_the_specification_are_told(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "fusesoc_firm.host.software_process", str(tmp_path / "none.yaml")]
+    command = [sys.executable, "-m", "fusesoc_firm.node.software_process", str(tmp_path / "none.yaml")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 1 and not done.stdout
     assert "none.yaml" in done.stderr and "Traceback" not in done.stderr

@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
-from fusesoc_firm.host.stimuli import Stimulus, read_stimuli
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.derived import Converter
+from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
+from fusesoc_firm.system.derived.model import Converter
+from fusesoc_firm.text.diagnostics import InputError
 
 LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
 

@@ -14,10 +14,10 @@ from collections.abc import Iterator
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.transport import uart
-from fusesoc_firm.host.transport.open_transport import open_transport
-from fusesoc_firm.host.transport.transport import Burst, Transport, TransportError, TransportResetError
-from fusesoc_firm.host.transport.uart import UartTransport
+from fusesoc_firm.node.transport import uart
+from fusesoc_firm.node.transport.open_transport import open_transport
+from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
+from fusesoc_firm.node.transport.uart import UartTransport
 
 SEED = 20240722
 

@@ -16,15 +16,15 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.gapi import GENERATORS, Call, make_request, obtain
-from fusesoc_firm.generation import GeneratedCore, Request
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.reads import Part, Reads, noted
-from fusesoc_firm.recall import state
+from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request, obtain
+from fusesoc_firm.request.request import GeneratedCore, Request
+from fusesoc_firm.store.reads import Part, Reads, noted
+from fusesoc_firm.store.recall import state
+from fusesoc_firm.text.diagnostics import InputError
 
 KINDS = ("ros1", "sqlite3", "mcap")
 ODD = parse_name("odd_msgs/Odd")

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.derived import Interface
 from fusesoc_firm.message.folders import environment_folders
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import md5, signature
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 SERVICE, ACTION = InterfaceKind.SERVICE, InterfaceKind.ACTION

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef
 from fusesoc_firm.message.folders import interface_files
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import InterfaceKind, MessageName, MessageType, PrimitiveType, RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.message.stores import DistributionStore, distributions
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 POINT = MessageName("geometry_msgs", "Point")

@@ -19,7 +19,6 @@ import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -37,6 +36,7 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.message.stores import distributions
+from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.typestores import typestore
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
@@ -26,6 +25,7 @@ from fusesoc_firm.message.parser import (
     parse_sections,
     service_names,
 )
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 NAME = MessageName("my_msgs", "Mine")

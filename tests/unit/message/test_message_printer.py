@@ -7,7 +7,6 @@ from dataclasses import replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.message.dialect import Dialect, dialect_of
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -27,6 +26,7 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.parser import parse_message
 from fusesoc_firm.message.printer import to_text
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
 NOWHERE = SourceRef("", 0, 0)
 NAME = MessageName("my_msgs", "Mine")

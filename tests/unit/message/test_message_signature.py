@@ -18,7 +18,6 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -33,6 +32,7 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.message.signature import md5, rihs01, signature
 from fusesoc_firm.message.stores import DistributionStore, distributions
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from tests.typestores import typestore
 
 ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2

@@ -15,10 +15,10 @@ from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from fusesoc_firm.host.transport.simulator import Simulator
 from fusesoc_firm.message.library import libraries
+from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
-from fusesoc_firm.system.generator import LoadedSystem, load_system
+from fusesoc_firm.system.system_core import LoadedSystem, load_system
 
 MODEL = Path(__file__).with_name("model_simulator.py")
 FORMS = ("ros1", "sqlite3", "mcap")

@@ -9,11 +9,11 @@ import pytest
 from rosbags.rosbag1 import Writer as Rosbag1Writer
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.host.transport.simulator import Simulator
 from fusesoc_firm.message.bags import Form
+from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
-from fusesoc_firm.system.generator import LoadedSystem
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.replay.replays import (
     FORMS,
     POINT,

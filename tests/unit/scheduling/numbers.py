@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusesoc_firm.scheduling.workloads import Times
+from fusesoc_firm.scheduling.evaluation.workloads import Times
 
 
 def times(*rows: list[int]) -> Times:

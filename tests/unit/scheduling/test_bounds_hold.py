@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from fusesoc_firm.scheduling.analysis import Channel, analyse, overheads_of
+from fusesoc_firm.scheduling.evaluation.simulation import simulate
+from fusesoc_firm.scheduling.evaluation.workloads import Times, Workload
 from fusesoc_firm.scheduling.models import POLICIES as MODELS
 from fusesoc_firm.scheduling.models import Generics
 from fusesoc_firm.scheduling.policies import POLICIES
-from fusesoc_firm.scheduling.simulation import simulate
 from fusesoc_firm.scheduling.tasks import Task
-from fusesoc_firm.scheduling.workloads import Times, Workload
 
 SEED = 20
 SMALL_PERIODS = (4, 5, 6, 8, 10, 12)

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.scheduling import area, pictures
+from fusesoc_firm.scheduling import area
 from fusesoc_firm.scheduling.area import Area
-from fusesoc_firm.scheduling.chapter import Evaluation, figures, tables
 from fusesoc_firm.scheduling.dissertation import dissertation
-from fusesoc_firm.scheduling.evaluation import Key
-from fusesoc_firm.scheduling.metrics import METRICS
+from fusesoc_firm.scheduling.evaluation import pictures
+from fusesoc_firm.scheduling.evaluation.chapter import Evaluation, figures, tables
+from fusesoc_firm.scheduling.evaluation.jobs import Key
+from fusesoc_firm.scheduling.evaluation.metrics import METRICS
+from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, REQUESTERS
 from fusesoc_firm.scheduling.policies import EVALUATED, POLICIES
 from fusesoc_firm.scheduling.tables import Table, figure_csv, figure_markdown, markdown, table_csv
-from fusesoc_firm.scheduling.workloads import DATA_SETS, REQUESTERS
 from tests.bench import tables as bench_tables
 from tests.bench.areas import write_areas
 

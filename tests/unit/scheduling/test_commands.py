@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.scheduling import pictures
-from fusesoc_firm.scheduling.metrics import METRICS
+from fusesoc_firm.scheduling.evaluation import pictures
+from fusesoc_firm.scheduling.evaluation.metrics import METRICS
 
 Captured = pytest.CaptureFixture[str]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusesoc_firm.scheduling.combinations import COMBINATIONS, combined
 from fusesoc_firm.scheduling.dissertation import dissertation
-from fusesoc_firm.scheduling.evaluation import Job, Key, Settings, evaluate, jobs
+from fusesoc_firm.scheduling.evaluation.combinations import COMBINATIONS, combined
+from fusesoc_firm.scheduling.evaluation.jobs import Job, Key, Settings, evaluate, jobs
+from fusesoc_firm.scheduling.evaluation.simulation import simulate
+from fusesoc_firm.scheduling.evaluation.workloads import Workload
 from fusesoc_firm.scheduling.models import Generics
-from fusesoc_firm.scheduling.simulation import simulate
-from fusesoc_firm.scheduling.workloads import Workload
 from tests.unit.scheduling.numbers import times
 
 FEW = Settings(seed=3, sets=4, cycles=2000)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from fusesoc_firm.scheduling.metrics import METRICS, Metrics, measure
-from fusesoc_firm.scheduling.simulation import Tasks, Trace
-from fusesoc_firm.scheduling.workloads import Workload
+from fusesoc_firm.scheduling.evaluation.metrics import METRICS, Metrics, measure
+from fusesoc_firm.scheduling.evaluation.simulation import Tasks, Trace
+from fusesoc_firm.scheduling.evaluation.workloads import Workload
 from tests.unit.scheduling.numbers import times
 
 # (set, requester, arrival, grant, finish, preemptions); transfer time 10, pause 20 in requester 0, 5 and 40 in 1.

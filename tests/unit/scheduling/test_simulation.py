@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fusesoc_firm.scheduling.evaluation.simulation import Trace, simulate
+from fusesoc_firm.scheduling.evaluation.timeline import Recorder
+from fusesoc_firm.scheduling.evaluation.workloads import Times, Workload
 from fusesoc_firm.scheduling.models import POLICIES, Generics
-from fusesoc_firm.scheduling.simulation import Trace, simulate
-from fusesoc_firm.scheduling.timeline import Recorder
-from fusesoc_firm.scheduling.workloads import Times, Workload
 from tests.unit.scheduling.numbers import times
 
 

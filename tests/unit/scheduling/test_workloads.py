@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fusesoc_firm.scheduling.workloads import DATA_SETS, Distribution, draw
+from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, Distribution, draw
 
 
 def test_the_data_sets_are_those_of_the_section() -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.analysis import derive
-from fusesoc_firm.system.derived import DerivedSystem
-from fusesoc_firm.system.specification import Specification, read_specification
+from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.written.specification import Specification, read_specification
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
 

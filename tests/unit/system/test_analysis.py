@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.generation import Request
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.generator import load_requested, load_system
-from fusesoc_firm.system.specification import Specification
+from fusesoc_firm.request.request import Request
+from fusesoc_firm.system.system_core import load_requested, load_system
+from fusesoc_firm.system.written.specification import Specification
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import (
     LIBRARIES,
     accelerator,

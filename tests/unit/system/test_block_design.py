@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.generation import GeneratedFile, Request
-from fusesoc_firm.system.generator import generate
+from fusesoc_firm.request.request import GeneratedFile, Request
+from fusesoc_firm.system.system_core import generate
+from fusesoc_firm.text.diagnostics import InputError
 
 SPECIFICATION = """\
 project: {{name: robot, width: 16{clocks}}}

@@ -6,12 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.render import render
-from fusesoc_firm.system.analysis import derive
-from fusesoc_firm.system.board import (
+from fusesoc_firm.system.boards.board import (
     BOARD_TEMPLATE,
     FLOWS,
     Board,
@@ -21,8 +18,11 @@ from fusesoc_firm.system.board import (
     on_board,
     read_board,
 )
-from fusesoc_firm.system.derived import DerivedSystem
-from fusesoc_firm.system.specification import read_specification
+from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.written.specification import read_specification
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.render import render
 
 LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
 SPECIFICATION = """

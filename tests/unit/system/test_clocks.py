@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.render import render
-from fusesoc_firm.system.configuration import (
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.hardware.configuration import (
     SYSTEM_TEMPLATE,
     TEST_BENCH_TEMPLATE,
     system_configuration,
 )
-from fusesoc_firm.system.configuration import (
+from fusesoc_firm.system.hardware.configuration import (
     test_bench_configuration as bench_configuration,
 )
-from fusesoc_firm.system.crossings import all_crossings
-from fusesoc_firm.system.derived import DerivedSystem
-from fusesoc_firm.system.diagram import diagram
-from fusesoc_firm.system.show import derived_description
+from fusesoc_firm.system.hardware.crossings import all_crossings
+from fusesoc_firm.system.views.diagram import diagram
+from fusesoc_firm.system.views.show import derived_description
+from fusesoc_firm.text.render import render
 from tests.unit.system.systems import accelerator, converter, derived, specification
 
 CLOCKS = "[{name: fast, frequency: 0.25 GHz}, {name: slow, frequency: 1 MHz}]"

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.system.board import boards
-from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
+from fusesoc_firm.system.boards.board import boards
+from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core, updated_core
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import accelerator, converter, derived, instance, specification
 
 SPECS = Path(__file__).resolve().parents[3] / "specs"

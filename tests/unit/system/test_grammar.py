@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.converter.config_file import ConfigFile
-from fusesoc_firm.system.specification import Specification
-from fusesoc_firm.yaml_sections import Key, Section, keys_of
+from fusesoc_firm.system.written.specification import Specification
+from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 from tests.unit.system.systems import read
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.generation import GeneratedCore, Request
-from fusesoc_firm.system import generator
-from fusesoc_firm.system.configuration import system_configuration
-from fusesoc_firm.system.derived import DerivedSystem
-from fusesoc_firm.system.show import derived_description
+from fusesoc_firm.request.request import GeneratedCore, Request
+from fusesoc_firm.system import system_core
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.hardware.configuration import system_configuration
+from fusesoc_firm.system.views.show import derived_description
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import converter, derived, instance, messages, specification
 
 IMAGE, CLOUD, TEXT = "sensor_msgs/Image", "sensor_msgs/PointCloud2", "std_msgs/String"
@@ -40,7 +40,7 @@ def through(folder: Path, taken: str, given: str, length: str = "", buffer: str 
 
 def generated(folder: Path) -> GeneratedCore:
     parameters = {"spec": "spec.yaml", "paths": None, "distro": None}
-    return generator.generate(Request("far", "a:b:c-d:0", folder, parameters))
+    return system_core.generate(Request("far", "a:b:c-d:0", folder, parameters))
 
 
 def described(system: DerivedSystem) -> dict[str, Any]:
@@ -143,12 +143,12 @@ def test_a_buffer_is_as_deep_as_its_longest_frame(tmp_path: Path, width: int, de
 
 def test_the_length_entity_is_a_file_of_the_core(tmp_path: Path) -> None:
     through(tmp_path, IMAGE, IMAGE)
-    core = generator.generate(
+    core = system_core.generate(
         Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": None})
     )
     assert "sensor_msgs_image_length.vhd" in core.files
     through(tmp_path, IMAGE, IMAGE, ", length: given")
-    core = generator.generate(
+    core = system_core.generate(
         Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": None})
     )
     assert "sensor_msgs_image_length.vhd" not in core.files
@@ -224,7 +224,7 @@ def test_a_bounded_message_has_its_buffer(tmp_path: Path) -> None:
     (tmp_path / "spec.yaml").write_text(derived_text, encoding="utf-8")
     (tmp_path / "acc.vhd").touch()
     request = Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": ["."], "distro": None})
-    system = generator.load_requested(request).system
+    system = system_core.load_requested(request).system
     # CDR's header, the count, three texts of 15 bytes with padding, one without.
     assert system.publishers[0].buffer == 4 + 4 + 3 * 16 + 15
 

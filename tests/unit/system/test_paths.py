@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.gapi import GENERATORS, Call, make_request
-from fusesoc_firm.host.simulator import CoreSources, _write_core
+from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
+from fusesoc_firm.simulation.simulator import CoreSources, _write_core
 from tests.unit.message.test_bag_definitions import record
 
 SPEC = """\

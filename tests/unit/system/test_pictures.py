@@ -11,13 +11,13 @@ import jsonschema
 import pytest
 import yaml
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.pictures import picture
-from fusesoc_firm.system.diagram import diagram
-from fusesoc_firm.system.generator import load_system
-from fusesoc_firm.system.report import Report, report
-from fusesoc_firm.system.specification import Specification
-from fusesoc_firm.yaml_schema import json_schema
+from fusesoc_firm.system.system_core import load_system
+from fusesoc_firm.system.views.diagram import diagram
+from fusesoc_firm.system.views.report import Report, report
+from fusesoc_firm.system.written.specification import Specification
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.yaml_schema import json_schema
+from fusesoc_firm.tools.pictures import picture
 from tests.unit.system.systems import LIBRARIES, accelerator, converter, derived, instance, specification
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.host.environment import environment_files
-from fusesoc_firm.system.configuration import system_configuration
-from fusesoc_firm.system.configuration import test_bench_configuration as bench_configuration
-from fusesoc_firm.system.derived import DerivedSystem
-from fusesoc_firm.system.show import derived_description
+from fusesoc_firm.simulation.environment import environment_files
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.hardware.configuration import system_configuration
+from fusesoc_firm.system.hardware.configuration import test_bench_configuration as bench_configuration
+from fusesoc_firm.system.views.show import derived_description
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import converter, derived, instance, specification
 
 PINS = "pins: [{name: led, direction: out, bits: 4}, {name: tid, direction: in}]"

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.select import names_in_use
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.generator import load_system
-from fusesoc_firm.system.skeleton import missing_sources
+from fusesoc_firm.system.scaffold.skeleton import missing_sources
+from fusesoc_firm.system.system_core import load_system
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import LIBRARIES, accelerator, converter, derived, instance, messages, specification
 
 SEED = 20240802

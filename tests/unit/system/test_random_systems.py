@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.system_core import load_system
 from tests.random_systems import random_system
 from tests.unit.system.systems import LIBRARIES
 

@@ -8,16 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.select import names_in_use
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.configuration import system_configuration
-from fusesoc_firm.system.derived import Connection, DerivedSystem, End
-from fusesoc_firm.system.diagram import diagram
-from fusesoc_firm.system.generator import load_system
-from fusesoc_firm.system.report import report
-from fusesoc_firm.system.show import derived_description
+from fusesoc_firm.system.derived.model import Connection, DerivedSystem, End
+from fusesoc_firm.system.hardware.configuration import system_configuration
+from fusesoc_firm.system.system_core import load_system
+from fusesoc_firm.system.views.diagram import diagram
+from fusesoc_firm.system.views.report import report
+from fusesoc_firm.system.views.show import derived_description
+from fusesoc_firm.text.diagnostics import InputError
 from tests.unit.system.systems import (
     LIBRARIES,
     accelerator,

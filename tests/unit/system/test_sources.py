@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.render import render
-from fusesoc_firm.system.analysis import derive
-from fusesoc_firm.system.configuration import SYSTEM_TEMPLATE, system_configuration
+from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
+from fusesoc_firm.text.render import render
 from tests.unit.system.systems import LIBRARIES, accelerator, converter, instance, read, specification
 
 BLOCKS = (

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.system.configuration import system_configuration
-from fusesoc_firm.system.derived import DerivedSystem, PublisherTimes, Scheduling
-from fusesoc_firm.system.show import derived_description
-from fusesoc_firm.system.specification import SCHEDULERS
-from fusesoc_firm.system.timing import bounds_of, frame_beats
+from fusesoc_firm.system.derived.model import DerivedSystem, PublisherTimes, Scheduling
+from fusesoc_firm.system.derived.timing import bounds_of, frame_beats
+from fusesoc_firm.system.hardware.configuration import system_configuration
+from fusesoc_firm.system.views.show import derived_description
+from fusesoc_firm.system.written.specification import SCHEDULERS
 from tests.unit.system.systems import converter, derived, specification
 
 PREEMPTIVE = {"fixed_priority_preemptive", "edf_resources", "edf_latency", "lst"}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.system_core import load_system
 from tests.unit.system.systems import LIBRARIES, converter, derived, specification
 
 

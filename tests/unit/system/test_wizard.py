@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.prompts import PipeAsker, Question
-from fusesoc_firm.system.specification import Accelerator, Block, Outgoing, Project
-from fusesoc_firm.system.wizard import extend_specification
-from fusesoc_firm.yaml_sections import keys_of
+from fusesoc_firm.system.scaffold.wizard import extend_specification
+from fusesoc_firm.system.written.specification import Accelerator, Block, Outgoing, Project
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.prompts import PipeAsker, Question
+from fusesoc_firm.text.yaml_sections import keys_of
 from tests.unit.system.systems import connections, derived
 
 POINT, VECTOR = "geometry_msgs/Point", "geometry_msgs/Vector3"

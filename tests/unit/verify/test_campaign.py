@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools.workers import Workers
 from fusesoc_firm.verify.campaign import Entry, Settings, run, select
 from fusesoc_firm.verify.task import Result, Task, Verdict
-from fusesoc_firm.workers import Workers
 from tests.unit.verify.messages import ROS1, ROS2
 
 

@@ -1,0 +1,1 @@
+"""What runs beside the hardware: the node between ROS and a transport."""

@@ -1,0 +1,1 @@
+"""What a simulated system receives and should answer, and its simulators."""

@@ -1,0 +1,1 @@
+"""What was generated, kept by the digest of what decides it."""

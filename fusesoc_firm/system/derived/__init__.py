@@ -1,0 +1,1 @@
+"""What follows from the specification: types, data flow, ids, clocks and times."""

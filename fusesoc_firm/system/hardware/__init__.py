@@ -1,0 +1,1 @@
+"""What is written of the derived system: the top level and its test benches as plain data."""

@@ -1,0 +1,1 @@
+"""The derived system for people: listings, pictures and reports."""

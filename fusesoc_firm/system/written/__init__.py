@@ -1,0 +1,1 @@
+"""The system as its author wrote it."""

@@ -1,0 +1,1 @@
+"""Faults with places, names, templates, files and YAML that keeps its places."""

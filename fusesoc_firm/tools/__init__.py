@@ -1,0 +1,1 @@
+"""Programs, worker processes and machines."""
