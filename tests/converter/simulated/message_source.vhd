@@ -197,8 +197,8 @@ use std.textio.all;
 library firm;
 use firm.firm_sim_pkg.all;
 
--- Takes the frames and prints each in hex, with the cycle of its last beat; form and stability of the stream are
--- checked.
+-- Takes the frames and prints each in hex, as parts of LONGEST_LINE digits and what is left, with the cycle of its last
+-- beat; form and stability of the stream are checked.
 entity frame_sink is
   generic (
     WIDTH         : positive;
@@ -220,6 +220,7 @@ end entity;
 
 architecture simulation of frame_sink is
 
+  constant LONGEST_LINE : positive := 128;
   signal ready_r : std_logic := '0';
 
 begin
@@ -264,6 +265,11 @@ begin
             size := size + 1;
             if ready_r = '1' then
               write(text, to_hex(tdata(8*lane+7 downto 8*lane)));
+              -- A line is copied with each byte that it gets.
+              if text'length = LONGEST_LINE then
+                print("part " & text.all);
+                deallocate(text);
+              end if;
             end if;
           end if;
         end loop;
@@ -272,7 +278,11 @@ begin
         if ready_r = '1' then
           beats := beats + 1;
           if tlast = '1' then
-            print("frame " & text.all);
+            if text = null then
+              print("frame ");
+            else
+              print("frame " & text.all);
+            end if;
             print("beats " & integer'image(beats) & " cycle " & integer'image(cycle));
             deallocate(text);
             beats := 0;

@@ -432,13 +432,13 @@ class Publisher:
         """Give the messages; the run fails unless their frames and errors come, and nothing else."""
         self._write(directory, messages)
         # A frame that is cut goes on inside for as long as its message.
-        quiet = 500 + 20 * max(len(message.bits) + self._given_bytes(message) for message in messages)
+        quiet = 500 + 20 * max(map(self._most_beats, messages))
         result = self.library.run(f"{self.entity}_tb", {"QUIET": quiet, **generics}, directory=directory)
         output = result.output
         assert result.exit_code == 0, output[-3000:]
         assert output.splitlines()[-1] == "over", output[-3000:]
         assert "waiting" not in output, output[-3000:]
-        frames = [bytes.fromhex(digits) for digits in re.findall(r"^frame (\w+)$", output, re.MULTILINE)]
+        frames = _frames(output)
         errors = [int(code) for code in re.findall(r"^error (\d+)$", output, re.MULTILINE)]
         taken = [int(number) for number in re.findall(r"^taken (\d+)", output, re.MULTILINE)]
         # One that is to be withdrawn may be taken before.
@@ -464,10 +464,11 @@ class Publisher:
         assert not re.search(r"^(?!.*@0ms).*warning", output, re.MULTILINE), output[-3000:]
         return result
 
-    @staticmethod
-    def _given_bytes(message: Message) -> int:
-        streams = sum(len(beat.data) for found in message.streams.values() for beats in found for beat in beats)
-        return streams + sum(len(bits) // 8 for found in message.elements.values() for _, bits in found)
+    def _most_beats(self, message: Message) -> int:
+        """More than it is sent in: each group of fields and each stream begins with one of its own."""
+        elements = [bits for found in message.elements.values() for _, bits in found]
+        streams = sum(len(beats) + 1 for found in message.streams.values() for beats in found)
+        return streams + sum(len(bits) // self.width + 2 for bits in (message.bits, *elements))
 
     def _write(self, directory: Path, messages: Sequence[Message]) -> None:
         lines: dict[str, list[str]] = {"values_0": []}
@@ -519,6 +520,17 @@ def _scopes(nodes: Sequence[Node], scope: Scope) -> Iterator[Scope]:
         if isinstance(node, Loop) and node.is_used and node.body:
             yield (*scope, node)
             yield from _scopes(node.body, (*scope, node))
+
+
+def _frames(output: str) -> list[bytes]:
+    """Those that the bench printed, most of them in parts, between which there are other lines."""
+    frames, digits = [], ""
+    for kind, found in re.findall(r"^(part|frame) (\w*)$", output, re.MULTILINE):
+        digits += found
+        if kind == "frame":
+            frames.append(bytes.fromhex(digits))
+            digits = ""
+    return frames
 
 
 def _header(message: Message) -> bytes:
