@@ -93,15 +93,15 @@ def _limited(item: pytest.Item) -> Iterator[None]:
         yield
         return
     limit = float(item.config.getini("waiting_limit"))
-    # Moments of the last while, and how much had been done by then.
-    seen = deque([(time.monotonic(), _processor_seconds())])
+    # Moments of the last while, and how much had been done by then; most tests are over before the first.
+    seen: deque[tuple[float, float]] = deque()
     looking = 0.0
 
     def look(*_: object) -> None:
         nonlocal looking
         begun, now, done = time.process_time(), time.monotonic(), _processor_seconds() - looking
         looking += time.process_time() - begun
-        if now - seen[-1][0] > limit / 2:
+        if seen and now - seen[-1][0] > limit / 2:
             # The machine slept, or the test held the looks back.
             seen.clear()
         seen.append((now, done))
