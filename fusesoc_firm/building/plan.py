@@ -9,7 +9,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.building.place_lock import PlaceLock
+from fusesoc_firm.building.folder_lock import FolderLock
 from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
@@ -58,7 +58,7 @@ class Plan:
         for build in self.builds:
             for core, _ in self._solved(build):
                 if core.provider and core.cache_status() != "downloaded":
-                    lock = PlaceLock(Path(f"{core.files_root}.lock"))
+                    lock = FolderLock(Path(f"{core.files_root}.lock"))
                     if owner := lock.acquire():
                         fail(f"{core.name} is being downloaded by {owner}", hint="start again when it is there")
                     try:

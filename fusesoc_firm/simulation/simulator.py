@@ -10,7 +10,6 @@ folder of the build. A second call builds what has changed.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
 import re
@@ -18,8 +17,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,6 +29,7 @@ from fusesoc_firm.system.beside import core_content, core_of, load_beside
 from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
 from fusesoc_firm.system.system_core import CoreFolders, no_core_folders
 from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.text.files import write_if_changed
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import missing, simulation_programs, ways
@@ -93,7 +92,7 @@ def build_simulator(
         fail(f"not installed: {' '.join(absent)}", hint="; ".join(ways(program) for program in absent))
     spec = spec.resolve()
     folder = _build_folder(spec, tool, build_root or Path(default_root()) / "simulators")
-    with _alone_in(folder):
+    with locked(folder):
         core = core_of(spec) or _write_core(spec, folder / "core", sources or CoreSources())
         work = folder / "work"
         is_new = not work.exists()
@@ -139,14 +138,6 @@ def _build_folder(spec: Path, tool: str, root: Path) -> Path:
 def _short_name(spec: Path) -> str:
     """What a specification's file is called, without the characters that make and simulators do not take in a path."""
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", spec.stem).lstrip("-")[:60]
-
-
-@contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Two builds in one folder wait for each other."""
-    with (folder / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
 
 
 def _build(spec: Path, core: Path, tool: str, work: Path) -> None:
