@@ -1,6 +1,6 @@
 """The scheduling policies: each is a row here, a model in `models` and a core in cores/sched.
 
-`make policies` writes the lists that cores hold of them (tests/sim/policies.py). docs/scheduling.md: how to add one.
+`make policies` writes the lists that cores hold of them (tests/cores/policies.py). docs/scheduling.md: how to add one.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from fusesoc_firm.scheduling.evaluation.combinations import TOP
 from fusesoc_firm.scheduling.policies import POLICIES
-from tests.sim.ghdl import Library, core_files
-from tests.sim.schedulers import POLICY_CORES, preset_generics, wrapper
+from tests.cores.schedulers import POLICY_CORES, preset_generics, wrapper
+from tests.hdl.ghdl import Library, core_files
 
 TIME_BITS = 16
 SHORTEST_TIME, LONGEST_TIME = 50, 150

@@ -16,7 +16,7 @@ from tests.bench.area import Subject
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.bench.yosys import SynthesisError
-from tests.sim.ghdl import GhdlError, Library, core_files
+from tests.hdl.ghdl import GhdlError, Library, core_files
 
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.
