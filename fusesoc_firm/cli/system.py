@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 from fusesoc_firm.cli.common import add_picture, add_sources, as_yaml, command, core_folders, load
 
 if TYPE_CHECKING:
-    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.message.middleware import Middleware, middleware_of
     from fusesoc_firm.system.system_core import LoadedSystem
 
 
-def _cpp_package(loaded: LoadedSystem, ros: RosVersion | None, _: argparse.Namespace) -> Mapping[str, str]:
+def _cpp_package(loaded: LoadedSystem, ros: Middleware | None, _: argparse.Namespace) -> Mapping[str, str]:
     from fusesoc_firm.node.package import cpp_package
 
     return cpp_package(loaded, ros)
 
 
-def _python_node(loaded: LoadedSystem, ros: RosVersion | None, arguments: argparse.Namespace) -> Mapping[str, str]:
+def _python_node(loaded: LoadedSystem, ros: Middleware | None, arguments: argparse.Namespace) -> Mapping[str, str]:
     from fusesoc_firm.node.source import python_node
     from fusesoc_firm.system.beside import sources_of
 
@@ -32,7 +32,7 @@ def _python_node(loaded: LoadedSystem, ros: RosVersion | None, arguments: argpar
     return python_node(loaded, ros, arguments.spec, arguments.output, sources.paths)
 
 
-_Writer = Callable[["LoadedSystem", "RosVersion | None", argparse.Namespace], Mapping[str, str]]
+_Writer = Callable[["LoadedSystem", "Middleware | None", argparse.Namespace], Mapping[str, str]]
 # What nodes are written in: the files of one, by path within its folder.
 _NODE_LANGUAGES: Mapping[str, _Writer] = {"cpp": _cpp_package, "python": _python_node}
 
@@ -207,11 +207,10 @@ def _write_core(arguments: argparse.Namespace) -> None:
 
 
 def _write_node(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.message.model import RosVersion
     from fusesoc_firm.text.outputs import write
 
     loaded = load(arguments, needs_sources=False)
-    ros = RosVersion(arguments.ros) if arguments.ros else None
+    ros = middleware_of(arguments.ros) if arguments.ros else None
     folder: Path = arguments.output or Path(f"{loaded.system.name}_node")
     arguments.output = folder
     files = _NODE_LANGUAGES[arguments.language](loaded, ros, arguments)
