@@ -90,7 +90,7 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
+bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
@@ -105,7 +105,7 @@ matrix: TOOLS = verilator
 matrix: tools $(VENV)/.extra-matrix ## Try each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' names more
 	@$(BIN)/python -m tests.matrix $(PYTHONS)
 
-proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
+proofs: setup ## Prove the Manager and the schedulers, write docs/figures/proofs.md
 	@$(BIN)/python -m tests.proofs
 
 fuzz-netlist: TOOLS = iverilog verilator

@@ -126,7 +126,7 @@ def installation(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 
 @pytest.fixture
 def project(installation: Installation, tmp_path: Path) -> Path:
-    """Another project, which has added the library as docs/packaging.md says."""
+    """Another project, which has added the library as docs/how-to/add-the-library.md says."""
     (tmp_path / "robot").mkdir()
     (tmp_path / "fusesoc.conf").write_text("")
     for name, location in (("firm", installation.library()), ("own", tmp_path / "robot")):

@@ -2,7 +2,7 @@
 -- Brings levels into another clock domain: each bit passes a row of registers, in which it has time to settle. Every bit
 -- must come from a register of its own domain, with no logic behind it, and no two bits arrive together for certain.
 --
--- Constraint: the path into the first register is asynchronous (docs/clocks.md).
+-- Constraint: the path into the first register is asynchronous (docs/how-to/use-several-clocks.md).
 library ieee;
 use ieee.std_logic_1164.all;
 

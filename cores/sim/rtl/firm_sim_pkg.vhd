@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The frame files of the simulation host (docs/simulation.md): read, checked and kept in memory, a character a byte.
+-- The frame files of the simulation host (docs/reference/simulation-host.md): read, checked and kept in memory, a character a byte.
 -- Simulation only. A fault of form ends the simulation with `file:line: what`.
 library ieee;
 use ieee.std_logic_1164.all;
