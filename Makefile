@@ -31,6 +31,8 @@ CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
 # Parts of the bench, all if empty, such as BENCH='area cycles'; BENCH=--help lists them.
 BENCH ?=
+# Options and pages for make docs, such as DOCS=--update or DOCS=README.md; all pages if none is named.
+DOCS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 
@@ -54,7 +56,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
-.PHONY: help sim test ros bitstream bench matrix proofs corpus fuzz-netlist lint setup tools clean distclean
+.PHONY: help sim test docs ros bitstream bench matrix proofs corpus fuzz-netlist lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -71,6 +73,12 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 test: TOOLS = iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 test: setup ros ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+
+docs: TOOLS = dot:graphviz
+docs: tools $(VENV)/.extra-docs ## Run the commands of the pages, build their site in build/docs; DOCS=--update writes their output into the pages
+	@$(BIN)/python -m tests.pages $(DOCS)
+	@$(BIN)/zensical build --clean --strict
+	@echo "The site: build/docs/index.html"
 
 # Both are there for some of the tests, which are skipped without them.
 ros: $(VENV)/.ros2

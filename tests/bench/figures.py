@@ -104,7 +104,8 @@ _INTRODUCTION = """# {title}
 For readers who compare designs, versions or tools.
 After it you can look up {subject}.
 
-Written by `make bench BENCH='{parts}'`; [Figures](index.md) explains its words.
+Written by `make bench BENCH='{parts}'`.
+[Figures](index.md) explains the words of the tables.
 """
 
 
