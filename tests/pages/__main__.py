@@ -21,7 +21,9 @@ from tests.sim.ghdl import REPOSITORY
 def main() -> int:
     """Check or update the pages."""
     parser = argparse.ArgumentParser(prog="tests.pages", description="Run the console blocks of the pages.")
-    parser.add_argument("pages", nargs="*", type=Path, metavar="PAGE", help="README.md and all of docs if none is named")
+    parser.add_argument(
+        "pages", nargs="*", type=Path, metavar="PAGE", help="README.md and all of docs if none is named"
+    )
     parser.add_argument("--update", action="store_true", help="write what the commands print into the pages")
     arguments = parser.parse_args()
     chosen = [Page(path.resolve()) for path in arguments.pages] or pages()

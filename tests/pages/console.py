@@ -158,7 +158,9 @@ def _shown(step: tuple[str, list[str]], output: list[str]) -> list[str]:
     head, *middle, tail = _parts(expected)
     shown = output[: len(head)]
     for part in middle:
-        found = next((n for n, line in enumerate(output) if _TIME.sub("0", line) == _TIME.sub("0", part[0])), len(output))
+        found = next(
+            (n for n, line in enumerate(output) if _TIME.sub("0", line) == _TIME.sub("0", part[0])), len(output)
+        )
         shown += [_ELISION, *output[found : found + len(part)]]
     return [*command.splitlines(), *shown, _ELISION, *output[len(output) - len(tail) :]]
 

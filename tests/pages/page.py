@@ -81,7 +81,9 @@ class Page:
 
     def long_lines(self, length: int) -> Iterator[int]:
         """The numbers of lines beyond `length` columns, apart from those of tables and code, which cannot be broken."""
-        unbroken = [token.map for token in self.tokens if token.type in ("fence", "code_block", "table_open", "html_block")]
+        unbroken = [
+            token.map for token in self.tokens if token.type in ("fence", "code_block", "table_open", "html_block")
+        ]
         skipped = {n for begin, end in filter(None, unbroken) for n in range(begin, end)}
         for n, line in enumerate(self.text.splitlines()):
             if len(line) > length and n not in skipped:
