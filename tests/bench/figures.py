@@ -30,7 +30,7 @@ from tests.bench import (
     yosys,
 )
 from tests.bench.tables import Table, filled
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 FOLDER = REPOSITORY / "docs" / "figures"
 
