@@ -12,10 +12,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from tests.hdl.ghdl import REPOSITORY
 from tests.pages.console import check
 from tests.pages.page import Page, pages
 from tests.pages.stage import stage
-from tests.sim.ghdl import REPOSITORY
 
 
 def main() -> int:

@@ -28,8 +28,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.hdl.ghdl import REPOSITORY
 from tests.pages.page import Page
-from tests.sim.ghdl import REPOSITORY
 
 _ELISION = "..."
 _COMMENT = re.compile(r"<!-- (?:(?P<checkout>in the checkout)|(?P<kind>not run|file): (?P<value>.+?)) -->")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from tests.hdl.ghdl import REPOSITORY
 from tests.pages.page import Page, pages
-from tests.sim.ghdl import REPOSITORY
 
 
 def stage(folder: Path) -> None:

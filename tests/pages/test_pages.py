@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.hdl.ghdl import REPOSITORY
 from tests.pages.console import blocks, check
 from tests.pages.page import DOCS, Page, pages
 from tests.pages.stage import stage
-from tests.sim.ghdl import REPOSITORY
 
 LINES, COLUMNS = 250, 100
 # Written by commands; their lines of prose are as long as those of all pages.
