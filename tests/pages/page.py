@@ -54,7 +54,7 @@ class Page:
     @cached_property
     def anchors(self) -> frozenset[str]:
         """The anchors of its headings, as forges and the site make them."""
-        headings = [inline.content for token, inline in self._inlines() if token.type == "heading_open"]
+        headings = [inline.content for token, inline in self.inlines() if token.type == "heading_open"]
         slugs = [re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings]
         repeated = (f"{slug}-{slugs[:n].count(slug)}" for n, slug in enumerate(slugs) if slug in slugs[:n])
         return frozenset([*slugs, *repeated])
@@ -65,7 +65,7 @@ class Page:
         return tuple(self._links())
 
     def _links(self) -> Iterator[Link]:
-        for _, inline in self._inlines():
+        for _, inline in self.inlines():
             for token in inline.children or ():
                 target = str(token.attrs.get("href") or token.attrs.get("src") or "")
                 if target and not _ELSEWHERE.match(target):
@@ -77,7 +77,7 @@ class Page:
     @property
     def first_paragraph(self) -> str:
         """What follows the title."""
-        return next((inline.content for token, inline in self._inlines() if token.type == "paragraph_open"), "")
+        return next((inline.content for token, inline in self.inlines() if token.type == "paragraph_open"), "")
 
     def long_lines(self, length: int) -> Iterator[int]:
         """The numbers of lines beyond `length` columns, apart from those of tables and code, which cannot be broken."""
@@ -89,8 +89,8 @@ class Page:
             if len(line) > length and n not in skipped:
                 yield n + 1
 
-    def _inlines(self) -> Iterator[tuple[Token, Token]]:
-        """Each inline token with the one that opens its block."""
+    def inlines(self) -> Iterator[tuple[Token, Token]]:
+        """Each inline token, text outside of code blocks, with the one that opens its block."""
         for before, token in zip(self.tokens, self.tokens[1:], strict=False):
             if token.type == "inline":
                 yield before, token

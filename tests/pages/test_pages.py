@@ -20,9 +20,17 @@ GENERATED = [DOCS / "figures"]
 TESTED_PICTURES = {"house.svg"}
 
 
+def with_readmes() -> list[Page]:
+    """The pages, and those beside cores and demo systems."""
+    return [
+        *pages(),
+        *(Page(path) for room in ("cores", "specs") for path in sorted((REPOSITORY / room).rglob("README.md"))),
+    ]
+
+
 def test_every_link_leads_somewhere() -> None:
     faults = []
-    for page in [*pages(), *map(Page, sorted(REPOSITORY.glob("*/**/README.md")))]:
+    for page in with_readmes():
         for link in page.links:
             if not link.file.exists():
                 faults.append(f"{page.name}:{link.line}: there is no {link.file}")
@@ -35,6 +43,27 @@ def test_no_line_and_no_page_is_too_long() -> None:
     assert [f"{page.name}:{line}" for page in pages() for line in page.long_lines(COLUMNS)] == []
     written = [page for page in pages() if not any(folder in page.file.parents for folder in GENERATED)]
     assert [page.name for page in written if len(page.text.splitlines()) > LINES] == []
+
+
+def test_every_file_that_a_page_names_is_there() -> None:
+    named = re.compile(r"\b(?:tests|fusesoc_firm|cores|specs|generators)/[\w./-]+\w")
+    for page in with_readmes():
+        paths = {path for _, inline in page.inlines() for path in named.findall(inline.content)}
+        missing = [path for path in paths if not any(REPOSITORY.glob(f"{path}*"))]
+        assert missing == [], page.name
+
+
+def test_errors_and_warnings_are_shown_by_console_blocks() -> None:
+    """They run, or say why not; `tests/house` runs the tutorial of a first converter."""
+    faults = [
+        f"{page.name}:{token.map[0] + 1}"
+        for page in pages()
+        if page.file.name != "first-converter.md"
+        for token in page.tokens
+        if token.type in ("fence", "code_block") and token.info != "console" and token.map
+        if re.search(r"^(\S+ )?(error|warning): ", token.content, re.MULTILINE)
+    ]
+    assert faults == []
 
 
 def test_every_page_says_whom_it_serves_in_its_first_two_lines() -> None:
