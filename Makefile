@@ -56,7 +56,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
-.PHONY: help sim test docs ros bitstream bench matrix proofs corpus fuzz-netlist lint setup tools clean distclean
+.PHONY: help sim test docs ros bitstream bench matrix proofs policies corpus fuzz-netlist lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -115,6 +115,9 @@ matrix: tools $(VENV)/.extra-matrix ## Try each supported Python with the oldest
 
 proofs: setup ## Prove the Manager and the schedulers, write docs/figures/proofs.md
 	@$(BIN)/python -m tests.proofs
+
+policies: $(VENV)/.installed ## Write the lists of schedulers in cores/sched from fusesoc_firm/scheduling/policies.py
+	@$(BIN)/python -m tests.cores.policies
 
 fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'

@@ -116,6 +116,7 @@ def test_make_without_a_target_lists_them() -> None:
         "bitstream",
         "matrix",
         "proofs",
+        "policies",
         "fuzz-netlist",
         "lint",
         "setup",
