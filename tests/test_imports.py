@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[1] / "fusesoc_firm"
+from tests.rooms import NAME, PACKAGE, arrows, imported_rooms, modules, reduced, room_of
+
+PICTURE = PACKAGE.parent / "docs" / "pictures" / "house.svg"
 
 # Each room, from the ground up, and the rooms below it that it may import from.
 ALLOWED: dict[str, str] = {
@@ -36,36 +39,6 @@ STOREYS = {
     "system": ("written", "derived", "hardware", "boards", ".", "views", "scaffold"),
     "scheduling": ("models", ".", "evaluation"),
 }
-_PREFIX = "fusesoc_firm"
-# Links to cores and demo systems.
-LIBRARIES = {"library", "demos"}
-
-
-def modules(package: Path) -> Iterator[Path]:
-    return (path for path in sorted(package.rglob("*.py")) if room_of(path, package) not in LIBRARIES)
-
-
-def room_of(path: Path, package: Path) -> str:
-    return path.relative_to(package).parts[0].removesuffix(".py")
-
-
-def imported_rooms(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """The line and room of each import from the package; a relative import counts as room '.'."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.level:
-            yield node.lineno, "."
-            continue
-        elif isinstance(node, ast.ImportFrom) and node.module == _PREFIX:
-            names = [f"{_PREFIX}.{alias.name}" for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            names = [node.module or ""]
-        else:
-            continue
-        for name in names:
-            if name.split(".")[0] == _PREFIX:
-                yield node.lineno, [*name.split("."), ""][1]
 
 
 def violations(package: Path) -> Iterator[str]:
@@ -91,7 +64,7 @@ def steps_down(package: Path, room: str, storeys: tuple[str, ...]) -> Iterator[s
     for path in sorted((package / room).rglob("*.py")):
         own = storeys.index(storey_of(path.relative_to(package / room).parts, storeys))
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{_PREFIX}.{room}"):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{NAME}.{room}"):
                 parts = [*(node.module or "").split(".")[2:], node.names[0].name]
                 if storeys.index(storey_of(tuple(parts), storeys)) > own:
                     yield f"{path}:{node.lineno}: '{'.'.join(parts)}' is in a higher storey"
@@ -116,11 +89,15 @@ def test_modules_lie_in_rooms() -> None:
 
 def test_a_room_imports_what_it_may() -> None:
     """A right that nobody uses goes."""
-    used: dict[str, set[str]] = {}
-    for path in modules(PACKAGE):
-        found = {room for _, room in imported_rooms(ast.parse(path.read_text()))}
-        used.setdefault(room_of(path, PACKAGE), set()).update(found - {"__version__"})
-    assert {room: set(may.split()) for room, may in ALLOWED.items()} == {room: used[room] - {room} for room in ALLOWED}
+    assert {room: set(may.split()) for room, may in ALLOWED.items()} == arrows()
+
+
+def test_the_picture_is_that_of_the_imports() -> None:
+    drawn = re.findall(r"<title>(\w+)&#45;&gt;(\w+)</title>", PICTURE.read_text(encoding="utf-8"))
+    command = "; draw it again: python -m tests.rooms docs/pictures/house.svg"
+    assert sorted(drawn) == sorted((room, other) for room, rooms in reduced(arrows()).items() for other in rooms), (
+        command
+    )
 
 
 def test_imports_go_one_way() -> None:

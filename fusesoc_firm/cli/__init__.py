@@ -1,4 +1,4 @@
-"""The door for people: the command `firm`. Each of its commands is a module; what it needs is imported when it runs."""
+"""The command `firm`: one module a command."""
 
 from __future__ import annotations
 

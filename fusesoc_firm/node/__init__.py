@@ -1,1 +1,1 @@
-"""What runs beside the hardware: the node between ROS and a transport."""
+"""The software beside the hardware: the node between ROS and a transport, in Python, C++ and C."""

@@ -1,1 +1,1 @@
-"""What FuseSoC and the command line share: the table of generators, and the answer to a call."""
+"""The answer to a generator call, for FuseSoC and for the command line."""

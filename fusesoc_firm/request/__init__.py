@@ -1,1 +1,1 @@
-"""What a call of a generator asks for, and the core that answers it."""
+"""A generator call's parameters, and the core that answers it."""

@@ -1,1 +1,1 @@
-"""What a simulated system receives and should answer, and its simulators."""
+"""The stimuli, reference answers and simulators of a system."""

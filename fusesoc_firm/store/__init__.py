@@ -1,1 +1,1 @@
-"""What was generated, kept by the digest of what decides it."""
+"""The cache of generated cores, keyed by everything that decides their content."""

@@ -1,1 +1,1 @@
-"""Faults with places, names, templates, files and YAML that keeps its places."""
+"""Diagnostics with source positions, identifiers, templates, YAML and files."""

@@ -1,1 +1,1 @@
-"""Programs, worker processes and machines."""
+"""External programs, Python packages and worker processes."""

@@ -13,7 +13,7 @@ from tests.bench import schedulers
 from tests.bench.area import WIDTHS, Bar, Row, Subject, of_core, tables_of
 from tests.bench.tables import Table, Tell
 from tests.bench.yosys import Yosys
-from tests.sim.ghdl import Generic
+from tests.hdl.ghdl import Generic
 
 # The sum of table 3.3, LUT/FF.
 DISSERTATION = {

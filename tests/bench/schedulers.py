@@ -8,8 +8,8 @@ from pathlib import Path
 from fusesoc_firm.scheduling.evaluation.combinations import TOP
 from fusesoc_firm.system.derived.timing import WITH_TRANSFER_TIMES
 from fusesoc_firm.system.written.specification import SCHEDULERS
-from tests.sim.ghdl import Library, core_files
-from tests.sim.schedulers import ENTITIES, POLICY_CORES, wrapper
+from tests.cores.schedulers import ENTITIES, POLICY_CORES, wrapper
+from tests.hdl.ghdl import Library, core_files
 
 POLICIES = SCHEDULERS
 TIME_BITS = 16

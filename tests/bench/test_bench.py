@@ -24,7 +24,7 @@ from tests.bench.model import FrameError, Message, publisher_model, subscriber_m
 from tests.bench.payloads import BrokenPayloadError, Payloads
 from tests.bench.tables import FAILED, Table
 from tests.bench.yosys import ECP5, ICE40, Cells, SynthesisError, Yosys, count_cells
-from tests.sim.ghdl import Library
+from tests.hdl.ghdl import Library
 
 SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"

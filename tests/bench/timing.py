@@ -15,8 +15,8 @@ from tests.bench.area import Subject
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.bench.yosys import SynthesisError
-from tests.sim.ghdl import GhdlError, Library, core_files
-from tests.sim.schedulers import ENTITIES
+from tests.cores.schedulers import ENTITIES
+from tests.hdl.ghdl import GhdlError, Library, core_files
 
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.

@@ -16,8 +16,8 @@ import pytest
 from fusesoc import edalizer
 
 from fusesoc_firm.tools.library_path import library_root
+from tests.hdl.ghdl import REPOSITORY
 from tests.processes import IGNORING_INTERRUPTS
-from tests.sim.ghdl import REPOSITORY
 
 CONFIGURATION = f"""\
 [main]

@@ -28,7 +28,7 @@ from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.loop import PUBLISHER_ID, SUBSCRIBER_ID, loop_text
 from fusesoc_firm.verify.simulation import firm_library, simulate, write_frames
-from tests.unit.frame.oracle import is_same
+from tests.frame.oracle import is_same
 
 SEED = 20241123
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "middlewares.md"

@@ -1,1 +1,1 @@
-"""Section 4.3 of the dissertation again: workloads, simulation, metrics and tables."""
+"""The dissertation's evaluation (section 4.3), reproduced: workloads, simulation, metrics, tables."""

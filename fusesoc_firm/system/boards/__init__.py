@@ -1,1 +1,1 @@
-"""Boards: what an FPGA is connected to, and the top level that fits a system on it."""
+"""Boards, and the top level that fits a system on one."""

@@ -1,1 +1,1 @@
-"""What follows from the specification: types, data flow, ids, clocks and times."""
+"""The system derived from it: types, data flow, ids, clocks and times."""

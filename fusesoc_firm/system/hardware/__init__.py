@@ -1,1 +1,1 @@
-"""What is written of the derived system: the top level and its test benches as plain data."""
+"""The derived system as plain data for the templates of the top level and its test benches."""

@@ -1,1 +1,1 @@
-"""First versions of what a user then owns: specification, core file, sources of accelerators."""
+"""First versions of a user's own files: specification, core file, accelerator sources."""

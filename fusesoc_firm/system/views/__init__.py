@@ -1,1 +1,1 @@
-"""The derived system for people: listings, pictures and reports."""
+"""Listings, pictures and reports of a derived system."""

@@ -1,1 +1,1 @@
-"""The system as its author wrote it."""
+"""The specification as its author wrote it."""
