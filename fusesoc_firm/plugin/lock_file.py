@@ -26,7 +26,7 @@ from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.system_core import load_requested
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 from fusesoc_firm.text.files import read_regular
-from fusesoc_firm.text.yaml_text import LARGE, yaml_data
+from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
 from fusesoc_firm.tools.programs import facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
@@ -66,7 +66,7 @@ def lock_of(core: ProjectCore, depends: Iterable[ProjectCore], calls: Mapping[st
 def lock_text(lock: Lock) -> str:
     """The lock file."""
     data = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
-    return _HEAD + yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+    return _HEAD + yaml_dump(data)
 
 
 def read_lock(path: Path) -> Lock:
