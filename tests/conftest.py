@@ -11,7 +11,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -61,11 +61,19 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
 
 
+# Before cases are left out by their markers.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: Iterable[pytest.Item]) -> None:
+    cases: Counter[tuple[pytest.Item | pytest.Collector | None, str]] = Counter()
     for item in items:
         if any(room in item.path.parents for room in _CLOSED):
             for rule in _OPEN:
                 item.add_marker(pytest.mark.filterwarnings(rule))
+        if one_in := item.get_closest_marker("one_in"):
+            test = item.parent, item.name.partition("[")[0]
+            if cases[test] % one_in.args[0]:
+                item.add_marker(pytest.mark.check)
+            cases[test] += 1
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

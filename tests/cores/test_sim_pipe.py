@@ -46,6 +46,7 @@ def send_all(simulator: Simulator, frames: list[bytes], seed: int) -> list[Event
     return events + run_to_rest(simulator)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize("stall", [0, 40, 90])
 def test_frames_there_and_back(bench: PipeBench, width: int, stall: int) -> None:

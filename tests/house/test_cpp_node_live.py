@@ -16,6 +16,7 @@ from tests.house.test_live_simulators import SPECS, answers
 from tests.node.drivers import Driver, compile_driver
 from tests.node.test_cpp_node import puts, run
 
+pytestmark = pytest.mark.check
 SEED = 20261126
 TOOLS = [
     pytest.param(tool, marks=pytest.mark.skipif(shutil.which(tool) is None, reason=f"{tool} is not installed"))

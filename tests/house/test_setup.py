@@ -110,6 +110,7 @@ def test_make_without_a_target_lists_them() -> None:
         "help",
         "sim",
         "test",
+        "check",
         "corpus",
         "bench",
         "bitstream",
