@@ -34,7 +34,7 @@ BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # What tests run beside Python.
-TEST_TOOLS := iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
+TEST_TOOLS := ccache iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core, which are GHDL's.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))

@@ -7,6 +7,7 @@ and all processes below it have waited for a minute (`waiting_limit`) without do
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
 import tempfile
@@ -21,6 +22,7 @@ import pytest
 from hypothesis import settings
 
 from fusesoc_firm.tools.interrupts import accept_interrupts
+from tests.shared import SHARED
 
 pytest_plugins = ["tests.time_report"]
 
@@ -51,11 +53,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     # What tests start inherits all this.
     accept_interrupts()
-    # The processes that share the work of a run share its store, too, and no other run does.
+    # The processes that share the work of a run share its store and what they made, and no other run does.
     if not hasattr(config, "workerinput"):
-        store = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
-        config.add_cleanup(store.cleanup)
-        os.environ["FUSESOC_FIRM_CACHE"] = store.name
+        folder = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
+        config.add_cleanup(folder.cleanup)
+        os.environ["FUSESOC_FIRM_CACHE"] = f"{folder.name}/store"
+        os.environ[SHARED] = f"{folder.name}/shared"
+        # Verilator compiles its library again for every program.
+        if shutil.which("ccache"):
+            os.environ |= {"OBJCACHE": "ccache", "CCACHE_DIR": f"{folder.name}/ccache"}
         # FuseSoC looks up a generator's interpreter there.
         os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})

@@ -13,7 +13,7 @@ import pytest
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.simulation.simulator import BuiltSimulator, build_simulator
 from tests.house.test_live_simulators import SPECS, answers
-from tests.node.drivers import Driver, compile_driver
+from tests.node.drivers import Driver, cpp_driver
 from tests.node.test_cpp_node import puts, run
 
 pytestmark = pytest.mark.check
@@ -25,8 +25,8 @@ TOOLS = [
 
 
 @pytest.fixture(scope="module")
-def driver(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    return compile_driver("node", tmp_path_factory.mktemp("node"))
+def driver() -> Driver:
+    return cpp_driver("node")
 
 
 @pytest.fixture(scope="module", params=TOOLS)

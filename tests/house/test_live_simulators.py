@@ -76,7 +76,7 @@ def answers(built: BuiltSimulator, frames: list[bytes], shape: tuple[int, int]) 
     return joined, last
 
 
-@pytest.mark.one_in(3)
+@pytest.mark.check
 def test_the_same_frames_give_the_same_bytes(recorded: tuple[str, Path], build_root: Path) -> None:
     system, folder = recorded
     stimuli, received = frames_of(folder / "stimulus.txt"), frames_of(folder / "received.txt")

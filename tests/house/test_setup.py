@@ -247,6 +247,7 @@ def test_why_pip_failed_is_shown(checkout: Checkout) -> None:
     assert checkout.calls("fusesoc") == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
