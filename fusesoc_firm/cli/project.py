@@ -12,10 +12,10 @@ from fusesoc_firm.cli.common import add_picture, command
 from fusesoc_firm.text.diagnostics import InputError, fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.cores import Instance, ProjectCore
+    from fusesoc_firm.building.cores import ProjectCore
     from fusesoc_firm.plugin.gapi import MessageCores
     from fusesoc_firm.plugin.lock import Lock
-    from fusesoc_firm.request.request import Request
+    from fusesoc_firm.request.request import GeneratorCall, Request
     from fusesoc_firm.store.reads import Input
 
 
@@ -56,8 +56,8 @@ def _draw_cores(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.building.cores import core_graph
     from fusesoc_firm.tools.pictures import check_picture, draw
 
-    def sources(instance: Instance) -> list[str]:
-        request = _request(instance)
+    def sources(call: GeneratorCall) -> list[str]:
+        request = _request(call)
         # Told from here, files of one name in two cores are two.
         return [] if request is None else [*map(shown, _input_files(request))]
 
@@ -118,8 +118,8 @@ def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
 def _calls(core: ProjectCore) -> Iterator[tuple[Request, Sequence[Input]]]:
     from fusesoc_firm.plugin.gapi import GENERATORS, MESSAGES
 
-    for instance in core.instances:
-        if instance.generator != MESSAGES and (request := _request(instance)):
+    for call in core.calls:
+        if call.generator != MESSAGES and (request := _request(call)):
             yield request, GENERATORS[request.command].inputs(request)
 
 
@@ -129,8 +129,8 @@ def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
     def touched(core: ProjectCore) -> str | None:
         found = _first(changed, core.files)
         # What is behind a generated core takes longer to tell.
-        for instance in core.instances if changed and not found else ():
-            found = found or _first(changed, _files_behind(instance, changed))
+        for call in core.calls if changed and not found else ():
+            found = found or _first(changed, _files_behind(call, changed))
         return shown(found) if found else None
 
     return touched
@@ -140,34 +140,33 @@ def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
     return next((path for path in changed if path in files), None)
 
 
-def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
+def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
     """All that a generated core is made of, our own files too."""
     from fusesoc_firm.plugin.gapi import GENERATORS, used_before
     from fusesoc_firm.store.own_code import PACKAGE, digests
 
     try:
-        request = _request(instance)
+        request = _request(call)
         if request is None:
             return set()
         files = set(_input_files(request))
         used = used_before(request, GENERATORS[request.command])
     except InputError:
         # It cannot be made: whatever changed beside it, or in our own files, may be why.
-        roots = (instance.files_root.resolve(), PACKAGE)
+        roots = (Path(call.files_root).resolve(), PACKAGE)
         return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
     # What was not made before may use any.
     return files | {PACKAGE / name for name in (digests() if used is None else used)}
 
 
-def _request(instance: Instance) -> Request | None:
+def _request(call: GeneratorCall) -> Request | None:
     """The request that FuseSoC would make; None for a generator that is not ours."""
     from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
 
-    if instance.generator not in GENERATORS:
+    if call.generator not in GENERATORS:
         return None
-    known = GENERATORS[instance.generator]
-    call = Call(instance.vlnv, instance.files_root, instance.parameters)
-    return make_request(instance.generator, call, known, message_folders)
+    known = GENERATORS[call.generator]
+    return make_request(call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), known, message_folders)
 
 
 def message_folders(names: MessageCores) -> tuple[Path, ...]:
@@ -180,7 +179,7 @@ def message_folders(names: MessageCores) -> tuple[Path, ...]:
     cores = {name: core for core in project_cores() for name in core.names}
     for name, source in names.items():
         core = cores.get(":".join(name.split(":")[:3]))
-        requests = [_request(item) for item in core.instances if item.generator == MESSAGES] if core else []
+        requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []
         if not requests:
             fail(f"'{name}' is no core with messages that FuseSoC knows here", source)
         found += [folder for request in requests if request for folder in folders(request)]

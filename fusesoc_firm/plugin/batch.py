@@ -39,7 +39,7 @@ _LEAST = 4
 # The parameter that names cores with messages.
 _OF_CORES = "messages"
 # Modules that keep what took long to find out, and nothing rendered; `render` notes what it keeps.
-_WITHOUT_TEMPLATES = ("store.own_code", "text.render", "request.requesting_core", "store.store")
+_WITHOUT_TEMPLATES = ("store.own_code", "text.render", "request.core_reader", "store.store")
 
 
 def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None]:

@@ -424,7 +424,7 @@ def _stored_call(request: Request, generator: Generator, path: Path, reads: Read
     """How a call is noted, of which FuseSoC's file is at `path`; `reads` are those of the key."""
 
     def facts_of_key(used: Iterable[str]) -> list[Fact]:
-        from fusesoc_firm.request.message_core import core_name
+        from fusesoc_firm.request.core_reader import core_name
 
         entries = [entry for name in SEARCHED for entry in os.environ.get(name, "").split(os.pathsep) if entry]
         environment = [folder for entry in entries for folder in (entry, str(Path(entry, "share")))]

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from fusesoc_firm.message.folders import interface_files
 from fusesoc_firm.message.middleware import known_suffixes
+from fusesoc_firm.request.core_reader import core_name
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.store.message_runs import marked_folders
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
@@ -65,11 +66,6 @@ def folders_of_run(
         found += current
     faults.raise_if_any()
     return tuple(found)
-
-
-def core_name(vlnv: str) -> str:
-    """The name of a core without its version."""
-    return ":".join(vlnv.split(":")[:3])
 
 
 def _files(request: Request) -> Iterator[tuple[str, Path]]:

@@ -1,4 +1,4 @@
-"""The lock on a place in the build root: one owner at a time, and none that is gone keeps others out."""
+"""The lock on a folder of the build root: one owner at a time, and none that is gone keeps others out."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.building import place_lock
-from fusesoc_firm.building.place_lock import PlaceLock
+from fusesoc_firm.building import folder_lock
+from fusesoc_firm.building.folder_lock import FolderLock
 
 FORK = multiprocessing.get_context("fork")
 
@@ -21,7 +21,7 @@ FORK = multiprocessing.get_context("fork")
 def work_alone(path: Path, log: Path, times: int) -> None:
     """Take the lock so many times, and note when this process begins and ends what it does alone."""
     for _ in range(times):
-        lock = PlaceLock(path)
+        lock = FolderLock(path)
         while lock.acquire():
             time.sleep(0.001)
         with log.open("a") as file:
@@ -33,7 +33,7 @@ def work_alone(path: Path, log: Path, times: int) -> None:
 
 
 def take_and_stay(path: Path) -> None:
-    assert PlaceLock(path).acquire() is None
+    assert FolderLock(path).acquire() is None
     time.sleep(600)
 
 
@@ -66,7 +66,7 @@ def test_one_at_a_time(tmp_path: Path) -> None:
 
 
 def test_who_has_it_is_named(tmp_path: Path) -> None:
-    lock, other = PlaceLock(tmp_path / "sim.lock"), PlaceLock(tmp_path / "sim.lock")
+    lock, other = FolderLock(tmp_path / "sim.lock"), FolderLock(tmp_path / "sim.lock")
     assert lock.acquire() is None
     assert str(other.acquire()).startswith(f"process {os.getpid()} on ")
     lock.release()
@@ -75,7 +75,7 @@ def test_who_has_it_is_named(tmp_path: Path) -> None:
 
 def test_of_a_killed_owner_one_takes_it_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Many find at the same time that the owner is gone."""
-    monkeypatch.setattr(place_lock, "_GRACE_SECONDS", 0.05)
+    monkeypatch.setattr(folder_lock, "_GRACE_SECONDS", 0.05)
     for number in range(5):
         path, log = tmp_path / f"{number}.lock", tmp_path / f"{number}.log"
         killed_owner(path)
@@ -83,34 +83,34 @@ def test_of_a_killed_owner_one_takes_it_over(tmp_path: Path, monkeypatch: pytest
 
 
 def test_what_a_killed_owner_started_has_time_to_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(place_lock, "_GRACE_SECONDS", 0.5)
+    monkeypatch.setattr(folder_lock, "_GRACE_SECONDS", 0.5)
     killed_owner(tmp_path / "sim.lock")
     start = time.monotonic()
-    assert PlaceLock(tmp_path / "sim.lock").acquire() is None
+    assert FolderLock(tmp_path / "sim.lock").acquire() is None
     assert time.monotonic() - start >= 0.5
 
 
 def test_a_process_of_the_same_number_is_another_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(place_lock, "_GRACE_SECONDS", 0)
+    monkeypatch.setattr(folder_lock, "_GRACE_SECONDS", 0)
     path = tmp_path / "sim.lock"
-    assert PlaceLock(path).acquire() is None
+    assert FolderLock(path).acquire() is None
     path.write_text(json.dumps(json.loads(path.read_text()) | {"started": "1"}))
-    assert PlaceLock(path).acquire() is None
+    assert FolderLock(path).acquire() is None
 
 
-def of_another_machine(path: Path) -> PlaceLock:
+def of_another_machine(path: Path) -> FolderLock:
     """A lock that somebody elsewhere holds, of whose process nothing is known here."""
-    lock = PlaceLock(path)
+    lock = FolderLock(path)
     assert lock.acquire() is None
     path.write_text(json.dumps(json.loads(path.read_text()) | {"machine": "elsewhere", "process": 1, "started": "0"}))
     return lock
 
 
 def test_an_owner_elsewhere_has_it_while_its_file_is_touched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(place_lock, "_GRACE_SECONDS", 0)
-    monkeypatch.setattr(place_lock, "_SILENT_SECONDS", 0.3)
+    monkeypatch.setattr(folder_lock, "_GRACE_SECONDS", 0)
+    monkeypatch.setattr(folder_lock, "_SILENT_SECONDS", 0.3)
     path = tmp_path / "sim.lock"
-    lost, mine = of_another_machine(path), PlaceLock(path)
+    lost, mine = of_another_machine(path), FolderLock(path)
     for _ in range(12):
         assert mine.acquire()
         time.sleep(0.05)
@@ -131,11 +131,11 @@ def test_an_owner_elsewhere_has_it_while_its_file_is_touched(tmp_path: Path, mon
 def test_a_damaged_lock_is_removed_after_a_while(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
 ) -> None:
-    monkeypatch.setattr(place_lock, "_GRACE_SECONDS", 0)
-    monkeypatch.setattr(place_lock, "_SILENT_SECONDS", 0.05)
+    monkeypatch.setattr(folder_lock, "_GRACE_SECONDS", 0)
+    monkeypatch.setattr(folder_lock, "_SILENT_SECONDS", 0.05)
     path = tmp_path / "sim.lock"
     path.write_bytes(content)
-    lock = PlaceLock(path)
+    lock = FolderLock(path)
     assert str(lock.acquire()) == "process 0 on an unknown machine"
     while lock.acquire():
         time.sleep(0.01)
@@ -143,7 +143,7 @@ def test_a_damaged_lock_is_removed_after_a_while(
 
 
 def test_a_beat_changes_the_time(tmp_path: Path) -> None:
-    lock = PlaceLock(tmp_path / "sim.lock")
+    lock = FolderLock(tmp_path / "sim.lock")
     assert not lock.beat()
     assert lock.acquire() is None
     os.utime(lock.path, ns=(0, 0))

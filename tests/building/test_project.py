@@ -150,7 +150,7 @@ def test_files_of_all_targets_and_flags_are_found(project: Path) -> None:
     assert [path.name for path in cores["leaf"].files] == ["leaf.core", "leaf.vhd", "bench.vhd"]
     assert cores["branch"].depends == {"me:p:leaf"}
     assert cores["branch"].names == {"me:p:branch", "me:p:tree"}
-    assert [item.parameters.get("message") for item in cores["top"].instances] == [
+    assert [item.parameters.get("message") for item in cores["top"].calls] == [
         "my_msgs/Size",
         "nothing",
         "geometry_msgs/Point",

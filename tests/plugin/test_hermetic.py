@@ -21,8 +21,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.building.cores import Instance, project_cores
+from fusesoc_firm.building.cores import project_cores
 from fusesoc_firm.plugin.gapi import main
+from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.store.layout import CALL
 from fusesoc_firm.store.own_code import PACKAGE
 from fusesoc_firm.store.reads import Reads, noted
@@ -85,13 +86,13 @@ class Generated:
         return [file for file in files if not file.is_relative_to(PACKAGE)]
 
 
-def instances() -> Iterator[Instance]:
+def calls_here() -> Iterator[GeneratorCall]:
     for core in project_cores():
-        for instance in core.instances if core.files[0].is_relative_to(SPECS) else ():
-            if _is_taken(core.vlnv.split(":")[2], instance.parameters):
-                yield instance
+        for call in core.calls if core.files[0].is_relative_to(SPECS) else ():
+            if _is_taken(core.vlnv.split(":")[2], call.parameters):
+                yield call
     for parameters in CONVERTERS:
-        yield Instance("a:b:c-converter:1", "firm", SPECS, parameters)
+        yield GeneratorCall("firm", "a:b:c-converter:1", str(SPECS), parameters)
 
 
 def _is_taken(application: str, parameters: Mapping[str, object]) -> bool:
@@ -102,22 +103,22 @@ def _is_taken(application: str, parameters: Mapping[str, object]) -> bool:
 
 
 def generate(
-    folder: Path, asked: list[Instance], roots: list[Path], environment: Mapping[str, str], *around: str
+    folder: Path, asked: list[GeneratorCall], roots: list[Path], environment: Mapping[str, str], *around: str
 ) -> Generated:
     """Answer all calls, each with its own root in place of `specs/`, in one process; its store is empty."""
     calls = []
-    for number, (instance, root) in enumerate(zip(asked, roots, strict=True)):
+    for number, (item, root) in enumerate(zip(asked, roots, strict=True)):
         work = folder / "work" / str(number)
         work.mkdir(parents=True)
-        vendor, library, name, version = instance.vlnv.split(":")
+        vendor, library, name, version = item.vlnv.split(":")
         call = {
-            "files_root": str(root / instance.files_root.relative_to(SPECS)),
+            "files_root": str(root / Path(item.files_root).relative_to(SPECS)),
             # Each has a name of its own, by which its note is found.
             "vlnv": f"{vendor}:{library}:{name}{number}:{version}",
-            "parameters": dict(instance.parameters),
+            "parameters": dict(item.parameters),
         }
         (work / "call.yml").write_text(yaml.safe_dump(call))
-        calls.append((str(work), instance.generator))
+        calls.append((str(work), item.generator))
     kept = {name: os.environ[name] for name in ("PATH",) if name in os.environ}
     paths = {"PYTHONPATH": str(PACKAGE.parent), "FUSESOC_FIRM_CACHE": str(folder / "store")}
     done = subprocess.run(
@@ -133,14 +134,14 @@ def generate(
 
 
 @pytest.fixture(scope="module")
-def asked() -> list[Instance]:
+def asked() -> list[GeneratorCall]:
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(PACKAGE.parent)
-        return [*instances()]
+        return [*calls_here()]
 
 
 @pytest.fixture(scope="module")
-def here(asked: list[Instance], tmp_path_factory: pytest.TempPathFactory) -> Generated:
+def here(asked: list[GeneratorCall], tmp_path_factory: pytest.TempPathFactory) -> Generated:
     folder = tmp_path_factory.mktemp("here")
     shutil.copytree(SPECS, folder / "specs")
     return generate(folder, asked, [folder / "specs"] * len(asked), HERE)
@@ -153,7 +154,7 @@ def assert_same(one: Generated, other: Generated) -> None:
 
 
 def test_folder_date_locale_and_hash_seed_change_nothing(
-    here: Generated, asked: list[Instance], tmp_path_factory: pytest.TempPathFactory
+    here: Generated, asked: list[GeneratorCall], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     folder = tmp_path_factory.mktemp("there") / "a longer name, with blanks"
     shutil.copytree(SPECS, folder / "specs")
@@ -167,12 +168,12 @@ def test_nothing_of_the_machine_is_in_it(here: Generated) -> None:
 
 
 def test_with_nothing_but_the_declared_inputs_it_is_the_same(
-    here: Generated, asked: list[Instance], tmp_path_factory: pytest.TempPathFactory
+    here: Generated, asked: list[GeneratorCall], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     folder = tmp_path_factory.mktemp("limited")
     roots = [folder / "specs" / str(number) for number in range(len(asked))]
-    for number, (root, instance) in enumerate(zip(roots, asked, strict=True)):
-        (root / instance.files_root.relative_to(SPECS)).mkdir(parents=True)
+    for number, (root, item) in enumerate(zip(roots, asked, strict=True)):
+        (root / Path(item.files_root).relative_to(SPECS)).mkdir(parents=True)
         for path in here.inputs(number):
             copy = root / path.relative_to(here.folder / "specs")
             copy.parent.mkdir(parents=True, exist_ok=True)
@@ -182,12 +183,12 @@ def test_with_nothing_but_the_declared_inputs_it_is_the_same(
 
 @pytest.mark.skipif(not IS_NAMESPACE_ALLOWED, reason="this user may not make mount namespaces")
 def test_what_it_reads_need_not_be_writable(
-    here: Generated, asked: list[Instance], tmp_path_factory: pytest.TempPathFactory
+    here: Generated, asked: list[GeneratorCall], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     folder = tmp_path_factory.mktemp("read_only")
     specs = folder / "specs"
     shutil.copytree(SPECS, specs)
-    first = [instance for instance in asked if "simulator" not in instance.parameters][::4]
+    first = [item for item in asked if "simulator" not in item.parameters][::4]
     frozen = [specs, PACKAGE]
     mounts = [f"mount --bind '{path}' '{path}' && mount -o remount,ro,bind '{path}'" for path in frozen]
     script = " && ".join([*mounts, f"! touch '{specs}/x' 2>/dev/null", 'exec "$@"'])

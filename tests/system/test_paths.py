@@ -117,7 +117,7 @@ def test_every_command_finds_the_messages(
     assert "found_spec" in project.generated()
     # The core that is written for a simulator.
     written = _write_core(project.spec, project.root / "live", CoreSources())
-    assert "robot_system" in written.read_text()
+    assert "robot_system" in written.path.read_text()
     # And the wizard, which extends what is right.
     monkeypatch.setattr("sys.stdin", io.StringIO("no\nno\n\n"))
     assert project.run(capsys, "system", "new", spec).count("is right") == 2

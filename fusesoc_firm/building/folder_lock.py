@@ -1,9 +1,10 @@
-"""A lock on a place in the build root, for one build at a time, on this machine and on all that share it.
+"""A lock on a folder of the build root, for one build at a time, on this machine and on all that share it.
 
 FuseSoC and the tools behind it take a work root to be theirs alone. The lock is a file beside it, which is linked into
-its place: that either happens or fails, on network folders too, where locks of the system (`flock`) may hold on one
-machine only. It names its owner. An owner on this machine is gone when its process is; one on another machine when it
-has not touched the file for a while, which is seen by the file's time changing, so clocks are not compared.
+its place: that either happens or fails, on network folders too, where locks of the system (`text/file_lock.py`) may
+hold on one machine only. It names its owner. An owner on this machine is gone when its process is; one on another
+machine when it has not touched the file for a while, which is seen by the file's time changing, so clocks are not
+compared.
 
 A lock whose owner is gone is removed under a lock of the system, so of several who wait only one removes it. Where that
 one does not hold between machines, two of them might do so at the same instant; then one owner finds that the lock is
@@ -12,7 +13,6 @@ its own no more, and `beat` tells.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import secrets
@@ -21,6 +21,8 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from fusesoc_firm.text.file_lock import locked
 
 BEAT_SECONDS = 2.0
 """How often an owner has to call `beat`."""
@@ -44,7 +46,7 @@ class Owner:
 
 
 @dataclass
-class PlaceLock:
+class FolderLock:
     """The lock of which the file is `path`; its folder is made. Not for several threads."""
 
     path: Path
@@ -83,7 +85,7 @@ class PlaceLock:
     def release(self) -> None:
         """Let others have it."""
         if self._mine:
-            with self._guard():
+            with locked(self.path.parent):
                 if _owner(self.path) == self._mine:
                     self.path.unlink()
             self._mine = None
@@ -101,29 +103,9 @@ class PlaceLock:
 
     def _remove(self, owner: Owner) -> None:
         time.sleep(_GRACE_SECONDS)
-        with self._guard():
+        with locked(self.path.parent):
             if _owner(self.path) == owner:
                 self.path.unlink()
-
-    def _guard(self) -> _Guard:
-        return _Guard(self.path.parent)
-
-
-class _Guard:
-    """While it is entered, no other process of this machine removes a lock from the folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._file = -1
-
-    def __enter__(self) -> None:
-        self._file = os.open(self._folder, os.O_RDONLY)
-        # A file system without such locks: see above.
-        with suppress(OSError):
-            fcntl.flock(self._file, fcntl.LOCK_EX)
-
-    def __exit__(self, *_: object) -> None:
-        os.close(self._file)
 
 
 def _owner(path: Path) -> Owner | None:
