@@ -72,6 +72,7 @@ def test_every_row_is_in_the_document() -> None:
             )
 
 
+@pytest.mark.check
 @needs_yosys
 def test_luts_and_flip_flops_of_a_tiny_entity(tmp_path: Path) -> None:
     (tmp_path / "tiny.vhd").write_text(_TINY, encoding="ascii")
@@ -136,6 +137,7 @@ def test_a_column_without_entries_is_left_out() -> None:
     assert not table.is_good
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("ros", list(RosVersion))
 @pytest.mark.parametrize("message", sorted({message for _, message in fuzz.MESSAGES}))
 def test_two_readers_agree_on_what_is_broken(ros: RosVersion, message: str) -> None:
@@ -169,6 +171,7 @@ def _is_read(payloads: Payloads, payload: bytes) -> bool:
     return True
 
 
+@pytest.mark.check
 @needs_verilator
 @pytest.mark.parametrize(
     "converter", [row for row in fuzz.rows() if row.ros == 2], ids=lambda row: f"{row.message}-{row.width}"
@@ -181,6 +184,7 @@ def test_a_thousand_broken_frames(tmp_path: Path, converter: Converter) -> None:
     assert tally.delivered == tally.good > 300
 
 
+@pytest.mark.check
 @needs_verilator
 def test_cycles_are_counted(tmp_path: Path) -> None:
     payloads = Payloads(RosVersion.ROS1, QUATERNION)
@@ -193,6 +197,7 @@ def test_cycles_are_counted(tmp_path: Path) -> None:
         assert all(each.beat_cycles == beats and each.message_cycles <= 2 for each in found)
 
 
+@pytest.mark.check
 @needs_verilator
 def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
     """Each way in which the records can differ from what was sent."""
@@ -219,6 +224,7 @@ def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
         assert fuzz.difference(model, frames, wrong)
 
 
+@pytest.mark.check
 def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
     """And what is measured ends well: a broken call would be measured as well."""
     systems.write_system(tmp_path, SEED)
@@ -234,6 +240,7 @@ def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
         systems.run(systems.JOBS[0], tmp_path)
 
 
+@pytest.mark.check
 def test_an_edit_makes_just_its_dependants_anew() -> None:
     """The rows of the bench, of a sixth of its messages; FuseSoC runs as it does there."""
     rows = [*store.edit_rows(6)]

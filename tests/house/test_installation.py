@@ -20,7 +20,7 @@ from fusesoc_firm import __version__
 ROOT = Path(__file__).resolve().parents[2]
 ROBOT = Path(__file__).parent / "data" / "robot"
 # One worker does them all, so that each kind is installed once.
-pytestmark = pytest.mark.xdist_group("installation")
+pytestmark = [pytest.mark.check, pytest.mark.xdist_group("installation")]
 
 
 PROJECT_CORE = """\

@@ -22,6 +22,7 @@ def _size_name(proof: Proof, size: object) -> str:
     return f"{proof.name}-{size}"
 
 
+@pytest.mark.check
 @needs_solver
 @pytest.mark.parametrize(("proof", "size"), _SIZES, ids=[_size_name(*each) for each in _SIZES])
 def test_it_is_proved(proof: Proof, size: dict[str, int], tmp_path: Path) -> None:
@@ -29,6 +30,7 @@ def test_it_is_proved(proof: Proof, size: dict[str, int], tmp_path: Path) -> Non
     assert outcome.is_proved, outcome.log
 
 
+@pytest.mark.check
 @needs_solver
 @pytest.mark.parametrize(("proof", "mutation", "label"), _FAULTS, ids=[f"{p.name}-{label}" for p, _, label in _FAULTS])
 def test_a_broken_copy_fails(proof: Proof, mutation: Mutation, label: str, tmp_path: Path) -> None:
