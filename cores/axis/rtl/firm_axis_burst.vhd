@@ -6,8 +6,8 @@
 -- whose; a frame's last one waits for nobody. A held beat therefore never blocks another source, and a run has no gap.
 -- In which sources a frame has begun is kept in a memory, a bit a source. It is cleared in the 2**n cycles after reset,
 -- n bits being the index; nothing is taken meanwhile.
--- The paths from input to output are combinational, and what is offered may change with the source until it is taken, as
--- behind the multiplexer: put a register slice behind it, which shows it to nobody.
+-- The paths from input to output are combinational, and what is offered may change with the source until it is taken,
+-- as behind the multiplexer: put a register slice behind it, which shows it to nobody.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

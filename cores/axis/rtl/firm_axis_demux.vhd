@@ -2,8 +2,8 @@
 -- Takes the id off a frame and routes the rest to one of DESTINATIONS. Data is broadcast, only `tvalid` and
 -- `tready` are decoded. At 8 bits the id's beat ends here; at wider streams it goes on with its lowest lane void
 -- (the bytes are still there, `tkeep` is unchanged), so nothing has to be re-aligned. A frame whose id belongs to
--- nobody, or that is nothing but its id at 8 bits, is swallowed and `id_error` pulses in the cycle after its first beat.
--- The paths from input to output are combinational: put a register slice in front.
+-- nobody, or that is nothing but its id at 8 bits, is swallowed and `id_error` pulses in the cycle after its first
+-- beat. The paths from input to output are combinational: put a register slice in front.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Between a host link, which knows bytes, and a system's two streams of frames. Bytes from the host wait in a FIFO, get
--- the ends of their frames from the lengths that these announce, and fill beats; beats to the host are sent byte by byte.
--- The host's bytes cannot be stopped here: who drives the link looks at `room`. If bytes are lost, by the link or for want
--- of room, the frame that has begun is cut and all that follows is dropped, as it could be anything, until the host makes
--- itself clear: by a cut of its own, or by TIMEOUT cycles of silence. Silence cuts a frame that has begun in any case.
+-- the ends of their frames from the lengths that these announce, and fill beats; beats to the host are sent byte by
+-- byte. The host's bytes cannot be stopped here: who drives the link looks at `room`. If bytes are lost, by the link or
+-- for want of room, the frame that has begun is cut and all that follows is dropped, as it could be anything, until the
+-- host makes itself clear: by a cut of its own, or by TIMEOUT cycles of silence. Silence cuts a frame that has begun in
+-- any case.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

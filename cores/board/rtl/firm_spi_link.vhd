@@ -1,15 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over SPI, mode 0, highest bit first, the host being the master; frames are sent as they are. SPI
--- sends both ways in every byte, asked or not, so each selection (spi_cs_n low) begins with a command:
+-- The host's two streams over SPI, mode 0, highest bit first, the host being the master; frames are sent as they are.
+-- SPI sends both ways in every byte, asked or not, so each selection (spi_cs_n low) begins with a command:
 --
---   00  status  then come: room for bytes to the system (two bytes, the lower first), bytes that wait for the host (two)
+--   00  status  then come: room for bytes to the system (two bytes, lower first), bytes that wait for the host (two)
 --   01  write   what follows are bytes of frames, no more than there is room for
 --   02  read    then come bytes of frames; behind those that waited, 00
 --   03  cut     what is written next begins a frame: both sides are together again after a fault
 --
--- While the command is sent, what comes back is 80, and 1 more if bytes wait, 2 more if bytes were dropped since the last
--- cut. The pins are sampled by clk, so a period of spi_sclk takes 10 cycles of it at least. A byte counts when its last
--- bit is clocked; selections may end anywhere.
+-- While the command is sent, what comes back is 80, and 1 more if bytes wait, 2 more if bytes were dropped since the
+-- last cut. The pins are sampled by clk, so a period of spi_sclk takes 10 cycles of it at least. A byte counts when its
+-- last bit is clocked; selections may end anywhere.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent as they are, byte
--- after byte. A break from the host, or a pause of TIMEOUT_MS, ends a frame that has begun; both bring the two sides
--- together again after bytes were lost. uart_rts_n rises while there is little room, in time for the bytes that an
--- adapter still sends.
+-- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent as they are,
+-- byte after byte. A break from the host, or a pause of TIMEOUT_MS, ends a frame that has begun; both bring the two
+-- sides together again after bytes were lost. uart_rts_n rises while there is little room, in time for the bytes that
+-- an adapter still sends.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

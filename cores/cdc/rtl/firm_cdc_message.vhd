@@ -1,14 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The handshake of a message, or of an element of an array, between two clock domains. What the source shows is a level a
--- segment, and one that all of it came. They go to the sink and are seen there one after the other, in this order;
+-- The handshake of a message, or of an element of an array, between two clock domains. What the source shows is a level
+-- a segment, and one that all of it came. They go to the sink and are seen there one after the other, in this order;
 -- the sink returns which of them it has seen, and whether it has taken the message. Both go back to zero before the
 -- next one, so nothing is lost or seen twice at any ratio of the clocks, and a message may be withdrawn at any time.
 --
 -- The fields are registers of the source's domain, which hold until the sink has let go, as a source that withdraws its
 -- message may change them at once. A source that never does need not have them here: they hold until `s_ready`.
 --
--- What lies within the message, streams and elements, crosses in entities of its own (firm_cdc_stream, firm_cdc_message)
--- which must not be ahead of it: they let nothing in before `s_settled`, and the next message waits for all of them.
+-- What lies within the message, streams and elements, crosses in entities of its own (firm_cdc_stream,
+-- firm_cdc_message) which must not be ahead of it: they let nothing in before `s_settled`, and the next message waits
+-- for all of them.
 --
 -- Constraint: fields are there one cycle of `m_clk` before the sink looks at them; limit their delay to that.
 library ieee;
@@ -143,8 +144,8 @@ begin
       synced => requested);
 
   -- Levels that rise or fall together may arrive one after the other, in any order: each is shown behind those before
-  -- it, and none any more when the first of them has fallen. In a reset, which the sink may be through with already, they
-  -- are those from before it.
+  -- it, and none any more when the first of them has fallen. In a reset, which the sink may be through with already,
+  -- they are those from before it.
   is_fallen <= '1' when (answer_r(SEGMENTS downto 0) and not requested) /= NONE else '0';
 
   order : process (requested, m_rst_n, m_enable, answer_r, is_fallen)

@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A stream of a message between two clock domains, and between two widths where they differ: a FIFO in distributed RAM,
--- as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It takes and gives a beat a cycle; the
--- slower clock, or the narrower end, sets the pace.
+-- as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It takes and gives a beat a cycle;
+-- the slower clock, or the narrower end, sets the pace.
 --
--- A stream's last beat is not taken from the source before the sink has it. So whatever the source shows after a stream,
--- such as that the message is complete, is not ahead of the stream at the sink.
+-- A stream's last beat is not taken from the source before the sink has it. So whatever the source shows after a
+-- stream, such as that the message is complete, is not ahead of the stream at the sink.
 --
--- Constraint: RAM to `m_axis_*` is written two cycles of `m_clk` or more before it is read; limit its delay to one. The bits
--- of a pointer may not be further apart than a cycle of the clock that they come from.
+-- Constraint: RAM to `m_axis_*` is written two cycles of `m_clk` or more before it is read; limit its delay to one. The
+-- bits of a pointer may not be further apart than a cycle of the clock that they come from.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -24,7 +24,8 @@ entity firm_cdc_stream is
     s_clk   : in std_logic;
     s_rst_n : in std_logic;
 
-    -- The message that the stream is part of, as its source shows it. When it falls, what has come of the stream is dropped.
+    -- The message that the stream is part of, as its source shows it. When it falls, what has come of the stream is
+    -- dropped.
     s_open   : in  std_logic := '1';
     -- The sink sees this message: beats may follow.
     s_enable : in  std_logic := '1';

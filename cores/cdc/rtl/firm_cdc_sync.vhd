@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Brings levels into another clock domain: each bit passes a row of registers, in which it has time to settle. Every bit
--- must come from a register of its own domain, with no logic behind it, and no two bits arrive together for certain.
+-- Brings levels into another clock domain: each bit passes a row of registers, in which it has time to settle. Every
+-- bit must come from a register of its own domain, with no logic behind it, and no two bits arrive together for
+-- certain.
 --
 -- Constraint: the path into the first register is asynchronous (docs/clocks.md).
 library ieee;

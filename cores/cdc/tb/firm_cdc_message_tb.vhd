@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A message of variable size between two clocks: a field, a stream, and an array of elements that have a field and a
--- stream each. Lengths and bytes follow from the message's number, which is its first field, so the sink knows what must
--- come next. It checks at every edge that fields hold while they are shown, that nothing is ahead of what was before it
--- at the source, and that a withdrawn message leaves nothing behind. A source that withdraws drives 'X' from there on.
+-- stream each. Lengths and bytes follow from the message's number, which is its first field, so the sink knows what
+-- must come next. It checks at every edge that fields hold while they are shown, that nothing is ahead of what was
+-- before it at the source, and that a withdrawn message leaves nothing behind. A source that withdraws drives 'X' from
+-- there on.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

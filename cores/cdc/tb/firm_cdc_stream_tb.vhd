@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Streams of random length through the crossing, or at one clock through the resizer alone: every byte must come once, in
--- order, in full beats from lane 0 up with zeros in lanes that are not kept. The source may not be rid of a stream's last
--- beat before the sink has it.
--- Without stalls the pace is that of the slower end: the longest stream may take no more than its beats there, and SLACK.
+-- Streams of random length through the crossing, or at one clock through the resizer alone: every byte must come once,
+-- in order, in full beats from lane 0 up with zeros in lanes that are not kept. The source may not be rid of a stream's
+-- last beat before the sink has it.
+-- Without stalls the pace is that of the slower end: the longest stream may take no more than its beats there, and
+-- SLACK.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The Manager's way to the host under a grant that moves at random, also within frames and also to publishers that have
--- nothing to send; or, for comparison, under a scheduler. What each publisher sends follows from its index and the number of the frame, as the test that reads
--- TRACE_FILE knows, too: of each burst one line, `tid`, a blank and the bytes in hex.
--- The last line that is printed has the beats taken from the publishers, those at the host, and the cycles between the
--- first of the former and the last of the latter.
+-- nothing to send; or, for comparison, under a scheduler. What each publisher sends follows from its index and the
+-- number of the frame, as the test that reads TRACE_FILE knows, too: of each burst one line, `tid`, a blank and the
+-- bytes in hex. The last line that is printed has the beats taken from the publishers, those at the host, and the
+-- cycles between the first of the former and the last of the latter.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -311,7 +311,8 @@ begin
     if rising_edge(clk) then
       cycle <= cycle + 1;
       if rst_n = '1' then
-        assert not is_shown or (out_tvalid = '1' and old_tdata = out_tdata and old_rest = out_tkeep & out_tid & out_tlast)
+        assert not is_shown
+          or (out_tvalid = '1' and old_tdata = out_tdata and old_rest = out_tkeep & out_tid & out_tlast)
           report "a beat was withdrawn or changed" severity failure;
         is_shown    := out_tvalid = '1' and out_tready = '0';
         old_tdata   := out_tdata;

@@ -169,7 +169,7 @@ begin
   root_id    <= root_id_r;
   root_key   <= root_key_r;
   first_valid <= root_valid_r or (filling_r and up_valid(0));
-  first_id    <= up_id(0)  when filling_r = '1' else root_id_r;
+  first_id    <= up_id(0) when filling_r = '1' else root_id_r;
   first_key   <= up_key(0) when filling_r = '1' else root_key_r;
   empty      <= not (root_valid_r or filling_r or owing_r);
 

@@ -174,8 +174,8 @@ begin
     second_right <= '1';
   end generate leaves;
   inner_nodes : if LOW_BITS > 0 generate
-    first        <= left  when fill_r = '1'                       else item;
-    second       <= right when fill_r = '1' or id_r(SIDE) = '1'   else left;
+    first        <= left when fill_r = '1' else item;
+    second       <= right when fill_r = '1' or id_r(SIDE) = '1' else left;
     second_right <= fill_r or id_r(SIDE);
   end generate inner_nodes;
   first_rank   <= rank(first, not fill_r and id_r(SIDE));

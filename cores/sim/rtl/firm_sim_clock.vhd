@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A clock that has nothing to do with another one: it has about so many edges for each of the other's, begins at any phase,
--- and is off by up to a thousandth, so that its edges wander along the other's. Simulation only.
+-- A clock that has nothing to do with another one: it has about so many edges for each of the other's, begins at any
+-- phase, and is off by up to a thousandth, so that its edges wander along the other's. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;

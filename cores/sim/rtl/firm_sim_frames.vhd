@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's end of a link that carries bytes: finds frames in them by their lengths and passes each on when it is whole.
--- It keeps what it has, however much that is. Simulation only.
+-- The host's end of a link that carries bytes: finds frames in them by their lengths and passes each on when it is
+-- whole. It keeps what it has, however much that is. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host as the master of an SPI link: frames of firm_sim_host, and back. It asks for the status, writes as much as there
--- is room for, reads what waits, and begins anew; selections are cut short at random where STALL_PERCENT is not 0.
--- Simulation only.
+-- The host as the master of an SPI link: frames of firm_sim_host, and back. It asks for the status, writes as much as
+-- there is room for, reads what waits, and begins anew; selections are cut short at random where STALL_PERCENT is not
+-- 0. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -89,7 +89,8 @@ begin
       wait for PERIOD;
       send_bits(command);
       assert answer(7 downto 1) = "1000000"
-        report "firm_sim_spi: the answer to a command begins with an unknown byte, or bytes were dropped" severity failure;
+        report "firm_sim_spi: the answer to a command begins with an unknown byte, or bytes were dropped"
+        severity failure;
     end procedure begin_selection;
 
     procedure end_selection is

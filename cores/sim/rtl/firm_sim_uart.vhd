@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host with its serial adapter: frames of firm_sim_host over two lines, and back. It sends as an adapter does: with
--- pauses, and up to LAG bytes more after the other side's `rts_n` has risen. It opens the line with a break, as the host's
--- software should. Simulation only.
+-- pauses, and up to LAG bytes more after the other side's `rts_n` has risen. It opens the line with a break, as the
+-- host's software should. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
