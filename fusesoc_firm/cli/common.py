@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 if TYPE_CHECKING:
-    from fusesoc_firm.diagnostics import SourceRef
     from fusesoc_firm.message.library import MessageLibrary
-    from fusesoc_firm.system.generator import LoadedSystem
+    from fusesoc_firm.system.system_core import LoadedSystem
+    from fusesoc_firm.text.diagnostics import SourceRef
 
 Handler = Callable[[argparse.Namespace], None]
 

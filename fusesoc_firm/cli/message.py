@@ -132,7 +132,7 @@ def _converters(stage: str, frame: Any, definitions: dict[MessageName, MessageDe
     """Configuration or VHDL of the message's package and of both converters."""
     from fusesoc_firm.converter import constants
     from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
-    from fusesoc_firm.render import render
+    from fusesoc_firm.text.render import render
 
     package = constants.constants_package(frame.message)
     configuration = constants.constants_configuration(frame.message, definitions, package)

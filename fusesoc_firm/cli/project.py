@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import add_picture, command
-from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.text.diagnostics import InputError, fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.gapi import MessageCores
-    from fusesoc_firm.generation import Request
-    from fusesoc_firm.lock import Lock
-    from fusesoc_firm.project import Instance, ProjectCore
-    from fusesoc_firm.reads import Input
+    from fusesoc_firm.building.cores import ProjectCore
+    from fusesoc_firm.plugin.gapi import MessageCores
+    from fusesoc_firm.plugin.lock import Lock
+    from fusesoc_firm.request.request import GeneratorCall, Request
+    from fusesoc_firm.store.reads import Input
 
 
 def add_project(commands: Any) -> None:
@@ -53,11 +53,11 @@ def add_project(commands: Any) -> None:
 
 
 def _draw_cores(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.pictures import check_picture, draw
-    from fusesoc_firm.project import core_graph
+    from fusesoc_firm.building.cores import core_graph
+    from fusesoc_firm.tools.pictures import check_picture, draw
 
-    def sources(instance: Instance) -> list[str]:
-        request = _request(instance)
+    def sources(call: GeneratorCall) -> list[str]:
+        request = _request(call)
         # Told from here, files of one name in two cores are two.
         return [] if request is None else [*map(shown, _input_files(request))]
 
@@ -66,7 +66,7 @@ def _draw_cores(arguments: argparse.Namespace) -> None:
 
 
 def _list_affected(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.project import affected, changed_files, project_cores
+    from fusesoc_firm.building.cores import affected, changed_files, project_cores
 
     changed = dict.fromkeys(path.resolve() for path in changed_files(arguments.since, Path.cwd()))
     found = affected(project_cores(), _touched(changed))
@@ -80,8 +80,8 @@ def check_locked(core: str) -> Path:
 
     Where that file is missing, there is nothing to hold the core to, which is a fault, too.
     """
-    from fusesoc_firm.lock import check_lock, lock_path, read_lock
-    from fusesoc_firm.project import dependencies
+    from fusesoc_firm.building.cores import dependencies
+    from fusesoc_firm.plugin.lock import check_lock, lock_path, read_lock
 
     found, depends = dependencies(core)
     path = lock_path(found)
@@ -91,9 +91,9 @@ def check_locked(core: str) -> Path:
 
 
 def _lock(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.lock import lock_path, lock_text
-    from fusesoc_firm.outputs import write
-    from fusesoc_firm.project import dependencies
+    from fusesoc_firm.building.cores import dependencies
+    from fusesoc_firm.plugin.lock import lock_path, lock_text
+    from fusesoc_firm.text.outputs import write
 
     if arguments.locked:
         print(f"{shown(check_locked(arguments.core))}: nothing differs")
@@ -105,7 +105,7 @@ def _lock(arguments: argparse.Namespace) -> None:
 
 def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
     """What a core uses now."""
-    from fusesoc_firm.lock import lock_of
+    from fusesoc_firm.plugin.lock import lock_of
 
     calls = {core.vlnv: [*_calls(core)]}
     for item in depends:
@@ -116,10 +116,10 @@ def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
 
 
 def _calls(core: ProjectCore) -> Iterator[tuple[Request, Sequence[Input]]]:
-    from fusesoc_firm.gapi import GENERATORS, MESSAGES
+    from fusesoc_firm.plugin.gapi import GENERATORS, MESSAGES
 
-    for instance in core.instances:
-        if instance.generator != MESSAGES and (request := _request(instance)):
+    for call in core.calls:
+        if call.generator != MESSAGES and (request := _request(call)):
             yield request, GENERATORS[request.command].inputs(request)
 
 
@@ -129,8 +129,8 @@ def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
     def touched(core: ProjectCore) -> str | None:
         found = _first(changed, core.files)
         # What is behind a generated core takes longer to tell.
-        for instance in core.instances if changed and not found else ():
-            found = found or _first(changed, _files_behind(instance, changed))
+        for call in core.calls if changed and not found else ():
+            found = found or _first(changed, _files_behind(call, changed))
         return shown(found) if found else None
 
     return touched
@@ -140,47 +140,46 @@ def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
     return next((path for path in changed if path in files), None)
 
 
-def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
+def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
     """All that a generated core is made of, our own files too."""
-    from fusesoc_firm.gapi import GENERATORS, used_before
-    from fusesoc_firm.own_code import PACKAGE, digests
+    from fusesoc_firm.plugin.gapi import GENERATORS, used_before
+    from fusesoc_firm.store.own_code import PACKAGE, digests
 
     try:
-        request = _request(instance)
+        request = _request(call)
         if request is None:
             return set()
         files = set(_input_files(request))
         used = used_before(request, GENERATORS[request.command])
     except InputError:
         # It cannot be made: whatever changed beside it, or in our own files, may be why.
-        roots = (instance.files_root.resolve(), PACKAGE)
+        roots = (Path(call.files_root).resolve(), PACKAGE)
         return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
     # What was not made before may use any.
     return files | {PACKAGE / name for name in (digests() if used is None else used)}
 
 
-def _request(instance: Instance) -> Request | None:
+def _request(call: GeneratorCall) -> Request | None:
     """The request that FuseSoC would make; None for a generator that is not ours."""
-    from fusesoc_firm.gapi import GENERATORS, Call, make_request
+    from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
 
-    if instance.generator not in GENERATORS:
+    if call.generator not in GENERATORS:
         return None
-    known = GENERATORS[instance.generator]
-    call = Call(instance.vlnv, instance.files_root, instance.parameters)
-    return make_request(instance.generator, call, known, message_folders)
+    known = GENERATORS[call.generator]
+    return make_request(call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), known, message_folders)
 
 
 def message_folders(names: MessageCores) -> tuple[Path, ...]:
     """The folders of cores that carry messages, where these lie: there is no run that copies them."""
-    from fusesoc_firm.gapi import MESSAGES
-    from fusesoc_firm.message_core import folders
-    from fusesoc_firm.project import project_cores
+    from fusesoc_firm.building.cores import project_cores
+    from fusesoc_firm.plugin.gapi import MESSAGES
+    from fusesoc_firm.request.message_core import folders
 
     found: list[Path] = []
     cores = {name: core for core in project_cores() for name in core.names}
     for name, source in names.items():
         core = cores.get(":".join(name.split(":")[:3]))
-        requests = [_request(item) for item in core.instances if item.generator == MESSAGES] if core else []
+        requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []
         if not requests:
             fail(f"'{name}' is no core with messages that FuseSoC knows here", source)
         found += [folder for request in requests if request for folder in folders(request)]
@@ -189,7 +188,7 @@ def message_folders(names: MessageCores) -> tuple[Path, ...]:
 
 def _input_files(request: Request) -> list[Path]:
     """The files that a request depends on, be it in part."""
-    from fusesoc_firm.gapi import GENERATORS
+    from fusesoc_firm.plugin.gapi import GENERATORS
 
     found = (item if isinstance(item, Path) else item.path for item in GENERATORS[request.command].inputs(request))
     return [*dict.fromkeys(path.resolve() for path in found)]

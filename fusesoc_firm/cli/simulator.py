@@ -52,7 +52,7 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
 
 def built_simulator(arguments: argparse.Namespace) -> Any:
     """The `BuiltSimulator` that the arguments ask for."""
-    from fusesoc_firm.host.simulator import CoreSources, build_simulator
+    from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
 
     sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)
     return build_simulator(arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources)

@@ -13,17 +13,17 @@ from fusesoc_firm.cli.common import add_picture, add_sources, as_yaml, command, 
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.model import RosVersion
-    from fusesoc_firm.system.generator import LoadedSystem
+    from fusesoc_firm.system.system_core import LoadedSystem
 
 
 def _cpp_package(loaded: LoadedSystem, ros: RosVersion | None, _: argparse.Namespace) -> Mapping[str, str]:
-    from fusesoc_firm.host.node_package import cpp_package
+    from fusesoc_firm.node.package import cpp_package
 
     return cpp_package(loaded, ros)
 
 
 def _python_node(loaded: LoadedSystem, ros: RosVersion | None, arguments: argparse.Namespace) -> Mapping[str, str]:
-    from fusesoc_firm.host.node.source import python_node
+    from fusesoc_firm.node.source import python_node
     from fusesoc_firm.system.beside import sources_of
 
     # The node runs where FuseSoC may not be.
@@ -142,14 +142,14 @@ def _check_system(arguments: argparse.Namespace) -> None:
 
 
 def _show_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.show import derived_description
+    from fusesoc_firm.system.views.show import derived_description
 
     print(as_yaml(derived_description(load(arguments).system)), end="")
 
 
 def _new_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.prompts import asker
-    from fusesoc_firm.system.wizard import extend_specification
+    from fusesoc_firm.system.scaffold.wizard import extend_specification
+    from fusesoc_firm.text.prompts import asker
 
     if arguments.spec.exists():
         _check_system(arguments)
@@ -166,8 +166,8 @@ def _message_names(arguments: argparse.Namespace, own: Sequence[str]) -> list[st
 
 
 def _write_skeletons(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.outputs import write
-    from fusesoc_firm.system.skeleton import missing_sources
+    from fusesoc_firm.system.scaffold.skeleton import missing_sources
+    from fusesoc_firm.text.outputs import write
 
     loaded = load(arguments, needs_sources=False)
     texts = missing_sources(loaded.system, loaded.folder)
@@ -179,8 +179,8 @@ def _write_skeletons(arguments: argparse.Namespace) -> None:
 
 
 def _write_core(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.outputs import check_output, write
-    from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
+    from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core, updated_core
+    from fusesoc_firm.text.outputs import check_output, write
 
     spec: Path = arguments.spec
     path: Path = arguments.output or spec.with_suffix(".core")
@@ -208,7 +208,7 @@ def _write_core(arguments: argparse.Namespace) -> None:
 
 def _write_node(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.message.model import RosVersion
-    from fusesoc_firm.outputs import write
+    from fusesoc_firm.text.outputs import write
 
     loaded = load(arguments, needs_sources=False)
     ros = RosVersion(arguments.ros) if arguments.ros else None
@@ -221,21 +221,21 @@ def _write_node(arguments: argparse.Namespace) -> None:
 
 
 def _draw_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.pictures import check_picture, draw
-    from fusesoc_firm.system.diagram import diagram
+    from fusesoc_firm.system.views.diagram import diagram
+    from fusesoc_firm.tools.pictures import check_picture, draw
 
     check_picture(arguments.output, arguments.format)
     draw(diagram(load(arguments).system), arguments.output, arguments.format)
 
 
 def _report_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.report import report
+    from fusesoc_firm.system.views.report import report
 
     print(report(arguments.spec, load(arguments)), end="")
 
 
 def _print_schema(_: argparse.Namespace) -> None:
-    from fusesoc_firm.system.specification import Specification
-    from fusesoc_firm.yaml_schema import json_schema
+    from fusesoc_firm.system.written.specification import Specification
+    from fusesoc_firm.text.yaml_schema import json_schema
 
     print(json.dumps(json_schema(Specification, "System specification of fusesoc_firm"), indent=2))

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import command
-from fusesoc_firm.diagnostics import SourceRef, fail
+from fusesoc_firm.text.diagnostics import SourceRef, fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.generation import Request
-    from fusesoc_firm.render import TracedLine
-    from fusesoc_firm.why import Names
+    from fusesoc_firm.plugin.why import Names
+    from fusesoc_firm.request.request import Request
+    from fusesoc_firm.text.render import TracedLine
 
 
 def add_why(commands: Any) -> None:
@@ -28,8 +28,8 @@ def add_why(commands: Any) -> None:
 
 
 def _tell_why(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.gapi import GENERATORS, read_request
-    from fusesoc_firm.why import call_file, reasons, rendering_of
+    from fusesoc_firm.plugin.gapi import GENERATORS, read_request
+    from fusesoc_firm.plugin.why import call_file, reasons, rendering_of
 
     path, number = _split(arguments.place)
     if not path.is_file():
@@ -66,8 +66,8 @@ def _split(text: str) -> tuple[Path, int | None]:
 
 def _generator(call: Path) -> str:
     """The generator that a call is for: FuseSoC does not write it down."""
-    from fusesoc_firm.gapi import MESSAGES
-    from fusesoc_firm.yaml_text import yaml_data
+    from fusesoc_firm.plugin.gapi import MESSAGES
+    from fusesoc_firm.text.yaml_text import yaml_data
 
     given = yaml_data(call.read_text(encoding="utf-8")).get("parameters") or {}
     if "spec" in given:
@@ -76,14 +76,14 @@ def _generator(call: Path) -> str:
 
 
 def _names(request: Request) -> Names:
-    from fusesoc_firm.why import names_of
+    from fusesoc_firm.plugin.why import names_of
 
     if request.command == "far":
-        from fusesoc_firm.system.generator import load_requested
+        from fusesoc_firm.system.system_core import load_requested
 
         loaded = load_requested(request)
         return names_of(loaded.specification, loaded.messages())
-    from fusesoc_firm.converter.generator import order_of_request
+    from fusesoc_firm.converter.converter_core import order_of_request
 
     return names_of(None, [(wanted.message, wanted.definitions) for wanted in order_of_request(request).messages])
 

@@ -16,10 +16,10 @@ from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.storing import Counter, joints, store_configuration, store_names
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, stores_of
-from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.defaults import default_payload
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
-from fusesoc_firm.naming import entity_name, prefixed
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.naming import entity_name, prefixed
 
 Configuration = dict[str, Any]
 

@@ -17,9 +17,9 @@ from enum import Enum
 from functools import cached_property
 from math import prod
 
-from fusesoc_firm.diagnostics import SourceRef
 from fusesoc_firm.message.model import DefaultValue, MessageName, RosVersion
-from fusesoc_firm.wire import WireType
+from fusesoc_firm.message.wire import WireType
+from fusesoc_firm.text.diagnostics import SourceRef
 
 ID_BYTES = 1
 LENGTH_BYTES = 4

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.naming import LONGEST_TEXT
+from fusesoc_firm.text.naming import LONGEST_TEXT
 
 LARGEST_SIZE = 2**32 - 1  # the wire counts elements and characters in a uint32
 

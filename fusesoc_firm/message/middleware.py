@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.model import MIDDLEWARES, InterfaceKind, MessageDefinition, MessageName, RosVersion
-from fusesoc_firm.wire import WireRules
+from fusesoc_firm.message.wire import WireRules
+from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 class Store(Protocol):

@@ -29,7 +29,7 @@ from tests.bench import (
     yosys,
 )
 from tests.bench.tables import Table, filled
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 FIGURES = REPOSITORY / "docs" / "figures.md"
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from fusesoc_firm.scheduling.combinations import TOP
-from fusesoc_firm.system.specification import SCHEDULERS
-from fusesoc_firm.system.timing import WITH_TRANSFER_TIMES
-from tests.sim.ghdl import Library, core_files
-from tests.sim.schedulers import ENTITIES, POLICY_CORES, wrapper
+from fusesoc_firm.scheduling.evaluation.combinations import TOP
+from fusesoc_firm.system.derived.timing import WITH_TRANSFER_TIMES
+from fusesoc_firm.system.written.specification import SCHEDULERS
+from tests.cores.schedulers import ENTITIES, POLICY_CORES, wrapper
+from tests.hdl.ghdl import Library, core_files
 
 POLICIES = SCHEDULERS
 TIME_BITS = 16

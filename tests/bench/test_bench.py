@@ -15,7 +15,7 @@ from fusesoc_firm.frame.values import CodecError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.system_core import load_system
 from tests import yowasp
 from tests.bench import figures, fuzz, store, systems
 from tests.bench.cycles import cycles_of
@@ -24,7 +24,7 @@ from tests.bench.model import FrameError, Message, publisher_model, subscriber_m
 from tests.bench.payloads import BrokenPayloadError, Payloads
 from tests.bench.tables import FAILED, Table
 from tests.bench.yosys import ECP5, ICE40, Cells, SynthesisError, Yosys, count_cells
-from tests.sim.ghdl import Library
+from tests.hdl.ghdl import Library
 
 SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"

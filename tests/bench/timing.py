@@ -9,14 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.bench import schedulers
 from tests.bench.area import Subject
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.bench.yosys import SynthesisError
-from tests.sim.ghdl import GhdlError, Library, core_files
-from tests.sim.schedulers import ENTITIES
+from tests.cores.schedulers import ENTITIES
+from tests.hdl.ghdl import GhdlError, Library, core_files
 
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.

@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 from fusesoc import edalizer
 
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.tools.library_path import library_root
+from tests.hdl.ghdl import REPOSITORY
 from tests.processes import IGNORING_INTERRUPTS
-from tests.sim.ghdl import REPOSITORY
 
 CONFIGURATION = f"""\
 [main]

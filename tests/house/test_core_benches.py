@@ -13,7 +13,7 @@ import yaml
 
 from fusesoc_firm.building.plan import Build, make_plan
 from fusesoc_firm.building.pool import Pool
-from tests.sim.ghdl import CORES, core_files
+from tests.hdl.ghdl import CORES, core_files
 
 
 def benches() -> dict[str, dict[str, Any]]:

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.simulator import BuiltSimulator, build_simulator
+from fusesoc_firm.simulation.simulator import BuiltSimulator, build_simulator
 from tests.house.test_live_simulators import SPECS, answers
-from tests.unit.host.drivers import Driver, compile_driver
-from tests.unit.host.test_cpp_node import puts, run
+from tests.node.drivers import Driver, compile_driver
+from tests.node.test_cpp_node import puts, run
 
 SEED = 20261126
 TOOLS = [

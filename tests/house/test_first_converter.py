@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 PAGE = REPOSITORY / "docs" / "first_converter.md"
 needs_tools = pytest.mark.skipif(

@@ -13,12 +13,12 @@ import pytest
 
 from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.host.bursts import BurstJoiner
-from fusesoc_firm.host.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator
-from fusesoc_firm.host.transport.simulator import Simulator
-from fusesoc_firm.host.transport.transport import Burst
+from fusesoc_firm.node.bursts import BurstJoiner
+from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.transport.transport import Burst
+from fusesoc_firm.simulation.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator
 from fusesoc_firm.system.beside import core_of
+from fusesoc_firm.text.diagnostics import InputError
 from tests.house.test_main_job import ROOT, run
 
 SPECS = ROOT / "specs"
@@ -162,7 +162,8 @@ def test_a_changed_source_is_built_and_its_fault_shown(tmp_path: Path) -> None:
 
 
 def test_the_core_beside_it_is_the_one_that_names_it() -> None:
-    assert core_of(SPECS / "quat2euler" / "quat2euler_hls.yaml") == SPECS / "quat2euler" / "quat2euler_hls.core"
+    core = core_of(SPECS / "quat2euler" / "quat2euler_hls.yaml")
+    assert core and core.path == SPECS / "quat2euler" / "quat2euler_hls.core"
     assert core_of(SPECS / "quat2euler" / "stimuli.yaml") is None
 
 

@@ -12,7 +12,8 @@ from types import MappingProxyType
 
 import pytest
 
-from fusesoc_firm import __version__, manifest
+from fusesoc_firm import __version__
+from fusesoc_firm.tools import manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 FUSESOC = Path(sys.executable).parent / "fusesoc"

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 CORE = REPOSITORY / "specs" / "obstacle" / "obstacle.core"
 APT = "apt-get install --no-install-recommends"

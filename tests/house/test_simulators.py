@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import __version__, manifest
+from fusesoc_firm import __version__
+from fusesoc_firm.tools import manifest
 from tests.house.test_main_job import run
 
 pytestmark = pytest.mark.skipif(

@@ -17,7 +17,6 @@ import pytest
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE, constants_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode, encode, pack_frame
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
@@ -25,10 +24,11 @@ from fusesoc_firm.message import middleware
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.render import render
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.loop import PUBLISHER_ID, SUBSCRIBER_ID, loop_text
 from fusesoc_firm.verify.simulation import firm_library, simulate, write_frames
-from tests.unit.frame.oracle import is_same
+from tests.frame.oracle import is_same
 
 SEED = 20241123
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "middlewares.md"

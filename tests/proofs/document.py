@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
+from tests.hdl.ghdl import REPOSITORY
 from tests.proofs.all import PROOFS
 from tests.proofs.proof import Proof
-from tests.sim.ghdl import REPOSITORY
 
 DOCUMENT = REPOSITORY / "docs" / "proofs.md"
 

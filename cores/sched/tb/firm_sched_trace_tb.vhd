@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Random tasks for the scheduler of any policy. What its ports do in every cycle is written to a file, which is
--- compared with the policy's model in Python: tests/sim/sched_trace.py reads it.
+-- compared with the policy's model in Python: tests/cores/sched_trace.py reads it.
 -- How requesters and sink behave is drawn anew for each stretch of cycles: everybody or a lone one has tasks, of one
 -- beat or many, at once, in bursts or now and then, with pauses and stalls or without.
 library ieee;
