@@ -17,7 +17,8 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_burst is
   generic (
     WIDTH   : integer := 8;
-    SOURCES : integer := 2);
+    SOURCES : integer := 2
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -34,7 +35,8 @@ entity firm_axis_burst is
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_axis_burst;
 
 architecture rtl of firm_axis_burst is

@@ -13,11 +13,13 @@ entity firm_axis_select is
   generic (
     WORDS   : integer  := 4;  -- 1 and more
     WIDTH   : positive := 8;
-    DECODED : boolean  := false);
+    DECODED : boolean  := false
+  );
   port (
     words_in : in  std_logic_vector(WORDS*WIDTH-1 downto 0);  -- word 0 lowest
     index    : in  std_logic_vector(index_bits(WORDS)-1 downto 0);
-    word     : out std_logic_vector(WIDTH-1 downto 0));
+    word     : out std_logic_vector(WIDTH-1 downto 0)
+  );
 end entity firm_axis_select;
 
 architecture rtl of firm_axis_select is

@@ -9,7 +9,8 @@ entity firm_message_fork is
   generic (
     SINKS : integer := 2;
     -- Bits of segment_valid, which a sink that has the message sees no more.
-    SEGMENTS : integer := 1);
+    SEGMENTS : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -22,7 +23,8 @@ entity firm_message_fork is
     sink_valid         : out std_logic_vector(SINKS-1 downto 0);
     sink_ready         : in  std_logic_vector(SINKS-1 downto 0);
     -- The first sink's bits lie lowest.
-    sink_segment_valid : out std_logic_vector(SINKS*SEGMENTS-1 downto 0));
+    sink_segment_valid : out std_logic_vector(SINKS*SEGMENTS-1 downto 0)
+  );
 end entity firm_message_fork;
 
 architecture rtl of firm_message_fork is

@@ -19,7 +19,8 @@ entity firm_link_framer is
     data  : out std_logic_vector(7 downto 0);
     last  : out std_logic;
     valid : out std_logic;
-    ready : in  std_logic);
+    ready : in  std_logic
+  );
 end entity firm_link_framer;
 
 architecture rtl of firm_link_framer is

@@ -18,7 +18,8 @@ library firm;
 entity firm_spi_link is
   generic (
     WIDTH : integer := 8;
-    DEPTH : integer := 1024);  -- bytes that can wait, in each direction
+    DEPTH : integer := 1024  -- bytes that can wait, in each direction
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -44,7 +45,8 @@ entity firm_spi_link is
     s_axis_tready : out std_logic;
 
     -- Pulses where bytes begin to be dropped.
-    link_error : out std_logic);
+    link_error : out std_logic
+  );
 end entity firm_spi_link;
 
 architecture rtl of firm_spi_link is
@@ -164,7 +166,8 @@ begin
   u_streams : entity firm.firm_link_streams
     generic map (
       WIDTH => WIDTH,
-      DEPTH => DEPTH)
+      DEPTH => DEPTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -186,12 +189,14 @@ begin
       s_axis_tvalid => s_axis_tvalid,
       s_axis_tlast  => s_axis_tlast,
       s_axis_tready => s_axis_tready,
-      link_error    => error);
+      link_error    => error
+    );
 
   u_fifo : entity firm.firm_axis_fifo
     generic map (
       WIDTH => 8,
-      DEPTH => DEPTH)
+      DEPTH => DEPTH
+    )
     port map (
       clk             => clk,
       rst_n           => rst_n,
@@ -204,7 +209,8 @@ begin
       m_axis_tkeep    => open,
       m_axis_tvalid   => head_valid,
       m_axis_tlast    => open,
-      m_axis_tready   => head_taken);
+      m_axis_tready   => head_taken
+    );
 
   count : process (clk)
   begin

@@ -7,7 +7,8 @@ use ieee.std_logic_1164.all;
 
 entity firm_uart_receiver is
   generic (
-    DIVISOR : integer := 16);  -- cycles of a bit
+    DIVISOR : integer := 16  -- cycles of a bit
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -17,7 +18,8 @@ entity firm_uart_receiver is
     data     : out std_logic_vector(7 downto 0);
     valid    : out std_logic;   -- a pulse with each byte
     is_break : out std_logic;   -- a pulse
-    is_wrong : out std_logic);  -- a pulse: the stop bit was low
+    is_wrong : out std_logic  -- a pulse: the stop bit was low
+  );
 end entity firm_uart_receiver;
 
 architecture rtl of firm_uart_receiver is

@@ -7,7 +7,8 @@ use ieee.std_logic_1164.all;
 
 entity firm_uart_transmitter is
   generic (
-    DIVISOR : integer := 16);  -- cycles of a bit
+    DIVISOR : integer := 16  -- cycles of a bit
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -17,7 +18,8 @@ entity firm_uart_transmitter is
     ready : out std_logic;
 
     uart_txd   : out std_logic;
-    uart_cts_n : in  std_logic);  -- low: the other side wants bytes
+    uart_cts_n : in  std_logic  -- low: the other side wants bytes
+  );
 end entity firm_uart_transmitter;
 
 architecture rtl of firm_uart_transmitter is

@@ -16,7 +16,8 @@ entity firm_uart_script_tb is
     DEPTH       : integer := 64;
     SCRIPT_FILE : string  := "script.txt";
     -- What the bench must print but `no room`; empty: anything.
-    EXPECTED_FILE : string := "");
+    EXPECTED_FILE : string := ""
+  );
 end entity firm_uart_script_tb;
 
 architecture simulation of firm_uart_script_tb is
@@ -142,7 +143,8 @@ begin
       CLOCK_HZ   => CLOCK_HZ,
       BAUD       => BAUD,
       DEPTH      => DEPTH,
-      TIMEOUT_MS => 1)
+      TIMEOUT_MS => 1
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -160,6 +162,7 @@ begin
       s_axis_tvalid => '0',
       s_axis_tlast  => '0',
       s_axis_tready => open,
-      link_error    => link_error);
+      link_error    => link_error
+    );
 
 end architecture simulation;

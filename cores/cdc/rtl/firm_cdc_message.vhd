@@ -23,7 +23,8 @@ entity firm_cdc_message is
     -- Bits of all fields.
     FIELD_BITS : integer := 1;
     -- Streams and elements within.
-    PARTS : integer := 1);
+    PARTS : integer := 1
+  );
   port (
     s_clk   : in std_logic;
     s_rst_n : in std_logic;
@@ -52,7 +53,8 @@ entity firm_cdc_message is
     m_fields        : out std_logic_vector(FIELD_BITS-1 downto 0);
     m_segment_valid : out std_logic_vector(SEGMENTS-1 downto 0);
     m_valid         : out std_logic;
-    m_ready         : in  std_logic);
+    m_ready         : in  std_logic
+  );
 end entity firm_cdc_message;
 
 architecture rtl of firm_cdc_message is
@@ -96,11 +98,13 @@ begin
 
   u_return : entity firm.firm_cdc_sync
     generic map (
-      BITS => SEGMENTS+2)
+      BITS => SEGMENTS+2
+    )
     port map (
       clk    => s_clk,
       level  => answer_r,
-      synced => returned);
+      synced => returned
+    );
 
   shown    <= returned(SEGMENTS downto 0);
   done     <= returned(SEGMENTS+1);
@@ -137,11 +141,13 @@ begin
 
   u_request : entity firm.firm_cdc_sync
     generic map (
-      BITS => SEGMENTS+1)
+      BITS => SEGMENTS+1
+    )
     port map (
       clk    => m_clk,
       level  => request_r,
-      synced => requested);
+      synced => requested
+    );
 
   -- Levels that rise or fall together may arrive one after the other, in any order: each is shown behind those before
   -- it, and none any more when the first of them has fallen. In a reset, which the sink may be through with already,

@@ -15,7 +15,8 @@ entity firm_cdc_reset is
     -- Of any domain; it is low while `rst_n` is, and for as long as the reset has to last.
     release : in std_logic := '1';
 
-    synced_rst_n : out std_logic);
+    synced_rst_n : out std_logic
+  );
 end entity firm_cdc_reset;
 
 architecture rtl of firm_cdc_reset is

@@ -11,11 +11,13 @@ entity firm_cdc_sync is
   generic (
     BITS : integer := 1;
     -- Registers in a row, 2 or more.
-    STAGES : integer := 2);
+    STAGES : integer := 2
+  );
   port (
     clk    : in  std_logic;
     level  : in  std_logic_vector(BITS-1 downto 0);
-    synced : out std_logic_vector(BITS-1 downto 0));
+    synced : out std_logic_vector(BITS-1 downto 0)
+  );
 end entity firm_cdc_sync;
 
 architecture rtl of firm_cdc_sync is

@@ -25,7 +25,8 @@ entity firm_cdc_message_tb is
     -- The chance of a message that a reset of one cycle meets it.
     RESET_PERCENT : integer := 0;
     -- The domain that the reset comes from.
-    IS_RESET_AT_SINK : boolean := false);
+    IS_RESET_AT_SINK : boolean := false
+  );
 end entity firm_cdc_message_tb;
 
 architecture simulation of firm_cdc_message_tb is
@@ -123,10 +124,12 @@ begin
   u_clock : entity firm.firm_sim_clock
     generic map (
       PERIOD_PS => M_PERIOD_PS,
-      SEED      => SEED)
+      SEED      => SEED
+    )
     port map (
       reference => s_clk,
-      clk       => m_clk);
+      clk       => m_clk
+    );
 
   resets : block
     signal rst_n        : std_logic;
@@ -145,21 +148,24 @@ begin
       port map (
         clk          => other_clk,
         rst_n        => rst_n,
-        synced_rst_n => seen);
+        synced_rst_n => seen
+      );
 
     u_released : entity firm.firm_cdc_reset
       port map (
         clk          => main_clk,
         rst_n        => rst_n,
         release      => seen,
-        synced_rst_n => released);
+        synced_rst_n => released
+      );
 
     u_synced : entity firm.firm_cdc_reset
       port map (
         clk          => other_clk,
         rst_n        => rst_n,
         release      => released,
-        synced_rst_n => synced_rst_n);
+        synced_rst_n => synced_rst_n
+      );
 
     s_rst_n <= synced_rst_n when IS_RESET_AT_SINK else released;
     m_rst_n <= released when IS_RESET_AT_SINK else synced_rst_n;
@@ -189,7 +195,8 @@ begin
     generic map (
       SEGMENTS   => SEGMENTS,
       FIELD_BITS => FIELD_BITS,
-      PARTS      => 2)
+      PARTS      => 2
+    )
     port map (
       s_clk           => s_clk,
       s_rst_n         => s_rst_n,
@@ -206,12 +213,14 @@ begin
       m_fields        => m_fields,
       m_segment_valid => m_segment_valid,
       m_valid         => m_valid,
-      m_ready         => m_ready);
+      m_ready         => m_ready
+    );
 
   u_stream : entity firm.firm_cdc_stream
     generic map (
       S_WIDTH => S_WIDTH,
-      M_WIDTH => M_WIDTH)
+      M_WIDTH => M_WIDTH
+    )
     port map (
       s_clk         => s_clk,
       s_rst_n       => s_rst_n,
@@ -230,11 +239,13 @@ begin
       m_axis_tkeep  => m_tkeep(0),
       m_axis_tvalid => m_tvalid(0),
       m_axis_tlast  => m_tlast(0),
-      m_axis_tready => m_tready(0));
+      m_axis_tready => m_tready(0)
+    );
 
   u_element : entity firm.firm_cdc_message
     generic map (
-      FIELD_BITS => FIELD_BITS)
+      FIELD_BITS => FIELD_BITS
+    )
     port map (
       s_clk           => s_clk,
       s_rst_n         => s_rst_n,
@@ -252,12 +263,14 @@ begin
       m_fields        => m_element_fields,
       m_segment_valid => m_element_segment,
       m_valid         => m_element_valid,
-      m_ready         => m_element_ready);
+      m_ready         => m_element_ready
+    );
 
   u_element_stream : entity firm.firm_cdc_stream
     generic map (
       S_WIDTH => S_WIDTH,
-      M_WIDTH => M_WIDTH)
+      M_WIDTH => M_WIDTH
+    )
     port map (
       s_clk         => s_clk,
       s_rst_n       => s_rst_n,
@@ -276,7 +289,8 @@ begin
       m_axis_tkeep  => m_tkeep(1),
       m_axis_tvalid => m_tvalid(1),
       m_axis_tlast  => m_tlast(1),
-      m_axis_tready => m_tready(1));
+      m_axis_tready => m_tready(1)
+    );
 
   give : process
     variable random_1 : positive := SEED;

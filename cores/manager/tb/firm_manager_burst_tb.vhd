@@ -35,7 +35,8 @@ entity firm_manager_burst_tb is
     PAUSE_PERCENT : natural := 0;
     STALL_PERCENT : natural := 0;
     -- Cycles without a beat at the host after which the bench gives up.
-    WATCHDOG : natural := 20000);
+    WATCHDOG : natural := 20000
+  );
 end entity firm_manager_burst_tb;
 
 architecture simulation of firm_manager_burst_tb is
@@ -118,7 +119,8 @@ begin
       WIDTH       => WIDTH,
       SUBSCRIBERS => 1,
       PUBLISHERS  => PUBLISHERS,
-      PREEMPTIVE  => PREEMPTIVE)
+      PREEMPTIVE  => PREEMPTIVE
+    )
     port map (
       clk                => clk,
       rst_n              => rst_n,
@@ -148,7 +150,8 @@ begin
       sched_last         => last,
       sched_grant_valid  => grant_valid,
       sched_grant_select => grant_select,
-      id_error           => open);
+      id_error           => open
+    );
 
   drawn : if not SCHEDULED generate
     grant_valid  <= drawn_valid;
@@ -158,7 +161,8 @@ begin
   scheduler : if SCHEDULED generate
     u_scheduler : entity firm.firm_sched_fixed_priority
       generic map (
-        REQUESTERS => PUBLISHERS)
+        REQUESTERS => PUBLISHERS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -166,7 +170,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate scheduler;
 
   play : process (clk)

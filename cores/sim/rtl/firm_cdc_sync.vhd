@@ -11,11 +11,13 @@ use ieee.math_real.all;
 entity firm_cdc_sync is
   generic (
     BITS   : integer := 1;
-    STAGES : integer := 2);
+    STAGES : integer := 2
+  );
   port (
     clk    : in  std_logic;
     level  : in  std_logic_vector(BITS-1 downto 0);
-    synced : out std_logic_vector(BITS-1 downto 0));
+    synced : out std_logic_vector(BITS-1 downto 0)
+  );
 end entity firm_cdc_sync;
 
 architecture simulation of firm_cdc_sync is

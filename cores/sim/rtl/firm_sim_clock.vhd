@@ -10,11 +10,13 @@ entity firm_sim_clock is
     -- Period in picoseconds, 2 and more.
     PERIOD_PS : integer := 10000;
     -- Different for each instance, 1 and more: the phase, and by how much the period is off.
-    SEED : integer := 1);
+    SEED : integer := 1
+  );
   port (
     -- The clock ends with it, so that a simulation does: when it stood still for some of the longer periods.
     reference : in  std_logic;
-    clk       : out std_logic);
+    clk       : out std_logic
+  );
 end entity firm_sim_clock;
 
 architecture simulation of firm_sim_clock is

@@ -19,7 +19,8 @@ entity firm_sim_frames is
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_sim_frames;
 
 architecture simulation of firm_sim_frames is

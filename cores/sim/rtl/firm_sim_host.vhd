@@ -33,7 +33,8 @@ entity firm_sim_host is
     -- Cycles without a beat after which the host gives up on missing frames.
     WATCHDOG : integer := 100000;
     -- Cycles without a beat in which it listens for surplus frames when everything has come.
-    QUIET : integer := 1000);
+    QUIET : integer := 1000
+  );
   port (
     clk   : out std_logic;
     rst_n : out std_logic;
@@ -55,7 +56,8 @@ entity firm_sim_host is
 
     -- A pulse that the expected file does not announce is a fault.
     id_error    : in std_logic                           := '0';
-    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0'));
+    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0')
+  );
 end entity firm_sim_host;
 
 architecture simulation of firm_sim_host is

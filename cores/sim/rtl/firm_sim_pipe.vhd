@@ -22,7 +22,8 @@ entity firm_sim_pipe is
     -- All randomness follows from it.
     SEED : integer := 1;
     -- The chance, each cycle and direction, that the host offers no beat or takes none.
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
   port (
     clk   : out std_logic;
     rst_n : out std_logic;
@@ -43,7 +44,8 @@ entity firm_sim_pipe is
     s_axis_tready : out std_logic;
 
     id_error    : in std_logic                           := '0';
-    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0'));
+    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0')
+  );
 end entity firm_sim_pipe;
 
 architecture simulation of firm_sim_pipe is

@@ -13,7 +13,8 @@ entity firm_sim_spi is
     PERIOD : time    := 100 ns;  -- of spi_sclk
     SEED   : integer := 1;
     -- The chance that it pauses before a byte, and that it ends a selection within one.
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -34,7 +35,8 @@ entity firm_sim_spi is
     spi_cs_n : out std_logic;
     spi_mosi : out std_logic;
     spi_miso : in  std_logic;
-    spi_irq  : in  std_logic);
+    spi_irq  : in  std_logic
+  );
 end entity firm_sim_spi;
 
 architecture simulation of firm_sim_spi is
@@ -192,6 +194,7 @@ begin
       m_axis_tid    => m_axis_tid,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
+      m_axis_tready => m_axis_tready
+    );
 
 end architecture simulation;

@@ -8,7 +8,8 @@ entity firm_sim_wire is
   generic (
     WIDTH : integer := 8;
     -- The way to break the stream; "none" for none. The process `spoil` shows them all.
-    FAULT : string := "none");
+    FAULT : string := "none"
+  );
   port (
     clk : in std_logic;
 
@@ -26,7 +27,8 @@ entity firm_sim_wire is
     m_axis_tready : in  std_logic;
 
     id_error    : out std_logic;
-    frame_error : out std_logic_vector(0 downto 0));
+    frame_error : out std_logic_vector(0 downto 0)
+  );
 end entity firm_sim_wire;
 
 architecture simulation of firm_sim_wire is
