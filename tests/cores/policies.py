@@ -47,7 +47,6 @@ def _missing_cores(sched: Path, listing: Path) -> Iterator[tuple[Path, str]]:
 def _instance(policy: Policy) -> dict[str, object]:
     values = {"PREEMPTIVE": "true"}
     generics = port_map((name, values.get(name, name)) for name in ("REQUESTERS", *policy.generics))
-    generics[-1]["comma"] = ")"
     return {"name": policy.name, "literal": policy.name.upper(), "entity": policy.entity, "generics": generics}
 
 

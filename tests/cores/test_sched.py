@@ -31,6 +31,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     return analysed(tmp_path_factory.mktemp("sched"))
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("policy", "requesters"), immediate_cases(REQUESTERS))
 def test_no_cycle_is_lost_where_everybody_is_ready(
     library: Library, tmp_path: Path, policy: str, requesters: int
@@ -41,17 +42,20 @@ def test_no_cycle_is_lost_where_everybody_is_ready(
     assert trace.beat[:, 1:].all()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("policy", "requesters"), immediate_cases(FEW_REQUESTERS))
 def test_who_asks_does_not_wait_for_who_is_idle(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
     assert idle_grants(trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters)) == 0
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("policy", "requesters"), cases(POLICIES, FEW_REQUESTERS))
 def test_only_preemptive_policies_interrupt(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
     trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters)
     assert (interruptions(trace) == 0) == (policy in NON_PREEMPTIVE)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("policy", "requesters"), cases(FAIR, FEW_REQUESTERS))
 @pytest.mark.parametrize("saturated", [False, True])
 def test_each_other_goes_first_once_at_most(
@@ -71,6 +75,7 @@ def test_fair_groups_below_a_fair_top_starve_nobody(library: Library, tmp_path: 
     assert 0 < most_overtaken(trace) <= largest * len(groups) - 1
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("policy", "requesters"), immediate_cases((1, *FEW_REQUESTERS)))
 @pytest.mark.parametrize("shortest_run", [1, 3])
 def test_the_netlist_does_the_same(
@@ -86,6 +91,7 @@ def test_the_netlist_does_the_same(
     assert (tmp_path / "trace.txt").read_text() == source
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("policy", "requesters"), immediate_cases(REQUESTERS))
 @pytest.mark.parametrize("shortest_run", [1, 3])
 def test_it_is_latch_free(library: Library, policy: str, requesters: int, shortest_run: int) -> None:

@@ -31,6 +31,7 @@ COMBINATIONS = [
 ]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("top", "groups", "requesters"), COMBINATIONS)
 def test_the_netlist_does_what_source_and_models_do(tmp_path: Path, top: str, groups: str, requesters: int) -> None:
     def run(library: Library) -> tuple[Trace, str]:

@@ -31,6 +31,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     return analysed(tmp_path_factory.mktemp("sched"))
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("policy", "requesters"), cases(POLICIES, REQUESTERS))
 def test_grants_are_those_of_the_model(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
     trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters, SEGMENTS=10, CYCLES=2000)
@@ -48,6 +49,7 @@ def test_runs_are_those_of_the_model(library: Library, tmp_path: Path, requester
     assert first_difference(trace, model_of(trace, policy)) == ""
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("top", "groups", "requesters"), COMBINATIONS)
 def test_combined_grants_are_those_of_the_models(
     library: Library, tmp_path: Path, top: str, groups: str, requesters: int

@@ -15,7 +15,8 @@ entity firm_sched_by_policy is
     TRANSFER_TIMES : times_t  := IMPLICIT;
     DEADLINES      : times_t  := IMPLICIT;
     TIME_BITS      : integer  := 16;
-    SHORTEST_RUN   : integer  := 1);
+    SHORTEST_RUN   : integer  := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -25,7 +26,8 @@ entity firm_sched_by_policy is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_by_policy;
 
 architecture rtl of firm_sched_by_policy is
@@ -35,7 +37,8 @@ begin
   of_fixed_priority : if POLICY = FIXED_PRIORITY generate
     u_scheduler : entity firm.firm_sched_fixed_priority
       generic map (
-        REQUESTERS => REQUESTERS)
+        REQUESTERS => REQUESTERS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -43,7 +46,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_fixed_priority;
 
   of_fixed_priority_preemptive : if POLICY = FIXED_PRIORITY_PREEMPTIVE generate
@@ -51,7 +55,8 @@ begin
       generic map (
         REQUESTERS   => REQUESTERS,
         PREEMPTIVE   => true,
-        SHORTEST_RUN => SHORTEST_RUN)
+        SHORTEST_RUN => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -59,13 +64,15 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_fixed_priority_preemptive;
 
   of_round_robin : if POLICY = ROUND_ROBIN generate
     u_scheduler : entity firm.firm_sched_round_robin
       generic map (
-        REQUESTERS => REQUESTERS)
+        REQUESTERS => REQUESTERS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -73,13 +80,15 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_round_robin;
 
   of_lru : if POLICY = LRU generate
     u_scheduler : entity firm.firm_sched_lru
       generic map (
-        REQUESTERS => REQUESTERS)
+        REQUESTERS => REQUESTERS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -87,7 +96,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_lru;
 
   of_edf_resources : if POLICY = EDF_RESOURCES generate
@@ -97,7 +107,8 @@ begin
         PERIODS      => PERIODS,
         DEADLINES    => DEADLINES,
         TIME_BITS    => TIME_BITS,
-        SHORTEST_RUN => SHORTEST_RUN)
+        SHORTEST_RUN => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -105,7 +116,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_edf_resources;
 
   of_edf_latency : if POLICY = EDF_LATENCY generate
@@ -115,7 +127,8 @@ begin
         PERIODS      => PERIODS,
         DEADLINES    => DEADLINES,
         TIME_BITS    => TIME_BITS,
-        SHORTEST_RUN => SHORTEST_RUN)
+        SHORTEST_RUN => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -123,7 +136,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_edf_latency;
 
   of_lst : if POLICY = LST generate
@@ -134,7 +148,8 @@ begin
         DEADLINES      => DEADLINES,
         TRANSFER_TIMES => TRANSFER_TIMES,
         TIME_BITS      => TIME_BITS,
-        SHORTEST_RUN   => SHORTEST_RUN)
+        SHORTEST_RUN   => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -142,7 +157,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_lst;
 
 end architecture rtl;

@@ -64,7 +64,7 @@ package firm_sched_pkg is
     return string;
   -- Of the times of all groups, if the policy of one knows them.
   function fault_of_group_times(requesters : integer; policies : policies_t;
-                                periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
+    periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
     return string;
 
 end package firm_sched_pkg;
@@ -243,7 +243,8 @@ package body firm_sched_pkg is
     return "";
   end function fault_of_time_bits;
 
-  function fault_of_times(generic_name, kind : string; times : times_t; requesters, time_bits : integer) return string is
+  function fault_of_times(generic_name, kind : string; times : times_t; requesters, time_bits : integer)
+    return string is
   begin
     if times'length /= requesters then
       return generic_name & " has " & integer'image(times'length) & " times; legal: one for each of " &
@@ -308,7 +309,7 @@ package body firm_sched_pkg is
   end function fault_of_groups;
 
   function fault_of_group_times(requesters : integer; policies : policies_t;
-                                periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
+    periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
     return string is
     variable any_deadlines : boolean := false;
     variable any_transfer  : boolean := false;

@@ -67,6 +67,7 @@ def system(folder: Path, scheduler: str, width: int) -> GeneratedSystem:
     return build(call(folder / "spec.yaml", folder / "stimuli.yaml", folder / "model.py"), folder / "system")
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize("scheduler", [*POLICIES, "auto"])
 def test_every_message_comes_back(tmp_path: Path, scheduler: str, width: int) -> None:
