@@ -125,7 +125,7 @@ def test_a_bag_of_the_other_version(tmp_path: Path, kind: str, ros: Middleware) 
     with pytest.raises(InputError) as raised:
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", ros)])
     assert str(raised.value).splitlines() == [
-        f"error: topic /{topic} of {path} is of ROS {version(kind)}, but 'p' speaks ROS {ros}" for topic in "pq"
+        f"error: topic /{topic} of {path} is of {version(kind).title}, but 'p' speaks {ros.title}" for topic in "pq"
     ]
 
 
