@@ -98,7 +98,7 @@ def _copy_messages(request: Request) -> GeneratedCore:
 
 
 def _system_inputs(request: Request) -> list[Input]:
-    from fusesoc_firm.node import package
+    from fusesoc_firm.node import cpp_package
     from fusesoc_firm.simulation import simulation_core
     from fusesoc_firm.system import system_core
 
@@ -106,11 +106,11 @@ def _system_inputs(request: Request) -> list[Input]:
         return simulation_core.live_inputs(request)
     if _is_simulation(request):
         return simulation_core.inputs(request)
-    return [*system_core.inputs(request), *package.headers()]
+    return [*system_core.inputs(request), *cpp_package.headers()]
 
 
 def _generate_system(request: Request) -> GeneratedCore:
-    from fusesoc_firm.node import package
+    from fusesoc_firm.node import cpp_package
     from fusesoc_firm.simulation import simulation_core
     from fusesoc_firm.system import system_core
 
@@ -122,7 +122,7 @@ def _generate_system(request: Request) -> GeneratedCore:
     for warning in loaded.warnings:
         print(warning, file=sys.stderr)
     core = system_core.system_core(loaded)
-    return replace(core, files={**core.files, **package.generated_files(loaded)})
+    return replace(core, files={**core.files, **cpp_package.generated_files(loaded)})
 
 
 def _simulator_programs(request: Request) -> Sequence[str]:
@@ -132,7 +132,7 @@ def _simulator_programs(request: Request) -> Sequence[str]:
 def _compiler(request: Request) -> Mapping[str, str]:
     if not _is_simulation(request):
         return {}
-    from fusesoc_firm.simulation.kernel import toolchain
+    from fusesoc_firm.simulation.kernel_library import toolchain
 
     return toolchain()
 

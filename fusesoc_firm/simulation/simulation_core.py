@@ -13,10 +13,10 @@ from fusesoc_firm.converter.converter_core import VHDL
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.simulation.environment import environment_files
-from fusesoc_firm.simulation.frames import expected_text, stimulus_text
-from fusesoc_firm.simulation.kernel import kernel_files
+from fusesoc_firm.simulation.host_files import expected_text, stimulus_text
+from fusesoc_firm.simulation.kernel_library import kernel_files
 from fusesoc_firm.simulation.reference import Response, responses
-from fusesoc_firm.simulation.software import answered, stimulated, traffic
+from fusesoc_firm.simulation.software_run import answered, stimulated, traffic
 from fusesoc_firm.simulation.stimuli import read_stimuli
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system import system_core
@@ -171,7 +171,7 @@ def _stimuli_files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
     # A call that the store answers does without what the import of rosbags' readers costs.
-    from fusesoc_firm.message.bags import bag_files
+    from fusesoc_firm.message.bag_reader import bag_files
 
     return bag_files(path)
 

@@ -39,8 +39,8 @@ from fusesoc_firm.system.boards.board import (
     read_board,
 )
 from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
-from fusesoc_firm.system.derived.analysis import derive, source_files
-from fusesoc_firm.system.derived.kernel import function_name
+from fusesoc_firm.system.derived.cpp_function import function_name
+from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import WRAPPER_TEMPLATE, wrapper_configuration

@@ -10,6 +10,7 @@ from typing import Any
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     ElementType,
     Field,
     FieldType,
@@ -22,7 +23,6 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.text.diagnostics import SourceRef
 
-Definitions = Mapping[MessageName, MessageDefinition]
 _SEPARATOR = "=" * 80
 # Stands for a wstring; a message, as there may be arrays of it.
 _WIDE = MessageName("firm_wide_msgs", "Wide")

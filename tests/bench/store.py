@@ -84,8 +84,8 @@ EDITS = (
     ),
     Edit("the module naming.py", "code/fusesoc_firm/text/naming.py", '"""\n', '"""\n# edited\n', frozenset(_KINDS)),
     Edit(
-        "the module simulation/frames.py",
-        "code/fusesoc_firm/simulation/frames.py",
+        "the module simulation/host_files.py",
+        "code/fusesoc_firm/simulation/host_files.py",
         '"""\n',
         '"""\n# edited\n',
         frozenset(),

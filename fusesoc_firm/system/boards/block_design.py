@@ -14,7 +14,7 @@ from typing import Any
 from fusesoc_firm.system.boards.board import Board, board_entity
 from fusesoc_firm.system.boards.processor import PROCESSORS, Processor
 from fusesoc_firm.system.boards.timing_constraints import period
-from fusesoc_firm.system.derived.kernel import function_name, kernel_entity
+from fusesoc_firm.system.derived.cpp_function import function_name, kernel_entity
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hardware.configuration import pin_groups
 from fusesoc_firm.system.hardware.names import Names

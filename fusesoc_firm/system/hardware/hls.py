@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from fusesoc_firm.converter.ports import vhdl_type
-from fusesoc_firm.system.derived.kernel import (
+from fusesoc_firm.system.derived.cpp_function import (
     AP_PORTS,
     WORD_BITS,
     Argument,

@@ -12,7 +12,7 @@ from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.converter.program import has_bytes
 from fusesoc_firm.frame.length import sent_length_of
 from fusesoc_firm.frame.model import Loop, Node
-from fusesoc_firm.system.derived.kernel import arguments, function_name, prototype
+from fusesoc_firm.system.derived.cpp_function import arguments, function_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, MessageSide
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, SidePort, accelerator_ports
 from fusesoc_firm.system.scaffold.python_skeleton import python_skeleton
