@@ -20,8 +20,7 @@ from fusesoc_firm.converter.sources import ConverterSource, publisher_source, su
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.render import render

@@ -19,8 +19,8 @@ import yaml
 from fusesoc_firm.building.cores import ProjectCore
 from fusesoc_firm.converter.converter_core import library_sources, order_of_request
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.message.model import Definitions, MessageName
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.request.request import Request
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.system_core import load_requested

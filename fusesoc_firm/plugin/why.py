@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.converter.converter_core import order_of_request
-from fusesoc_firm.message.model import MessageName, nested_message
-from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.message.model import Definitions, MessageName, nested_message
 from fusesoc_firm.plugin.gapi import GENERATORS, read_call, read_request
 from fusesoc_firm.request.request import GeneratedCore, Request
 from fusesoc_firm.request.requesting_core import find_requesting_core

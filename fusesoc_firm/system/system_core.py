@@ -16,8 +16,7 @@ from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.boards.block_design import (

@@ -39,7 +39,7 @@ def plain_text(definition: MessageDefinition) -> str:
     return "".join(f"{field.type} {field.name}\n" for field in definition.fields)
 
 
-def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> str:
+def joint_text(name: MessageName, definitions: Definitions) -> str:
     """A message and all below it in one text, parted as ROS's own tools do."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{plain_text(definitions[other])}" for other in definitions if other != name]
     return "\n".join([plain_text(definitions[name]), *others])
