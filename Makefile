@@ -33,6 +33,8 @@ VERIFY_OPTIONS ?=
 BENCH ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
+# What tests run beside Python.
+TEST_TOOLS := iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core, which are GHDL's.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
@@ -54,7 +56,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
-.PHONY: help sim test ros bitstream bench matrix proofs corpus fuzz-netlist lint setup tools clean distclean
+.PHONY: help sim test ros bitstream bench matrix proofs corpus fuzz-netlist lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -68,7 +70,7 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
+test: TOOLS = $(TEST_TOOLS)
 test: setup ros ## Run all tests; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
@@ -112,9 +114,16 @@ fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
 	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
-lint: setup ## Check style and types
+lint: setup $(VENV)/.extra-lint ## Check style and types: Python, and VHDL, also a sample of what is generated
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/python .ci/lint_vhdl.py
+
+# All extras, since all are listed.
+licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
+licences: TOOLS = $(TEST_TOOLS)
+licences: tools ros ## List what the project depends on and under which licences, in docs/licences.md
+	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 
 setup: tools $(VENV)/.extra-test ## Install what the other targets need: programs by apt, Python packages into .venv
 

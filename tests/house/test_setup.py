@@ -117,6 +117,7 @@ def test_make_without_a_target_lists_them() -> None:
         "proofs",
         "fuzz-netlist",
         "lint",
+        "licences",
         "setup",
         "clean",
         "distclean",
