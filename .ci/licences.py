@@ -1,4 +1,4 @@
-"""Write docs/licences.md: what the project depends on, in which version, and under which licence.
+"""Write docs/reference/licences.md: what the project depends on, in which version, and under which licence.
 
     python licences.py ROS2_PYTHON
 
@@ -25,12 +25,13 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "licences.md"
+PAGE = ROOT / "docs" / "reference" / "licences.md"
 TEXT = Path(__file__).with_name("licences.md.mustache")
 RUN_TIME = "run time"
 
 # Packages of Debian and what they are called for.
 PROGRAMS: Mapping[str, str] = {
+    "ccache": "keeps what was compiled, in tests",
     "g++": "compiles simulated C++ kernels, Verilator's models, nodes in C++",
     "ghdl": "analyses, simulates and translates VHDL",
     "graphviz": "draws diagrams",

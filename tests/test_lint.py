@@ -16,7 +16,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 
-@pytest.mark.parametrize("linter", [["ruff", "check", "--no-cache", "."], ["mypy"]], ids=["ruff", "mypy"])
+LINTERS = [["ruff", "check", "--no-cache", "."], pytest.param(["mypy"], marks=pytest.mark.check)]
+
+
+@pytest.mark.parametrize("linter", LINTERS, ids=["ruff", "mypy"])
 def test_lint(linter: list[str]) -> None:
     done = subprocess.run([sys.executable, "-m", *linter], cwd=ROOT, text=True, capture_output=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -43,6 +46,7 @@ end package limits_pkg;
 """
 
 
+@pytest.mark.check
 @needs_vsg
 def test_a_fault_of_style_is_reported_with_its_line(
     lint_vhdl: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -53,6 +57,7 @@ def test_a_fault_of_style_is_reported_with_its_line(
     assert capsys.readouterr().out == f'{path}:3: constant_004: Change "highest" to "HIGHEST"\n'
 
 
+@pytest.mark.check
 @needs_vsg
 def test_a_file_that_vsg_cannot_read_is_a_fault(
     lint_vhdl: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -63,6 +68,7 @@ def test_a_file_that_vsg_cannot_read_is_a_fault(
     assert capsys.readouterr().out.startswith(f"{path}:3: Unexpected token")
 
 
+@pytest.mark.check
 @needs_vsg
 def test_a_file_that_passed_is_checked_again_only_after_a_change(
     lint_vhdl: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -1,4 +1,4 @@
-"""docs/licences.md lists what pyproject.toml asks for and the programs that builds call; `make licences` writes it."""
+"""docs/reference/licences.md lists what pyproject.toml asks for and the programs that builds call; `make licences` writes it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from packaging.requirements import Requirement
 from fusesoc_firm.tools.programs import PROGRAMS
 
 ROOT = Path(__file__).resolve().parents[2]
-(PAGE,) = (ROOT / "docs").rglob("licences.md")
+PAGE = ROOT / "docs" / "reference" / "licences.md"
 
 
 def rows(section: str) -> list[list[str]]:

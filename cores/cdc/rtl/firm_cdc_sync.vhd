@@ -3,7 +3,7 @@
 -- bit must come from a register of its own domain, with no logic behind it, and no two bits arrive together for
 -- certain.
 --
--- Constraint: the path into the first register is asynchronous (docs/clocks.md).
+-- Constraint: the path into the first register is asynchronous (docs/how-to/use-several-clocks.md).
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -29,9 +29,9 @@ architecture rtl of firm_cdc_sync is
   attribute shreg_extract : string;
   attribute preserve      : boolean;
   attribute altera_attribute : string;
-  attribute async_reg of stages_r     : signal is "true";
-  attribute shreg_extract of stages_r : signal is "no";
-  attribute preserve of stages_r      : signal is true;
+  attribute async_reg of stages_r        : signal is "true";
+  attribute shreg_extract of stages_r    : signal is "no";
+  attribute preserve of stages_r         : signal is true;
   attribute altera_attribute of stages_r : signal is
     "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS";
 

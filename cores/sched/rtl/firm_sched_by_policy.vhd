@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The scheduler of a policy that is a generic. It has the generics of all policies; each takes those that it knows.
+-- `make policies` writes this file from by_policy.vhd.mustache and fusesoc_firm/scheduling/policies.py.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -33,12 +34,10 @@ architecture rtl of firm_sched_by_policy is
 
 begin
 
-  of_fixed_priority : if POLICY = FIXED_PRIORITY or POLICY = FIXED_PRIORITY_PREEMPTIVE generate
+  of_fixed_priority : if POLICY = FIXED_PRIORITY generate
     u_scheduler : entity firm.firm_sched_fixed_priority
       generic map (
-        REQUESTERS   => REQUESTERS,
-        PREEMPTIVE   => POLICY = FIXED_PRIORITY_PREEMPTIVE,
-        SHORTEST_RUN => SHORTEST_RUN
+        REQUESTERS => REQUESTERS
       )
       port map (
         clk          => clk,
@@ -50,6 +49,24 @@ begin
         grant_select => grant_select
       );
   end generate of_fixed_priority;
+
+  of_fixed_priority_preemptive : if POLICY = FIXED_PRIORITY_PREEMPTIVE generate
+    u_scheduler : entity firm.firm_sched_fixed_priority
+      generic map (
+        REQUESTERS   => REQUESTERS,
+        PREEMPTIVE   => true,
+        SHORTEST_RUN => SHORTEST_RUN
+      )
+      port map (
+        clk          => clk,
+        rst_n        => rst_n,
+        request      => request,
+        beat         => beat,
+        last         => last,
+        grant_valid  => grant_valid,
+        grant_select => grant_select
+      );
+  end generate of_fixed_priority_preemptive;
 
   of_round_robin : if POLICY = ROUND_ROBIN generate
     u_scheduler : entity firm.firm_sched_round_robin
@@ -128,8 +145,8 @@ begin
       generic map (
         REQUESTERS     => REQUESTERS,
         PERIODS        => PERIODS,
-        TRANSFER_TIMES => TRANSFER_TIMES,
         DEADLINES      => DEADLINES,
+        TRANSFER_TIMES => TRANSFER_TIMES,
         TIME_BITS      => TIME_BITS,
         SHORTEST_RUN   => SHORTEST_RUN
       )

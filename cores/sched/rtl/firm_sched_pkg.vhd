@@ -11,6 +11,7 @@ package firm_sched_pkg is
 
   constant MAX_REQUESTERS : positive := 256;
 
+  -- `make policies` writes the list from fusesoc_firm/scheduling/policies.py.
   type policy_t is (FIXED_PRIORITY, FIXED_PRIORITY_PREEMPTIVE, ROUND_ROBIN, LRU, EDF_RESOURCES, EDF_LATENCY, LST);
   type policies_t is array (natural range <>) of policy_t;
 
@@ -132,6 +133,11 @@ package body firm_sched_pkg is
   begin
     return policy = EDF_RESOURCES or policy = EDF_LATENCY or policy = LST;
   end function has_deadlines;
+
+  function has_transfer_times(policy : policy_t) return boolean is
+  begin
+    return policy = LST;
+  end function has_transfer_times;
 
   function is_implicit(deadlines : times_t) return boolean is
   begin
@@ -310,7 +316,7 @@ package body firm_sched_pkg is
   begin
     for place in policies'range loop
       any_deadlines := any_deadlines or has_deadlines(policies(place));
-      any_transfer  := any_transfer or policies(place) = LST;
+      any_transfer  := any_transfer or has_transfer_times(policies(place));
     end loop;
     if any_deadlines and fault_of_deadlines(requesters, periods, deadlines, time_bits, shortest_run) /= "" then
       return fault_of_deadlines(requesters, periods, deadlines, time_bits, shortest_run);

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host beside the hardware at the end of a pipe: makes clock and reset, and does what is requested on file
 -- descriptor 3: it takes frames for the system, and runs so many cycles. What happened in them is reported on file
--- descriptor 4. docs/transport.md says what requests and reports look like.
+-- descriptor 4. docs/reference/transports.md says what requests and reports look like.
 --
 -- Between two requests no time passes, so a simulation depends on the requests, on SEED and STALL_PERCENT alone. What
 -- breaks a rule ends it with a message. As in firm_sim_host, one process reads the inputs before the rising edge, and
