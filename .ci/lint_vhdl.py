@@ -34,6 +34,7 @@ ROOT = Path(__file__).resolve().parents[1]
 VSG = Path(sys.executable).with_name("vsg")
 WORK = ROOT / "build" / "vhdl_lint"
 PASSED = WORK / "passed"
+KEPT = 2000  # verdicts: several times the files of a run
 SAMPLES = WORK / "samples"
 GOLDEN = ROOT / "tests" / "converter" / "golden"
 TEMPLATES = ROOT / "fusesoc_firm" / "templates"
@@ -128,13 +129,13 @@ def hand_written() -> list[Path]:
 
 def violations(paths: Sequence[Path], style: Sequence[Path]) -> list[str]:
     """What vsg finds in these files, sorted. Files that it found clean before are not checked."""
-    passed = set(PASSED.read_text(encoding="utf-8").split()) if PASSED.exists() else set()
+    passed = PASSED.read_text(encoding="utf-8").split() if PASSED.exists() else []
     digests = {path: digest(path, style) for path in paths}
     waiting = [path for path, value in digests.items() if value not in passed]
     found = check(waiting, style) if waiting else {}
-    clean = {value for path, value in digests.items() if path not in found}
+    clean = [value for path, value in digests.items() if path not in found]
     WORK.mkdir(parents=True, exist_ok=True)
-    PASSED.write_text("\n".join(sorted(passed | clean)), encoding="utf-8")
+    PASSED.write_text("\n".join(list(dict.fromkeys(clean + passed))[:KEPT]), encoding="utf-8")
     return [line for path in sorted(found) for line in found[path]]
 
 
