@@ -1,4 +1,4 @@
-"""docs/reference/licences.md lists what pyproject.toml asks for and the programs that builds call; `make licences` writes it."""
+"""docs/reference/licences.md, by `make licences`: what pyproject.toml asks for, and the programs that builds call."""
 
 from __future__ import annotations
 
