@@ -26,13 +26,13 @@ from fusesoc_firm.tools.simulators import Simulator, default_simulator, fitting
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
 
-# Families of FPGAs as Yosys calls them, and the options of its synth command.
-FAMILIES = (
+# Families of FPGAs as Yosys calls them, and the options of its synth command: a target synth_<name> for each.
+FAMILIES = [
     {"name": "xilinx", "description": "Xilinx UltraScale+", "options": "[-family, xcup, -flatten, -abc9]"},
     {"name": "ecp5", "description": "Lattice ECP5", "options": "[-abc9]"},
     {"name": "ice40", "description": "Lattice iCE40 UltraPlus", "options": "[-abc9, -device, u, -dsp]"},
     {"name": "gowin", "description": "Gowin", "options": "[]"},
-)
+]
 # The instances of the generator that targets ask for.
 _SYSTEM, _SIMULATION = "system", "simulation"
 # The core with the generator `far`, and the one that had it before version 0.2.0.
@@ -128,7 +128,7 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
             ],
             # Only an HLS tool makes them, so there is no netlist of the whole.
             "has_kernels": has_kernels,
-            "families": [] if has_kernels else list(FAMILIES),
+            "families": [] if has_kernels else FAMILIES,
             "boards": [target for name in boards() if (target := _board(system, name, has_kernels=has_kernels))],
         },
     )
