@@ -7,11 +7,12 @@ and all processes below it have waited for a minute (`waiting_limit`) without do
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
 import tempfile
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,6 +22,7 @@ import pytest
 from hypothesis import settings
 
 from fusesoc_firm.tools.interrupts import accept_interrupts
+from tests.shared import SHARED
 
 pytest_plugins = ["tests.time_report"]
 
@@ -51,21 +53,33 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     # What tests start inherits all this.
     accept_interrupts()
-    # The processes that share the work of a run share its store, too, and no other run does.
+    # The processes that share the work of a run share its store and what they made, and no other run does.
     if not hasattr(config, "workerinput"):
-        store = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
-        config.add_cleanup(store.cleanup)
-        os.environ["FUSESOC_FIRM_CACHE"] = store.name
+        folder = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
+        config.add_cleanup(folder.cleanup)
+        os.environ["FUSESOC_FIRM_CACHE"] = f"{folder.name}/store"
+        os.environ[SHARED] = f"{folder.name}/shared"
+        # Verilator compiles its library again for every program.
+        if shutil.which("ccache"):
+            os.environ |= {"OBJCACHE": "ccache", "CCACHE_DIR": f"{folder.name}/ccache"}
         # FuseSoC looks up a generator's interpreter there.
         os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
 
 
+# Before cases are left out by their markers.
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: Iterable[pytest.Item]) -> None:
+    cases: Counter[tuple[pytest.Item | pytest.Collector | None, str]] = Counter()
     for item in items:
         if any(room in item.path.parents for room in _CLOSED):
             for rule in _OPEN:
                 item.add_marker(pytest.mark.filterwarnings(rule))
+        if one_in := item.get_closest_marker("one_in"):
+            test = item.parent, item.name.partition("[")[0]
+            if cases[test] % one_in.args[0]:
+                item.add_marker(pytest.mark.check)
+            cases[test] += 1
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

@@ -37,7 +37,7 @@ ALLOWED: dict[str, str] = {
 # The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
 STOREYS = {
     "system": ("written", "derived", "hardware", "boards", ".", "views", "scaffold"),
-    "scheduling": ("models", ".", "evaluation"),
+    "scheduling": (".", "models", "evaluation"),
 }
 
 

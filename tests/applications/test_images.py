@@ -57,6 +57,7 @@ def to_camera(messages: Sequence[Message]) -> list[tuple[str, Message]]:
     return [("camera", message) for message in messages]
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("ros", ["ROS", "ROS2"])
 @pytest.mark.parametrize("name", ["image_pipeline", "sobel", "multi_type"])
 def test_one_word_makes_it_a_system_of_ros_2(tmp_path: Path, name: str, ros: str) -> None:
@@ -69,6 +70,7 @@ def test_one_word_makes_it_a_system_of_ros_2(tmp_path: Path, name: str, ros: str
     check(built(copy, stimuli), 0, 60)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("width", [8, 64, 128])
 @pytest.mark.parametrize("name", ["image_pipeline", "sobel"])
 def test_images_of_all_kinds(tmp_path: Path, name: str, width: int) -> None:
@@ -83,6 +85,7 @@ def test_images_of_all_kinds(tmp_path: Path, name: str, width: int) -> None:
     check(made, 0)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("name", ["image_pipeline", "sobel"])
 def test_an_image_that_is_too_wide_becomes_an_empty_one(tmp_path: Path, name: str) -> None:
     source = random.Random(SEED)
@@ -91,6 +94,7 @@ def test_an_image_that_is_too_wide_becomes_an_empty_one(tmp_path: Path, name: st
     check(fed(copied(tmp_path, name, 128), to_camera(messages)), 0)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("ratios", [((1, 1), (2, 3)), ((5, 7), (1, 1)), ((1, 20), (19, 20))])
 def test_other_ratios(tmp_path: Path, ratios: tuple[tuple[int, int], tuple[int, int]]) -> None:
     """So many columns out of so many, and rows."""
@@ -107,6 +111,7 @@ def test_other_ratios(tmp_path: Path, ratios: tuple[tuple[int, int], tuple[int, 
     check(fed(copy, to_camera(random_images("ROS", source, 3, 6, largest=50))), 25)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("name", "width"), [("image_pipeline", 64), ("sobel", 8)])
 def test_an_image_that_breaks_off_does_not_harm_the_next(tmp_path: Path, name: str, width: int) -> None:
     """Frames that end in their header give no image; those that end among the pixels one of the announced length."""
@@ -151,6 +156,7 @@ def twist(ros: str, source: random.Random) -> Message:
     return {"header": header(ros, source, "t" * source.randrange(20)), "twist": parts}
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("width", [8, 128])
 def test_many_types_side_by_side(tmp_path: Path, width: int) -> None:
     source = random.Random(SEED + width)
@@ -221,6 +227,7 @@ IDS = """
 """
 
 
+@pytest.mark.check
 def test_twists_interrupt_images(tmp_path: Path) -> None:
     """Each end on the stream to the host is that of a frame, or of a part of one that is interrupted."""
     source = random.Random(SEED)

@@ -171,6 +171,7 @@ def settles(found: Sequence[Answer], x: float, z: float) -> None:
         assert abs(mean - wanted) <= 0.01 * abs(wanted) + QUARTER / 4 * unit
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("part", "x", "z"),
     [
@@ -259,6 +260,7 @@ def decoded(work: Library, folder: Path, steps: Sequence[tuple[int, int, int]], 
 LINES = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("filter_", [2, 4, 9])
 @pytest.mark.parametrize("start", range(4))
 def test_the_decoder_counts_every_edge_and_no_glitch(work: Library, tmp_path: Path, filter_: int, start: int) -> None:

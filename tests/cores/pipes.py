@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ import pytest
 from fusesoc_firm.node.transport.simulator import Simulator
 from tests.hdl.ghdl import Generic, Library, core_files
 from tests.hdl.verilog import compile_verilog
+from tests.shared import made_once
 
 TOOLS = ("ghdl", "icarus", "verilator")
 _BENCH = "firm_sim_pipe_tb"
@@ -21,7 +21,7 @@ _PROGRAMS = {"icarus": "iverilog"}
 
 @dataclass(frozen=True)
 class PipeBench:
-    """The bench in one simulator, which is built in `folder`; `is_four_valued` if the simulator knows 'X'."""
+    """The bench in one simulator, which runs in `folder`; `is_four_valued` if the simulator knows 'X'."""
 
     tool: str
     folder: Path
@@ -33,11 +33,13 @@ class PipeBench:
     def command(self, width: int = 8, **generics: Generic) -> list[str]:
         """What starts it; generics are SEED, STALL_PERCENT and FAULT."""
         if self.tool == "ghdl":
-            _analysed(self.folder)
-            options = ["--std=93", "--work=firm", f"--workdir={self.folder}", f"-P{self.folder}"]
+            library = made_once("pipe_ghdl", _analyse)
+            options = ["--std=93", "--work=firm", f"--workdir={library}", f"-P{library}"]
             return ["ghdl", "-r", *options, _BENCH, *_options("-g", {"WIDTH": width, **generics})]
-        program = (_icarus if self.tool == "icarus" else _verilator)(self.folder, width)
-        return [*program, *_options("+", generics)]
+        make = _icarus if self.tool == "icarus" else _verilator
+        folder = made_once(f"pipe_{self.tool}_{width}", lambda folder: make(folder, width))
+        program = ["vvp", "-n", folder / f"{_BENCH}.vvp"] if self.tool == "icarus" else [folder / f"V{_BENCH}"]
+        return [*map(str, program), *_options("+", generics)]
 
     def start(self, width: int = 8, **generics: Generic) -> Simulator:
         return Simulator(self.command(width, **generics), self.folder)
@@ -54,8 +56,7 @@ def _options(mark: str, generics: dict[str, Generic]) -> list[str]:
     return [f"{mark}{name}={value}" for name, value in generics.items()]
 
 
-@cache
-def _analysed(folder: Path) -> None:
+def _analyse(folder: Path) -> None:
     library = Library("firm", folder)
     library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/pipe"))
     library.analyse(core_files("sim/pipe", fileset="tb"))
@@ -65,18 +66,12 @@ def _sources() -> list[Path]:
     return [*core_files("sim/verilog_pipe"), *core_files("sim/verilog_pipe", fileset="tb")]
 
 
-@cache
-def _icarus(folder: Path, width: int) -> list[str]:
-    place = folder / f"width{width}"
-    place.mkdir()
-    return ["vvp", "-n", str(compile_verilog(_BENCH, _sources(), place, {"WIDTH": width}).program)]
+def _icarus(folder: Path, width: int) -> None:
+    compile_verilog(_BENCH, _sources(), folder, {"WIDTH": width})
 
 
-@cache
-def _verilator(folder: Path, width: int) -> list[str]:
-    place = folder / f"width{width}"
+def _verilator(folder: Path, width: int) -> None:
     options = ["--binary", "--timing", "-Wno-lint", "-Wno-style", "--top-module", _BENCH, f"-GWIDTH={width}"]
-    command = ["verilator", *options, "-Mdir", str(place), *map(str, _sources())]
+    command = ["verilator", *options, "-Mdir", str(folder), *map(str, _sources())]
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     assert done.returncode == 0, done.stdout
-    return [str(place / f"V{_BENCH}")]

@@ -51,6 +51,7 @@ def float_bits(number: float) -> str:
     return binary(int.from_bytes(struct.pack("<d", number), "little"), 64)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("width", "fraction", "iterations"),
     [(64, 60, 35), (16, 8, 8), (24, 16, 12), (40, 64, 64), (80, 62, 50), (33, 20, 2)],
@@ -101,6 +102,7 @@ def test_mirrored_vectors_have_the_same_length_and_mirrored_angles(library: Libr
         assert first[1] + second[1] == 4 * round(PI / 4 * 2**60)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("fraction", "iterations"), [(29, 29), (8, 8), (58, 58), (40, 20), (20, 2)])
 def test_sine_and_cosine(library: Library, tmp_path: Path, fraction: int, iterations: int) -> None:
     print(f"seed {SEED}")
@@ -132,6 +134,7 @@ def fixed_of(number: float, width: int, fraction: int) -> tuple[int, bool, bool]
     return -result if math.copysign(1, number) < 0 else result, magnitude > limit, False
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("width", "fraction"), [(32, 29), (64, 60), (64, 0), (2, 0), (12, 10), (54, 512), (30, 20)])
 def test_float64_to_fixed(library: Library, tmp_path: Path, width: int, fraction: int) -> None:
     print(f"seed {SEED}")
@@ -166,6 +169,7 @@ def block_of(numbers: list[float], fraction: int) -> tuple[list[int], int, bool,
     return results, largest, False, False
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("count", "block_fraction", "fixed_fraction"), [(4, 60, 60), (1, 53, 0), (2, 62, 63), (5, 56, 512), (3, 61, 17)]
 )

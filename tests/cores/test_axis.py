@@ -36,6 +36,7 @@ def _write_files(directory: Path, width: int) -> int:
     return sum(frame.beats(width) for frame in frames)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("part", LATENCY)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_part_keeps_a_stream_under_stalls(library: Library, tmp_path: Path, part: str, width: int) -> None:
@@ -47,6 +48,7 @@ def test_a_part_keeps_a_stream_under_stalls(library: Library, tmp_path: Path, pa
         assert result.output.splitlines()[-1] == "PASS 100/100"
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("part", LATENCY)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_part_takes_a_beat_a_cycle(library: Library, tmp_path: Path, part: str, width: int) -> None:
@@ -56,6 +58,7 @@ def test_a_part_takes_a_beat_a_cycle(library: Library, tmp_path: Path, part: str
     assert traffic(result.output).cycles == beats + LATENCY[part]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("part", LATENCY)
 @pytest.mark.parametrize("stall", [20, 50, 80])
 def test_a_part_leaves_no_gap_behind_a_stall(library: Library, tmp_path: Path, part: str, stall: int) -> None:
@@ -92,6 +95,7 @@ def test_the_netlist_of_a_part_does_the_same(tmp_path: Path, part: str) -> None:
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 16, 256])
 def test_every_part_is_latch_free(library: Library, width: int, count: int) -> None:

@@ -59,6 +59,7 @@ def passes(library: Library, bench: str, **generics: Generic) -> bool:
 # --- streams -------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(("s_width", "m_width"), WIDTHS)
 def test_a_stream_keeps_its_bytes(library: Library, s_width: int, m_width: int, ratio: float) -> None:
@@ -70,6 +71,7 @@ def test_a_stream_keeps_its_bytes(library: Library, s_width: int, m_width: int, 
         assert passes(library, STREAM, **widths, **clocks, SEED=seed, STALL_PERCENT=percent, STREAMS=60)
 
 
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(("s_width", "m_width"), WIDTHS)
 def test_a_stream_goes_at_the_pace_of_the_slower_end(
@@ -90,6 +92,7 @@ def test_a_fifo_of_any_depth(library: Library, depth: int) -> None:
         assert passes(library, STREAM, DEPTH=depth, SEED=seed, STALL_PERCENT=percent, STREAMS=60, **clocks)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("s_width", "m_width"), [*WIDTHS, (8, 16), (16, 8), (8, 512), (512, 8)])
 def test_the_resizer_loses_no_cycle(library: Library, s_width: int, m_width: int) -> None:
     generics: dict[str, Generic] = {"PART": "resizer", "S_WIDTH": s_width, "M_WIDTH": m_width}
@@ -101,6 +104,7 @@ def test_the_resizer_loses_no_cycle(library: Library, s_width: int, m_width: int
 # --- messages ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(("s_width", "m_width"), [(8, 8), (8, 64), (64, 8)])
 def test_messages_cross_in_their_order(library: Library, s_width: int, m_width: int, ratio: float) -> None:
@@ -111,6 +115,7 @@ def test_messages_cross_in_their_order(library: Library, s_width: int, m_width: 
         assert passes(library, MESSAGE, **generics, **periods(ratio, source), SEED=seed, MESSAGES=60)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_messages_of_fixed_size_follow_each_other(library: Library, ratio: float) -> None:
     """Seven cycles of each clock at most, on average."""
@@ -120,6 +125,7 @@ def test_messages_of_fixed_size_follow_each_other(library: Library, ratio: float
     assert passes(library, "firm_cdc_rate_tb", **clocks, SEED=source.randrange(1, 10**6), MOST_PS=most)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_a_withdrawn_message_leaves_nothing_behind(library: Library, ratio: float) -> None:
     source = random.Random(SEED + 3)
@@ -128,6 +134,7 @@ def test_a_withdrawn_message_leaves_nothing_behind(library: Library, ratio: floa
         assert passes(library, MESSAGE, **generics, **periods(ratio, source), WITHDRAW_PERCENT=50)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("is_at_sink", [False, True])
 @pytest.mark.parametrize("ratio", RATIOS)
 def test_a_reset_of_one_cycle_meets_messages(library: Library, ratio: float, is_at_sink: bool) -> None:
@@ -225,6 +232,7 @@ def test_what_is_broken_is_found(tmp_path: Path, fault: str) -> None:
     assert any(result.exit_code != 0 for result in runs)
 
 
+@pytest.mark.one_in(1)
 def test_a_pointer_in_binary_is_found_by_unsure_synchronisers_only(tmp_path: Path) -> None:
     unsure, sure = broken(tmp_path / "unsure", BINARY), broken(tmp_path / "sure", BINARY, is_sure=True)
     clocks = periods(0.97, random.Random(SEED))
@@ -242,6 +250,7 @@ GENERICS: dict[str, dict[str, Generic]] = {
 }
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("entity", GENERICS)
 def test_every_path_between_the_clocks_is_synchronised(tmp_path: Path, entity: str) -> None:
     library = _library(tmp_path, is_sure=True)
@@ -249,6 +258,7 @@ def test_every_path_between_the_clocks_is_synchronised(tmp_path: Path, entity: s
     assert unsynchronised(verilog, entity, tmp_path, DOMAINS) == []
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("fault", [NO_SYNCHRONISER, ONE_STAGE], ids=["none", "one stage"])
 @pytest.mark.parametrize("entity", GENERICS)
 def test_a_missing_synchroniser_is_found(tmp_path: Path, entity: str, fault: Fault) -> None:
@@ -256,6 +266,7 @@ def test_a_missing_synchroniser_is_found(tmp_path: Path, entity: str, fault: Fau
     assert unsynchronised(verilog, entity, tmp_path, DOMAINS)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("entity", "part"), [("firm_cdc_stream", "crossing"), ("firm_axis_resize", "resizer")])
 @pytest.mark.parametrize(("s_width", "m_width"), [(8, 8), (8, 32), (32, 8)])
 def test_the_netlist_of_a_stream_does_the_same(
@@ -292,6 +303,7 @@ def test_the_netlist_of_a_message_does_the_same(tmp_path: Path) -> None:
         assert passes(library, MESSAGE, **clocks, STALL_PERCENT=30, WITHDRAW_PERCENT=20, MESSAGES=100)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(
     ("entity", "generics"),
     [

@@ -24,6 +24,7 @@ def _library(directory: Path) -> Library:
     return library
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("sinks", COUNTS)
 @pytest.mark.parametrize(("seed", "stall_percent"), [(1, 20), (2, 50), (3, 90)])
 def test_random_readiness(library: Library, sinks: int, seed: int, stall_percent: int) -> None:
@@ -33,6 +34,7 @@ def test_random_readiness(library: Library, sinks: int, seed: int, stall_percent
     assert "PASS 1000 messages in " in result.output
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("sinks", COUNTS)
 @pytest.mark.parametrize(("seed", "stall_percent"), [(5, 30), (6, 80)])
 def test_a_withdrawn_message_leaves_nothing_behind(library: Library, sinks: int, seed: int, stall_percent: int) -> None:

@@ -94,6 +94,7 @@ def _pack(library: Library, directory: Path, frames: list[bytes], generics: Gene
     return report
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("source_stall", "reader_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_window_shows_every_byte(
@@ -114,6 +115,7 @@ def test_the_window_leaves_void_lanes_out(library: Library, tmp_path: Path, void
     _window(library, tmp_path, frames, {"WIDTH": 64, "VOID_LANES": void, "SEED": SEED, "SOURCE_STALL_PERCENT": 20})
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("source_stall", "reader_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_window_skips_the_rest_of_a_frame(
@@ -126,6 +128,7 @@ def test_the_window_skips_the_rest_of_a_frame(
         _window(library, tmp_path, frames, {**generics, "VOID_LANES": min(1, width // 8 - 1)})
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_window_takes_a_beat_a_cycle_in(library: Library, tmp_path: Path, width: int) -> None:
     """Across frames too; the window is empty for one cycle at most, where a frame's last bytes were in two beats."""
@@ -137,6 +140,7 @@ def test_the_window_takes_a_beat_a_cycle_in(library: Library, tmp_path: Path, wi
     assert idle <= (width > 8)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_window_skips_a_beat_a_cycle(library: Library, tmp_path: Path, width: int) -> None:
     frames = _write_long_frames(tmp_path, width)
@@ -144,6 +148,7 @@ def test_the_window_skips_a_beat_a_cycle(library: Library, tmp_path: Path, width
     assert _figures(report, "beats", "waits") == [_beats(frames, width), 0]
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_window_gives_whole_windows_at_any_offset(library: Library, tmp_path: Path, width: int) -> None:
     """A frame whose first bytes are taken alone can need one cycle more than it has beats."""
@@ -154,6 +159,7 @@ def test_the_window_gives_whole_windows_at_any_offset(library: Library, tmp_path
     assert waits <= len(frames)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("source_stall", "sink_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_keeps_every_byte(
@@ -165,6 +171,7 @@ def test_the_packer_keeps_every_byte(
         _pack(library, tmp_path, frames, {"WIDTH": width, "SEED": SEED, "PIECES": pieces, **stalls})
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_makes_nothing_of_an_empty_frame(library: Library, tmp_path: Path, width: int) -> None:
     frames = _write_frames(tmp_path, width)
@@ -172,12 +179,14 @@ def test_the_packer_makes_nothing_of_an_empty_frame(library: Library, tmp_path: 
         _pack(library, tmp_path, frames, {"WIDTH": width, "SEED": SEED, "PIECES": pieces, "EMPTY_FRAMES": True})
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_shows_a_beat_before_it_is_asked(library: Library, tmp_path: Path, width: int) -> None:
     frames = _write_frames(tmp_path, width)
     _pack(library, tmp_path, frames, {"WIDTH": width, "SEED": SEED, "LATE_READY": True})
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("pieces", ["random", "shifted", "full"])
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_never_holds_its_input_up(library: Library, tmp_path: Path, width: int, pieces: str) -> None:
@@ -189,6 +198,7 @@ def test_the_packer_never_holds_its_input_up(library: Library, tmp_path: Path, w
     assert gaps == 0 or pieces != "full"
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_packer_gives_a_beat_a_cycle_at_any_offset(library: Library, tmp_path: Path, width: int) -> None:
     """A frame that begins with a short piece has one piece more than beats at most."""
@@ -199,6 +209,7 @@ def test_the_packer_gives_a_beat_a_cycle_at_any_offset(library: Library, tmp_pat
     assert gaps <= len(frames)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("stall", [0, 20, 50])
 def test_the_packer_joins_what_the_window_cuts(library: Library, tmp_path: Path, width: int, stall: int) -> None:
@@ -214,6 +225,7 @@ def test_the_packer_joins_what_the_window_cuts(library: Library, tmp_path: Path,
         assert traffic(result.output).cycles == sum(frame.beats(width) for frame in frames) + latency
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_gearboxes_give_no_warnings(library: Library, tmp_path: Path, width: int) -> None:
     """Of numbers with undefined bits, though undefined is what lies in unused lanes and before the first frame."""
@@ -222,6 +234,7 @@ def test_the_gearboxes_give_no_warnings(library: Library, tmp_path: Path, width:
     assert "warning" not in _pack(library, tmp_path, frames, {"WIDTH": width})
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", [8, 16, 32, 64])
 def test_the_netlist_of_the_window_does_the_same(tmp_path: Path, width: int) -> None:
     library = _library(tmp_path)
@@ -233,6 +246,7 @@ def test_the_netlist_of_the_window_does_the_same(tmp_path: Path, width: int) -> 
     _window(library, tmp_path, frames, {**void, **stalls, "SKIP_PERCENT": 10})
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", [8, 16, 32, 64])
 def test_the_netlist_of_the_packer_does_the_same(tmp_path: Path, width: int) -> None:
     library = _library(tmp_path)
@@ -243,6 +257,7 @@ def test_the_netlist_of_the_packer_does_the_same(tmp_path: Path, width: int) -> 
     _pack(library, tmp_path, frames, {"WIDTH": width, **stalls})
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", [*WIDTHS, 256])
 def test_the_gearboxes_are_latch_free(library: Library, width: int) -> None:
     assert library.latches("firm_axis_window", {"WIDTH": width, "VOID_LANES": min(1, width // 8 - 1)}) == []

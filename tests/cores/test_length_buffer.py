@@ -61,6 +61,7 @@ def _run(library: Library, directory: Path, **generics: Generic) -> str:
     return result.output
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("stalls", [(0, 0), (50, 0), (0, 60), (25, 25)])
 def test_lengths_are_right_and_long_frames_dropped(
@@ -89,6 +90,7 @@ def test_any_depth(library: Library, tmp_path: Path, depth: int) -> None:
     _run(library, tmp_path, WIDTH=32, DEPTH=depth, SEED=SEED, STALL_PERCENT=30)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_frame_is_sent_while_the_next_is_stored(library: Library, tmp_path: Path, width: int) -> None:
     beats, count = 20, 30
@@ -121,6 +123,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, width: int) -> None:
     _run(library, tmp_path, WIDTH=width, DEPTH=12, SEED=SEED, STALL_PERCENT=30)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("depth", [2, 5, 1024])
 def test_there_is_no_latch(library: Library, width: int, depth: int) -> None:

@@ -40,6 +40,7 @@ def _write_files(directory: Path, number: int, longest: int, seed: int = SEED) -
     return sum(len(frame.to_bytes()) for frame in frames)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("link", LINKS)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("stall", [0, 30])
@@ -117,6 +118,7 @@ BREAK = ["break  0"]
 PAUSE = [f"pause  {SILENCE + 20}"]
 
 
+@pytest.mark.one_in(13)
 @pytest.mark.parametrize("width", [8, 16, 64])
 @pytest.mark.parametrize("cut", [BREAK, PAUSE])
 @pytest.mark.parametrize("sent", range(len(WHOLE)))
@@ -146,6 +148,7 @@ def test_a_glitch_is_no_byte(library: Library, tmp_path: Path) -> None:
     assert _played(library, tmp_path, script) == [WHOLE.hex()]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("clear", [BREAK, PAUSE])
 @pytest.mark.parametrize("seed", range(3))
 def test_what_finds_no_room_is_dropped_and_cut(library: Library, tmp_path: Path, clear: list[str], seed: int) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fusesoc_firm.scheduling.models.engine import rows_and_columns
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.cores.sched_trace import Trace, first_difference, most_overtaken
 from tests.cores.schedulers import (
-    ENTITIES,
     aggregate,
     analyse_bench,
     analysed,
@@ -21,7 +21,7 @@ from tests.cores.schedulers import (
 )
 from tests.hdl.ghdl import Library
 
-TIMED = [policy for policy, entity in ENTITIES.items() if entity.has_times]
+TIMED = [policy for policy, entity in POLICIES.items() if entity.has_deadlines]
 # Each policy with each way to keep its tasks: in a heap, in a sorted queue, all at once.
 LST_IN_HEAP = 20
 SIZES = [
@@ -44,6 +44,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     return analysed(tmp_path_factory.mktemp("sched"))
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("requesters", [2, 5, 32])
 @pytest.mark.parametrize("shortest_run", [2, 7])
 @pytest.mark.parametrize("policy", TIMED)
@@ -84,6 +85,7 @@ def _shortest_broken_run(trace: Trace) -> int:
     return shortest
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("policy", "requesters"), [case for case in SIZES if case[0] in TIMED])
 @pytest.mark.parametrize("saturated", [False, True])
 def test_time_wraps_around(library: Library, tmp_path: Path, policy: str, requesters: int, saturated: bool) -> None:
@@ -125,6 +127,7 @@ def _longest_idle(trace: Trace) -> int:
     return longest
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("beats", [4, 7])
 @pytest.mark.parametrize("saturated", [False, True])
 @pytest.mark.parametrize("requesters", [20, 100])
@@ -137,6 +140,7 @@ def test_each_other_goes_first_once_at_most(
     assert 0 < most_overtaken(trace) <= requesters - 1
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("beats", [1, 2, 3])
 @pytest.mark.parametrize("saturated", [False, True])
 @pytest.mark.parametrize("requesters", [20, 100])
@@ -150,6 +154,7 @@ def test_short_tasks_pass_by_few(
     assert 0 < most_overtaken(trace) <= (1.2 if beats == 3 else 2) * requesters
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(("policy", "requesters"), [("lru", 20), ("lru", 256), ("edf_resources", 256)])
 def test_reset_is_over_soon(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
     trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters, SATURATED=True, CYCLES=200)
@@ -158,6 +163,7 @@ def test_reset_is_over_soon(library: Library, tmp_path: Path, policy: str, reque
     assert (trace.grant_valid.argmax(axis=1) == rows + 2).all()
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("policy", "requesters"), [*SIZES, ("edf_resources", 256), ("edf_latency", 256), ("lru", 256)])
 def test_a_lone_request_is_granted_in_two_cycles(
     library: Library, tmp_path: Path, policy: str, requesters: int
@@ -183,6 +189,7 @@ def test_a_lone_request_is_granted_in_two_cycles(
     assert found > 0
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("beats", [1, 2, 4, 7])
 @pytest.mark.parametrize(("policy", "requesters"), SIZES)
 def test_tasks_follow_each_other(library: Library, tmp_path: Path, policy: str, requesters: int, beats: int) -> None:
@@ -194,6 +201,7 @@ def test_tasks_follow_each_other(library: Library, tmp_path: Path, policy: str, 
     assert share >= 0.995 if policy == "lst" and requesters == LST_IN_HEAP else share == 1
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("shortest_run", [1, 3])
 @pytest.mark.parametrize(("policy", "requesters"), SIZES)
 def test_the_netlist_does_the_same(
@@ -247,7 +255,7 @@ ILLEGAL = [
 def test_illegal_generics_are_named(tmp_path: Path, policy: str, requesters: int, generics: str, message: str) -> None:
     if policy == "lst":
         generics += "; TRANSFER_TIMES => (1, 1)"
-    entity = ENTITIES[policy].entity
+    entity = POLICIES[policy].entity
     assert f"{entity}: {message}" in _refusal(analysed(tmp_path), entity, requesters, generics)
 
 

@@ -139,6 +139,7 @@ def _judge(cycles: list[Cycle], is_sorted: bool) -> tuple[int, int]:
     return popped, fullest
 
 
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("rates", RATES)
 @pytest.mark.parametrize("items", ITEMS)
 @pytest.mark.parametrize("is_sorted", ENTITIES)
@@ -153,6 +154,7 @@ def test_it_is_a_priority_queue(
         assert fullest == items or rates != FILLING
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("items", [2, 5, 32])
 @pytest.mark.parametrize("is_sorted", ENTITIES)
 def test_the_netlist_does_the_same(tmp_path: Path, is_sorted: bool, items: int) -> None:
@@ -163,6 +165,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, is_sorted: bool, items: int) 
         assert _judge(cycles, is_sorted)[0] > 50
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("items", ITEMS)
 @pytest.mark.parametrize("is_sorted", ENTITIES)
 def test_it_is_latch_free(library: Library, is_sorted: bool, items: int) -> None:

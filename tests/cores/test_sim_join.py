@@ -56,6 +56,7 @@ def run(joiner: Bench, folder: Path, bursts: list[bytes], whole: list[tuple[int,
     return joiner.run(folder, **{"SEED": SEED, **generics}).output
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
 @pytest.mark.parametrize("stall", [0, 50])
 def test_frames_come_out_whole(joiner: Bench, tmp_path: Path, width: int, stall: int) -> None:

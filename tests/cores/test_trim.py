@@ -69,6 +69,7 @@ def _run(library: Library, directory: Path, width: int, **generics: Generic) -> 
     return result.output
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("slack", [0, 3])
 @pytest.mark.parametrize(("source_stall", "sink_stall"), STALLS)
 @pytest.mark.parametrize("width", WIDTHS)
@@ -80,6 +81,7 @@ def test_every_frame_has_its_length(
         _run(library, tmp_path, width, SLACK=slack, FULL_PIECES=is_full, **stalls)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_only_filling_holds_the_input_up(library: Library, tmp_path: Path, width: int) -> None:
     """A beat of zeros a cycle; the frame's end comes with the last of them, if that is not a full one."""
@@ -99,6 +101,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, width: int) -> None:
     _run(library, tmp_path, width, SLACK=3, SOURCE_STALL_PERCENT=30, SINK_STALL_PERCENT=30)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", [*WIDTHS, 256])
 def test_it_is_latch_free(library: Library, width: int) -> None:
     assert library.latches("firm_axis_trim", {"WIDTH": width}) == []

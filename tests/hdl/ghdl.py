@@ -15,7 +15,9 @@ import re
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -141,9 +143,14 @@ def core_files(*cores: str, fileset: str = "rtl") -> list[Path]:
     files = []
     for core in cores:
         description = CORES / f"{core}.core"
-        names = yaml.safe_load(description.read_text(encoding="utf-8"))["filesets"][fileset]["files"]
-        files += [description.parent / name for name in names]
+        files += [description.parent / name for name in core_description(description)["filesets"][fileset]["files"]]
     return files
+
+
+@cache
+def core_description(path: Path) -> Any:
+    """What a .core file says; nobody may change it."""
+    return yaml.load(path.read_text(encoding="utf-8").removeprefix("CAPI=2:"), Loader=yaml.CSafeLoader)
 
 
 def _generic_options(generics: Mapping[str, Generic] | None) -> list[str]:

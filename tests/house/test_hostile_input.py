@@ -254,6 +254,7 @@ def test_yaml_is_bounded(text: str, words: str, tmp_path: Path, capsys: pytest.C
     assert words in shown(text, tmp_path, capsys)
 
 
+@pytest.mark.check
 def test_400_accelerators_are_shown(tmp_path: Path) -> None:
     count = 400
     side = "[{middleware: ROS2, message: geometry_msgs/Point}]"

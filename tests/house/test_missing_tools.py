@@ -96,6 +96,7 @@ def test_every_target_is_listed() -> None:
     assert set(targets) == {"default", *SAID}
 
 
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("target", SAID)
 def test_missing_programs_are_named_with_their_packages(bare: Bare, target: str) -> None:
     said = bare.run(target)

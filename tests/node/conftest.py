@@ -2,10 +2,10 @@
 
 import pytest
 
-from tests.node.drivers import Driver, compile_driver
+from tests.node.drivers import Driver, cpp_driver
 
 
 @pytest.fixture(scope="session")
-def node_driver(tmp_path_factory: pytest.TempPathFactory) -> Driver:
+def node_driver() -> Driver:
     """The node's engine in C++, with sanitizers."""
-    return compile_driver("node", tmp_path_factory.mktemp("node"))
+    return cpp_driver("node")

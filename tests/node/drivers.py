@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import fusesoc_firm.node
+from tests.shared import made_once
 
 HERE = Path(__file__).resolve().parent
 HEADERS = Path(fusesoc_firm.node.__file__).resolve().parent / "cpp"
@@ -36,13 +37,14 @@ class Driver:
         return done.stdout
 
 
-def compile_driver(name: str, directory: Path, sanitizers: str = "address,undefined") -> Driver:
-    """Compile `<name>_driver.cpp` with all warnings and these sanitizers."""
-    program = directory / f"{name}_{sanitizers.replace(',', '_')}"
+def cpp_driver(name: str, sanitizers: str = "address,undefined") -> Driver:
+    """`<name>_driver.cpp`, compiled with all warnings and these sanitizers, once in a run."""
     sanitize = [f"-fsanitize={sanitizers}", "-fno-sanitize-recover=all"]
-    command = ["g++", *_OPTIONS, *sanitize, "-I", str(HEADERS), str(HERE / f"{name}_driver.cpp"), "-o", str(program)]
-    subprocess.run(command, check=True)
-    return Driver(program)
+    command = ["g++", *_OPTIONS, *sanitize, "-I", str(HEADERS), str(HERE / f"{name}_driver.cpp"), "-o", name]
+    folder = made_once(
+        f"drivers/{name}_{sanitizers.replace(',', '_')}", lambda folder: subprocess.run(command, cwd=folder, check=True)
+    )
+    return Driver(folder / name)
 
 
 def compile_c_driver(

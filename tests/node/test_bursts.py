@@ -9,15 +9,15 @@ import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.bursts import WIDTHS, BurstError, BurstJoiner, JoinedFrame, split_frame
-from tests.node.drivers import Driver, compile_driver
+from tests.node.drivers import Driver, cpp_driver
 
 SEED = 20240612
 LONGEST = 1000
 
 
 @pytest.fixture(scope="module")
-def driver(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    return compile_driver("bursts", tmp_path_factory.mktemp("bursts"))
+def driver() -> Driver:
+    return cpp_driver("bursts")
 
 
 def _python_answers(lines: Sequence[str]) -> list[str]:

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.node.drivers import Driver, compile_driver
+from tests.node.drivers import Driver, cpp_driver
 
 SEED = 20261123
 
 
 @pytest.fixture(scope="module")
-def driver(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    return compile_driver("dma", tmp_path_factory.mktemp("dma"))
+def driver() -> Driver:
+    return cpp_driver("dma")
 
 
 def play(driver: Driver, count: int, longest: int, buffer: int, fault: str = "none", at: int = 0) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.node.drivers import HERE, Driver, compile_driver
+from tests.node.drivers import HERE, Driver, cpp_driver
 
 SEED = 20261121
 SIMULATOR = f"exec {shlex.quote(sys.executable)} {shlex.quote(str(HERE / 'model_simulator.py'))}"
@@ -102,9 +102,9 @@ def test_large_and_empty_payloads(node_driver: Driver) -> None:
     assert outcome.published == by_converter(messages)
 
 
-def test_threads_do_not_race(tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_threads_do_not_race() -> None:
     print(f"seed {SEED}")
-    driver = compile_driver("node", tmp_path_factory.mktemp("node_threads"), "thread")
+    driver = cpp_driver("node", "thread")
     messages = payloads_of(random.Random(SEED), 5, 200, 100)
     outcome = run(driver, puts(messages), f"pipe:{SIMULATOR} --run-beats 3", converters=5)
     assert outcome.published == by_converter(messages)

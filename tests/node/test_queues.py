@@ -21,7 +21,7 @@ from fusesoc_firm.node.queues import (
     RoundRobin,
     SubscriberQueues,
 )
-from tests.node.drivers import Driver, compile_driver
+from tests.node.drivers import Driver, cpp_driver
 
 SEED = 20240613
 SUBSCRIBERS = [1, 2, 3, 5, 32]
@@ -36,8 +36,8 @@ POLICIES: dict[str, Callable[[list[int], list[int]], Policy]] = {
 
 
 @pytest.fixture(scope="module")
-def driver(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    return compile_driver("queues", tmp_path_factory.mktemp("queues"))
+def driver() -> Driver:
+    return cpp_driver("queues")
 
 
 class Model:
@@ -213,8 +213,8 @@ def test_threads_lose_nothing() -> None:
     assert found == [[*range(items)]] * subscribers
 
 
-def test_threads_lose_nothing_in_cpp(tmp_path_factory: pytest.TempPathFactory) -> None:
-    compile_driver("queues", tmp_path_factory.mktemp("threads"), "thread").run("threads")
+def test_threads_lose_nothing_in_cpp() -> None:
+    cpp_driver("queues", "thread").run("threads")
 
 
 def test_a_writer_that_waits_is_told_of_the_end() -> None:

@@ -35,6 +35,7 @@ ECHO_SIMULATOR = f"pipe:exec {sys.executable} {Path(__file__).with_name('echo_si
 MODEL_SIMULATOR = REPOSITORY / "tests/node/model_simulator.py"
 APPLICATIONS = ["quat2euler", "image_pipeline", "multi_type", "mobile_robot", "robotic_arm", "sobel"]
 SEED = 20240721
+pytestmark = pytest.mark.check
 # A simulator on a machine that does other things, too, comes to rest late.
 PATIENT = ("--drain", "100")
 

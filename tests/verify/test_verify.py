@@ -192,6 +192,7 @@ def gates(tmp_path_factory: pytest.TempPathFactory) -> Library:
     return library
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("seed", [1, 2, 77])
 @pytest.mark.parametrize("percent", [0, 30, 90])
 def test_gates_stall_and_withdraw_nothing(gates: Library, seed: int, percent: int) -> None:
@@ -327,6 +328,7 @@ def test_the_same_message_gets_the_same_stimuli_in_any_company() -> None:
     assert tasks[0].chance().random() != replace(tasks[0], seed=6).chance().random()
 
 
+@pytest.mark.check
 def test_a_dask_cluster_gives_the_same(tmp_path: Path, capsys: Captured) -> None:
     distributed = pytest.importorskip("distributed", reason="distributed is not installed")
     arguments = ["message", "verify", "geometry_msgs/P*", "--ros", "1"]

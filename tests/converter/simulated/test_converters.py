@@ -76,6 +76,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> ConverterBench:
     return ConverterBench(tmp_path_factory.mktemp("converters"))
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_messages_come_through_under_stalls(
     bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int
@@ -90,6 +91,7 @@ def test_messages_come_through_under_stalls(
     assert [int(digits, 16) for digits in printed(result, "fields")] == [pair.field_bits(value) for value in values]
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_no_cycle_is_lost_without_stalls(
     bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int
@@ -106,6 +108,7 @@ def test_no_cycle_is_lost_without_stalls(
     assert found.cycles <= beats + pair.beats(frames[-1]) + PIPELINE_CYCLES
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_a_message_that_waits_loses_nothing(
     bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int
@@ -118,6 +121,7 @@ def test_a_message_that_waits_loses_nothing(
     assert printed(result, "beats behind a message:") == ["1"] * 19 + ["0"]
 
 
+@pytest.mark.one_in(11)
 @pytest.mark.parametrize("flow", FLOWS)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_broken_frames_hurt_no_other(
@@ -133,6 +137,7 @@ def test_broken_frames_hurt_no_other(
     pair.run(tmp_path, frames, SEED=SEED, **FLOWS[flow])
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_every_length_of_a_frame(bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
     """Cut behind each byte, and longer by up to five; with the length of the whole message, and with its own.
@@ -162,6 +167,7 @@ def test_any_byte_but_zero_is_true(bench: ConverterBench, tmp_path: Path) -> Non
     assert printed(result, "fields") == ["00", "01", "01", "01", "01", "01", "01", "00"]
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("offset", range(4))
 @pytest.mark.parametrize("byte", [1, 0x80, 0xFF])
 def test_a_lie_in_each_byte_of_the_length(bench: ConverterBench, tmp_path: Path, offset: int, byte: int) -> None:
@@ -176,6 +182,7 @@ def test_a_lie_in_each_byte_of_the_length(bench: ConverterBench, tmp_path: Path,
     pair.run(tmp_path, frames, SEED=SEED, STALL_PERCENT=10)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_they_are_latch_free(bench: ConverterBench, ros: RosVersion, name: str, width: int) -> None:
     pair = bench.pair(ros, name, width)
@@ -183,6 +190,7 @@ def test_they_are_latch_free(bench: ConverterBench, ros: RosVersion, name: str, 
         assert pair.library.latches(entity) == []
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("ros", "name", "width"), NETLISTS)
 def test_the_netlist_does_the_same(tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
     """The bench with what `ghdl --synth` made of both converters in their place."""

@@ -153,6 +153,7 @@ def test_lengths_far_beyond_what_a_test_can_serialise(tmp_path: Path) -> None:
     simulate(tmp_path, [image, scan], tests)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("ros", RosVersion)
 @pytest.mark.parametrize(
     ("name", "used"),

@@ -95,6 +95,7 @@ def framed(payload: bytes) -> bytes:
     return len(payload).to_bytes(LENGTH_BYTES, "little") + payload
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("stall", [0, 40])
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_messages_come_through_under_stalls(
@@ -126,6 +127,7 @@ SELECTIONS = [
 ]
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize(("ros", "name", "include", "exclude"), SELECTIONS)
 def test_what_is_not_used_is_skipped(
@@ -148,6 +150,7 @@ def test_what_is_not_used_is_skipped(
     assert subscriber.run(tmp_path, frames[::2], SEED=1) == expected
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("stall", [0, 35])
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_broken_frames_hurt_no_other(
@@ -173,6 +176,7 @@ def test_broken_frames_hurt_no_other(
     assert set(codes(events)) >= ({1, 2, 3, 4} if ros is ROS2 else {1, 2, 3})
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_every_length_of_a_frame(
     bench: SubscriberBench, tmp_path: Path, ros: RosVersion, name: str, width: int
@@ -236,12 +240,14 @@ def test_a_stream_takes_a_beat_in_every_cycle(bench: SubscriberBench, tmp_path: 
         assert cycles - 2000 <= beats / 0.98 + 60
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_they_are_latch_free(bench: SubscriberBench, ros: RosVersion, name: str, width: int) -> None:
     subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
     assert subscriber.library.latches(subscriber.entity) == []
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("ros", "name", "width"), NETLISTS)
 def test_the_netlist_does_the_same(tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
     subscriber = SubscriberBench(tmp_path).subscriber(ORACLES[ros].frame(name), width)

@@ -73,6 +73,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> PublisherBench:
     return PublisherBench(tmp_path_factory.mktemp("publishers"))
 
 
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_frames_are_those_of_rosbags(
     bench: PublisherBench, tmp_path: Path, ros: RosVersion, name: str, width: int
@@ -84,6 +85,7 @@ def test_frames_are_those_of_rosbags(
     publisher.run(tmp_path, messages, SEED=SEED, LATE_READY=True)
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_faults_hurt_no_other_frame(
     bench: PublisherBench, tmp_path: Path, ros: RosVersion, name: str, width: int
@@ -98,6 +100,7 @@ def test_faults_hurt_no_other_frame(
     publisher.run(tmp_path, messages, SEED=SEED, STALL_PERCENT=30, SINK_STALL_PERCENT=40)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 32, 64, 512])
 @pytest.mark.parametrize("name", ["sensor_msgs/PointCloud2", "sensor_msgs/JointState"])
 @pytest.mark.parametrize("ros", RosVersion)
@@ -114,6 +117,7 @@ def test_a_message_goes_in_any_cycle(
     publisher.run(tmp_path, messages, SEED=SEED, SINK_STALL_PERCENT=50)
 
 
+@pytest.mark.one_in(11)
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
 @pytest.mark.parametrize("ros", RosVersion)
 @pytest.mark.parametrize("length", [2**32 - 1, 2**31, 2**29, 300])
@@ -152,6 +156,7 @@ def test_padding_ends_in_what_is_given_up(bench: PublisherBench, tmp_path: Path,
     publisher.run(tmp_path, messages, SEED=SEED)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("ros", RosVersion)
 def test_a_stream_moves_a_beat_a_cycle(bench: PublisherBench, tmp_path: Path, ros: RosVersion, width: int) -> None:
@@ -183,6 +188,7 @@ def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Ros
     assert [end - start for start, end in pairwise(taken)] == [expected] * 2
 
 
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize("ros", RosVersion)
 @pytest.mark.parametrize(
@@ -241,6 +247,7 @@ def _zeros(value: Any) -> Any:
     return type(value)()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_giant_block_of_zeros_is_one_word(bench: PublisherBench, tmp_path: Path, width: int) -> None:
     """What is not used of a large message costs neither text nor a multiplexer."""
@@ -255,6 +262,7 @@ def test_a_giant_block_of_zeros_is_one_word(bench: PublisherBench, tmp_path: Pat
     publisher.run(tmp_path, messages, SEED=SEED, SINK_STALL_PERCENT=10)
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("ros", RosVersion)
 @pytest.mark.parametrize("width", [8, 64])
 def test_every_message_of_the_distributions_is_analysed(
@@ -275,12 +283,14 @@ def test_every_message_of_the_distributions_is_analysed(
     library.analyse(files)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("ros", "name", "width"), [*NETLISTS, case(ROS1, f"{PACKAGE}/Texts", 512)])
 def test_they_are_latch_free(bench: PublisherBench, ros: RosVersion, name: str, width: int) -> None:
     publisher = bench.publisher(ros, name, width)
     assert publisher.library.latches(publisher.entity) == []
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(("ros", "name", "width"), NETLISTS)
 def test_the_netlist_does_the_same(tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
     """The bench with what `ghdl --synth` made of the publisher in its place."""

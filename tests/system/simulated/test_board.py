@@ -35,6 +35,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Library:
     return system.work
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("pressed", [0, 300])
 def test_a_board_answers_over_its_serial_line(work: Library, pressed: int) -> None:
     result = work.run("board_tb", {"PRESSED_CYCLES": pressed, "SEED": 5})
@@ -51,6 +52,7 @@ def test_the_light_shows_a_broken_frame(work: Library, tmp_path: Path) -> None:
     assert "frame_error(0) pulses" in result.output
 
 
+@pytest.mark.check
 @pytest.mark.parametrize(
     "board",
     [

@@ -78,6 +78,7 @@ def entities(made: GeneratedSystem, name: str) -> int:
 # --- messages of fixed size ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("own", "other"), CLOCKS)
 def test_parts_of_messages_meet_from_several_domains(tmp_path: Path, own: str, other: str) -> None:
     """Of fixed size, there and back; a publisher gets fields from two domains, an accelerator from two subscribers."""
@@ -108,6 +109,7 @@ def test_parts_of_messages_meet_from_several_domains(tmp_path: Path, own: str, o
 # --- messages of variable size -------------------------------------------------------------------------------------
 
 
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(("own", "other"), [(SAME, SAME), *CLOCKS])
 @pytest.mark.parametrize(("width", "other_width"), [(8, 64), (64, 8), (32, 32), (128, 512)])
 def test_an_image_streams_through(tmp_path: Path, own: str, other: str, width: int, other_width: int) -> None:
@@ -132,6 +134,7 @@ def test_an_image_streams_through(tmp_path: Path, own: str, other: str, width: i
     check(made, 0, 60)
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("width", [8, 64])
 def test_an_image_goes_to_several_domains(tmp_path: Path, width: int) -> None:
     """A fork with sinks in two domains; behind it two accelerators of one domain and of two widths."""
@@ -154,6 +157,7 @@ def test_an_image_goes_to_several_domains(tmp_path: Path, width: int) -> None:
     check(made, 0, 60)
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("width", [8, 16])
 def test_every_path_between_the_clocks_of_a_system_is_synchronised(tmp_path: Path, width: int) -> None:
     """The top level with all that it holds, as a netlist; that does the same, too."""
@@ -223,6 +227,7 @@ ELEMENTS = (
 )
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(("width", "other_width", "own", "other"), [(8, 32, *CLOCKS[0]), (64, 16, *CLOCKS[2])])
 @pytest.mark.parametrize("message", ELEMENTS)
 def test_elements_go_through(tmp_path: Path, message: str, width: int, other_width: int, own: str, other: str) -> None:
@@ -242,6 +247,7 @@ def test_elements_go_through(tmp_path: Path, message: str, width: int, other_wid
 # --- an application ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("width", "other_width", "own", "other"), [(8, 64, "100 MHz", "31 MHz"), (64, 16, "50 MHz", "333 MHz")]
 )

@@ -26,6 +26,7 @@ def runtime(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("number", range(6))
 def test_a_random_system_is_elaborated(number: int, runtime: Path, tmp_path: Path) -> None:
     """Accelerators are skeletons, which have all ports."""

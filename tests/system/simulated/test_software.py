@@ -129,6 +129,7 @@ def frames(made: GeneratedSystem, publisher: str) -> list[str]:
     return [re.sub(r"\A  [0-9a-f]{2}", "", frame) for frame in found]
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("moved", "ros", "publishers"),
     [
@@ -211,6 +212,7 @@ def pipeline(folder: Path, moved: Collection[str], width: int, ros: str) -> Path
     return copy
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(
     ("moved", "width"),
     [

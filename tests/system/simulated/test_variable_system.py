@@ -94,6 +94,7 @@ def check(made: GeneratedSystem) -> None:
         assert made.passes(SEED=seed, STALL_PERCENT=stall_percent)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("width", [8, 32, 128])
 def test_an_image_streams_through(tmp_path: Path, width: int) -> None:
     blocks = [
@@ -107,6 +108,7 @@ def test_an_image_streams_through(tmp_path: Path, width: int) -> None:
     assert made.work.latches(made.entity) == []
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize("fields", [["height", "width", "encoding"], ["data", "step"], ["width"], ["header.frame_id"]])
 def test_parts_of_an_image_pass(tmp_path: Path, fields: list[str], width: int) -> None:
@@ -125,6 +127,7 @@ def respond(subscriber, message):
     check(system(tmp_path, bag(tmp_path, IMAGE, values(IMAGE, 8)), model, width, [], blocks))
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("width", [8, 64])
 def test_an_image_goes_many_ways(tmp_path: Path, width: int) -> None:
     """To an accelerator, past it, and through it twice."""
@@ -143,6 +146,7 @@ def test_an_image_goes_many_ways(tmp_path: Path, width: int) -> None:
         assert made.passes(SEED=4, STALL_PERCENT=30)
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize("message", [CLOUD, "geometry_msgs/PolygonStamped", "diagnostic_msgs/DiagnosticArray"])
 def test_elements_go_several_ways(tmp_path: Path, message: str, width: int) -> None:
