@@ -1,4 +1,4 @@
-"""A simulator, a board and a target are added by a row, or a file, each; commands, core, generator and build know them."""
+"""A simulator, a board and a target are added by a row or a file each, which commands, cores and builds follow."""
 
 from __future__ import annotations
 
