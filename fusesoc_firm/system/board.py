@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.naming import identifier, text_fault
 from fusesoc_firm.system.configuration import top_level_pins

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived import DerivedSystem
 from fusesoc_firm.system.instances import (
     ERROR_CODE_BITS,

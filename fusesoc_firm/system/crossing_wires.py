@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.crossings import Crossing, Scope, parts_of, port_of, word
 from fusesoc_firm.system.derived import Clock
 from fusesoc_firm.system.maps import port_map

@@ -16,7 +16,8 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from fusesoc_firm.converter.limits import check_fixed_size
-from fusesoc_firm.converter.ports import FieldPort, field_ports, vhdl_type
+from fusesoc_firm.converter.ports import FieldPort, field_ports
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.naming import distinct_identifiers, identifier

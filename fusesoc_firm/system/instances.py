@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.system.derived import AcceleratorBlock, AcceleratorType, Converter, DerivedSystem
 from fusesoc_firm.system.maps import port_map

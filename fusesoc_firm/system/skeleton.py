@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.message_ports import message_side
-from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.converter.program import has_bytes
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.length import sent_length_of
 from fusesoc_firm.frame.model import Loop, Node
 from fusesoc_firm.naming import distinct_identifiers, identifier

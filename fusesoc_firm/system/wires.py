@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fusesoc_firm.converter.payload_length import length_entity, length_ports
-from fusesoc_firm.converter.ports import field_ports, vhdl_type
+from fusesoc_firm.converter.ports import field_ports
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.crossing_wires import SourceSide, crossing_configuration, field_pairs
 from fusesoc_firm.system.crossings import Crossing, crossings, port_of
 from fusesoc_firm.system.derived import Connection, DerivedSystem, End, LengthSource, PayloadLength
