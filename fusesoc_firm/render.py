@@ -16,7 +16,7 @@ templates, and the tree is expanded here, by these rules:
 * A list holds mappings, each the scope of its turn, or strings and integers, which `{{.}}` prints. Within it, `@first`
   and `@last` are bools: whether this is the first turn, and the last.
 * `{{|}}` begins a column: in neighbouring lines, what follows it begins at the same place. `{{|20}}` begins it behind
-  20 characters at least.
+  20 characters at least. `{{|!}}` in a line parts it from those before.
 * `{{> name}}` includes `partials/name.mustache`; alone on a line, its indentation is that of every line included.
 """
 
@@ -69,7 +69,9 @@ _MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001
 _STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
 # Where a column begins, and behind how many characters at least.
 _COLUMN = re.compile("\ue002(\\d*)\ue003")
+_PARTED = "\ue004"
 _COLUMN_KEY = re.compile(r"\|(?P<least>\d*)")
+_PARTED_KEY = "|!"
 _SUM_KEY = re.compile(r"(?P<name>.+?)(?P<addend>[+-]\d+)")
 
 
@@ -321,7 +323,12 @@ def _in_columns(text: str) -> str:
     lines: list[str] = []
     rows = (_COLUMN.split(line) for line in text.split("\n"))
     for has_columns, run in groupby(rows, key=lambda row: len(row) > 1):
-        block = [*run]
+        block: list[list[str]] = []
+        for first, *others in run:
+            if _PARTED in first:
+                lines += _aligned(block)
+                block = []
+            block.append([first.replace(_PARTED, ""), *others])
         lines += _aligned(block) if has_columns else [line for (line,) in block]
     return "\n".join(lines)
 
@@ -408,6 +415,8 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
 
 def _value(key: str) -> _Node:
     """What a tag prints: `x`, `comment x` or `x-1`, or the beginning of a column."""
+    if key == _PARTED_KEY:
+        return _Literal(_PARTED)
     if column := _COLUMN_KEY.fullmatch(key):
         return _Literal(f"\ue002{column['least']}\ue003")
     quote, _, name = key.rpartition(" ")
