@@ -15,7 +15,7 @@ def add_simulator(commands: Any) -> None:
     simulator = command(
         commands,
         "simulator",
-        "build the simulator of a system, and print the command that starts it (docs/transport.md)",
+        "build the simulator of a system, and print the command that starts it (docs/reference/transports.md)",
         'robot_node --transport "pipe:$(firm simulator robot.yaml)"',
         _build_simulator,
     )
@@ -52,7 +52,7 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
 
 def built_simulator(arguments: argparse.Namespace) -> Any:
     """The `BuiltSimulator` that the arguments ask for."""
-    from fusesoc_firm.host.simulator import CoreSources, build_simulator
+    from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
 
     sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)
     return build_simulator(arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources)

@@ -16,10 +16,10 @@ from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.storing import is_beat, store_configuration, store_names, stored_slices
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, stores_of
 from fusesoc_firm.converter.vhdl import bits_of_bool, hexadecimal
-from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.defaults import default_payload
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
-from fusesoc_firm.naming import entity_name, prefixed
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.naming import entity_name, prefixed
 
 Configuration = dict[str, Any]
 

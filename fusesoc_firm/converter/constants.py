@@ -17,8 +17,8 @@ from fusesoc_firm.frame.model import COUNT_BYTES
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import Constant, MessageName, RosVersion, StringType, nested_message
 from fusesoc_firm.message.signature import Definitions, signature
-from fusesoc_firm.naming import distinct_constants, entity_name, prefixed
-from fusesoc_firm.wire import CHARACTER, WIDE_CHARACTER
+from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER
+from fusesoc_firm.text.naming import distinct_constants, entity_name, prefixed
 
 CONSTANTS_TEMPLATE = "vhdl/constants.vhd"
 SIGNATURE = "SIGNATURE"

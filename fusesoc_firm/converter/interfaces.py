@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from fusesoc_firm.naming import distinct_identifiers
+from fusesoc_firm.text.naming import distinct_identifiers
 
 INTERFACE_TEMPLATE = "vhdl/interface.vhd"
 

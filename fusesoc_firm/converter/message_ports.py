@@ -22,7 +22,7 @@ from fusesoc_firm.converter.reserved import reserved_names
 from fusesoc_firm.converter.steps import SET_NAMES
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
-from fusesoc_firm.naming import identifier
+from fusesoc_firm.text.naming import identifier
 
 LENGTH_BITS = 32
 

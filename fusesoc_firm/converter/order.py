@@ -12,7 +12,6 @@ from pathlib import Path
 from fusesoc_firm.converter.config_file import MessageInterfaces, read_config
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import constants_package
-from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Paths, select
@@ -20,7 +19,8 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import Definitions, signature
-from fusesoc_firm.reads import Input
+from fusesoc_firm.store.reads import Input
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
 # The directions and the entity of a frame's converter in each.
 ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}

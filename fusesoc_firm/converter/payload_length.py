@@ -16,7 +16,7 @@ from fusesoc_firm.converter.message_ports import LENGTH_BITS, message_side
 from fusesoc_firm.converter.ports import ros_path
 from fusesoc_firm.frame.length import Align, Bytes, Repeat, Term, sent_length_of
 from fusesoc_firm.frame.model import Data, Frame, Loop, Path
-from fusesoc_firm.naming import entity_name
+from fusesoc_firm.text.naming import entity_name
 
 Configuration = dict[str, Any]
 

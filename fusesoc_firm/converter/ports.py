@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Frame, FrameField, Path
-from fusesoc_firm.naming import distinct_identifiers, identifier
+from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
 # What the templates declare or use by name: a field of that name gets another port name.
 _TAKEN = """

@@ -39,8 +39,8 @@ from fusesoc_firm.converter.program import (
 from fusesoc_firm.converter.slices import Slice, slices_of
 from fusesoc_firm.converter.steps import terminator_of
 from fusesoc_firm.converter.vhdl import LINE, any_of, binary, bits_of_bool, hexadecimal, within
-from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, FrameField, Loop
+from fusesoc_firm.text.diagnostics import fail
 
 Configuration = dict[str, Any]
 

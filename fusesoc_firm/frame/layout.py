@@ -35,7 +35,7 @@ from fusesoc_firm.message.model import (
     SequenceType,
     StringType,
 )
-from fusesoc_firm.wire import CHARACTER, WIDE_CHARACTER, WireRules, WireType
+from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER, WireRules, WireType
 
 Definitions = Mapping[MessageName, MessageDefinition]
 

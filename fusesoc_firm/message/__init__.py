@@ -1,4 +1,4 @@
-"""What a message is: its model, where definitions come from, and the middlewares, each with a line here."""
+"""Message definitions: their model, the sources they are read from, and the ROS middlewares."""
 
 from fusesoc_firm.message import ros1, ros2
 from fusesoc_firm.message.middleware import register

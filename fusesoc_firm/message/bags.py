@@ -25,11 +25,11 @@ from rosbags.rosbag2 import Reader as Rosbag2Reader
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 
-from fusesoc_firm.diagnostics import InputError, fail
 from fusesoc_firm.message.joint import separate_texts
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.reads import in_part
+from fusesoc_firm.store.reads import in_part
+from fusesoc_firm.text.diagnostics import InputError, fail
 
 Reader = Rosbag1Reader | Rosbag2Reader
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 
-from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -20,7 +19,8 @@ from fusesoc_firm.message.model import (
     PrimitiveType,
     SequenceType,
 )
-from fusesoc_firm.wire import WireRules
+from fusesoc_firm.message.wire import WireRules
+from fusesoc_firm.text.diagnostics import fail
 
 MOST_LEVELS = 64
 MOST_FIELDS = 4096

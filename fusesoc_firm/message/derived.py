@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, RosVersion
 from fusesoc_firm.message.parser import action_names, parse_message, parse_sections, service_names
+from fusesoc_firm.text.diagnostics import Diagnostics
 
 # ROS 2 has events of services, and hashes, since the distribution (Iron) that brought this message.
 EVENT_INFO = MessageName("service_msgs", "ServiceEventInfo")

@@ -1,6 +1,6 @@
 """What the two generations of ROS allow in a `.msg` file: one table each, so that the parser never tells them apart.
 
-ROS 1 follows genmsg 0.6.0, ROS 2 follows rosidl_adapter 4.9.5. docs/messages.md lists the few places where FIRM
+ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few places where FIRM
 takes more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.naming import LONGEST_TEXT
+from fusesoc_firm.text.naming import LONGEST_TEXT
 
 LARGEST_SIZE = 2**32 - 1  # the wire counts elements and characters in a uint32
 

@@ -10,9 +10,9 @@ from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from fusesoc_firm.files import read_regular
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES
 from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
+from fusesoc_firm.text.files import read_regular
 
 # What catkin, colcon and ament leave out; colcon puts one into `build`, `install` and `log` itself.
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"})

@@ -9,13 +9,13 @@ import re
 from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.bounds import check_extents
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion, nested_message
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.signature import signature
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 _LINE = "=" * 80
 _PARTING = re.compile(rf"^{_LINE}\s*\n\s*MSG:\s*(\S+)\s*?\n", re.MULTILINE)

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
-from fusesoc_firm.files import read_regular
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files
@@ -29,7 +27,9 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.unsupported import unsupported_word
-from fusesoc_firm.reads import Input, Part
+from fusesoc_firm.store.reads import Input, Part
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
+from fusesoc_firm.text.files import read_regular
 
 # Where users name further places.
 _FURTHER = "; further places: 'paths' of the specification or core, --path"

@@ -1,7 +1,7 @@
 """What a middleware is to all other rooms: where its messages come from, and how they lie on the wire.
 
 A middleware is a module with one `Middleware` value, and the line in `message/__init__.py` that registers it.
-docs/middlewares.md shows how a third one is added.
+docs/how-to/add-a-middleware.md shows how a third one is added.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.model import MIDDLEWARES, InterfaceKind, MessageDefinition, MessageName, RosVersion
-from fusesoc_firm.wire import WireRules
+from fusesoc_firm.message.wire import WireRules
+from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 class Store(Protocol):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
 
-from fusesoc_firm.diagnostics import SourceRef
+from fusesoc_firm.text.diagnostics import SourceRef
 
 
 class _Collected(type):

@@ -16,7 +16,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.message.dialect import LARGEST_SIZE, Dialect, NameRule, dialect_of
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -37,6 +36,7 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.message.piece import Piece, read_lines
 from fusesoc_firm.message.unsupported import unsupported_form, unsupported_word
 from fusesoc_firm.message.values import read_default, read_value
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail, nearest
 
 _SEPARATOR = "---"
 _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)(?:/(msg|srv|action))?/([A-Za-z][A-Za-z0-9_]*)")

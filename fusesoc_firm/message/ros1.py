@@ -6,7 +6,7 @@ from types import MappingProxyType
 from fusesoc_firm.message import dialect, folders, parser, signature, stores
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
-from fusesoc_firm.wire import INTEGER_AND_FLOAT, WireRules
+from fusesoc_firm.message.wire import INTEGER_AND_FLOAT, WireRules
 
 _uint32, _int32 = INTEGER_AND_FLOAT["uint32"], INTEGER_AND_FLOAT["int32"]
 

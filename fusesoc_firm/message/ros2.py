@@ -11,7 +11,7 @@ from types import MappingProxyType
 from fusesoc_firm.message import dialect, folders, parser, signature, stores
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import InterfaceKind, RosVersion
-from fusesoc_firm.wire import INTEGER_AND_FLOAT, WireRules
+from fusesoc_firm.message.wire import INTEGER_AND_FLOAT, WireRules
 
 _RULES = WireRules(
     scalars=MappingProxyType(

@@ -7,9 +7,9 @@ from functools import cached_property
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from fusesoc_firm.diagnostics import fail, nearest
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.text.diagnostics import fail, nearest
 
 # The newest distributions with long-term support that FIRM's round trips are tested against.
 _DEFAULTS = {RosVersion.ROS1: "noetic", RosVersion.ROS2: "jazzy"}

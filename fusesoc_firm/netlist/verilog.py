@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Final
 
-from fusesoc_firm.naming import VERILOG_KEYWORDS
 from fusesoc_firm.netlist.model import Instance, LostRegisterError, Module, Modules, Net, NetlistError, Port
+from fusesoc_firm.text.naming import VERILOG_KEYWORDS
 
 _WORD = 32
 _LEVELS = "01zx"  # by a bit of GHDL's value, and twice that of its mask of levels that are none

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from fusesoc_firm.diagnostics import SourceRef
 from fusesoc_firm.message.model import (
     ArrayType,
     ElementType,
@@ -21,6 +20,7 @@ from fusesoc_firm.message.model import (
     SequenceType,
     StringType,
 )
+from fusesoc_firm.text.diagnostics import SourceRef
 
 Definitions = Mapping[MessageName, MessageDefinition]
 _SEPARATOR = "=" * 80

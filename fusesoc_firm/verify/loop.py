@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.message_ports import MessagePort, message_ports, segment_count
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 
 ENTITY = "firm_verify_loop"
 SUBSCRIBER_ID = 1

@@ -12,8 +12,8 @@ from typing import Any
 
 from fusesoc_firm import __version__
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.outputs import write
-from fusesoc_firm.render import render
+from fusesoc_firm.text.outputs import write
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.campaign import Entry, Settings
 from fusesoc_firm.verify.complexity import Level, Statistics
 from fusesoc_firm.verify.judge import versions

@@ -10,12 +10,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.library_path import library_root
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.tools.library_path import library_root
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 TITLE = "200 converters, generated with an empty store"
 CONVERTERS = 200

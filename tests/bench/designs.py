@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
-from fusesoc_firm.converter.generator import publisher_files, subscriber_files
-from fusesoc_firm.diagnostics import InputError
+from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
-from tests.sim.ghdl import REPOSITORY, Library, core_files
+from fusesoc_firm.text.diagnostics import InputError
+from tests.hdl.ghdl import REPOSITORY, Library, core_files
 
 SUBSCRIBER, PUBLISHER = "subscriber", "publisher"
 CORES = ("axis/package", "axis/axis", "sched/package", "sched/fixed_priority", "manager/manager")

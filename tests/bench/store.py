@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
-from fusesoc_firm.own_code import PACKAGE
+from fusesoc_firm.store.own_code import PACKAGE
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 RUN_TITLE = "A second run of the applications' target `sim`"
 EDIT_TITLE = "An edit in a project of 60 messages"
@@ -82,10 +82,10 @@ EDITS = (
         '"""\n# edited\n',
         frozenset({TEXT, NESTED_TEXT}),
     ),
-    Edit("the module naming.py", "code/fusesoc_firm/naming.py", '"""\n', '"""\n# edited\n', frozenset(_KINDS)),
+    Edit("the module naming.py", "code/fusesoc_firm/text/naming.py", '"""\n', '"""\n# edited\n', frozenset(_KINDS)),
     Edit(
-        "the module host/frames.py, of simulations",
-        "code/fusesoc_firm/host/frames.py",
+        "the module simulation/frames.py",
+        "code/fusesoc_firm/simulation/frames.py",
         '"""\n',
         '"""\n# edited\n',
         frozenset(),

@@ -16,11 +16,11 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.diagnostics import nearest
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.specification import Specification
-from fusesoc_firm.yaml_sections import Section, keys_of
+from fusesoc_firm.system.written.specification import Specification
+from fusesoc_firm.text.diagnostics import nearest
+from fusesoc_firm.text.yaml_sections import Section, keys_of
 from tests.errors.key_sites import KeySite, key_sites, misspellings, spellings_of
 
 SPECS = Path(__file__).resolve().parents[2] / "specs"
@@ -34,7 +34,7 @@ def specifications() -> list[Path]:
     required = {name for name, (_, entry) in keys_of(Specification).items() if entry.is_required}
     found = []
     for path in sorted(SPECS.glob("*/*.yaml")):
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
         if isinstance(content, dict) and required <= content.keys():
             found.append(path)
     return found

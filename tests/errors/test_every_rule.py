@@ -11,7 +11,7 @@ from types import FrameType
 
 import pytest
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from tests.errors.conftest import make_libraries
 from tests.errors.test_spec_errors import SPECIFICATIONS, derive_file
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.text.diagnostics import InputError
 from tests.expected import check_expected
 
 HERE = Path(__file__).parent / "msg"

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
-from fusesoc_firm.system.derived import DerivedSystem
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.system_core import load_system
+from fusesoc_firm.text.diagnostics import InputError
 from tests.expected import check_expected
 
 FOLDER = Path(__file__).parent / "spec"

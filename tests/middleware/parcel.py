@@ -1,4 +1,4 @@
-"""Parcel, a middleware that there is not: the example of docs/middlewares.md.
+"""Parcel, a middleware that there is not: the example of docs/how-to/add-a-middleware.md.
 
 A definition is a file `<Message>.parcel` in the folder of its package, a line for each field:
 
@@ -17,7 +17,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -34,7 +33,8 @@ from fusesoc_firm.message.model import (
     StringType,
 )
 from fusesoc_firm.message.piece import Piece, read_lines
-from fusesoc_firm.wire import INTEGER_AND_FLOAT, WireRules
+from fusesoc_firm.message.wire import INTEGER_AND_FLOAT, WireRules
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail, nearest
 
 RULES = WireRules(
     scalars=MappingProxyType(

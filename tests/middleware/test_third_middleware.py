@@ -17,7 +17,6 @@ import pytest
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE, constants_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode, encode, pack_frame
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
@@ -25,13 +24,14 @@ from fusesoc_firm.message import middleware
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.render import render
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.loop import PUBLISHER_ID, SUBSCRIBER_ID, loop_text
 from fusesoc_firm.verify.simulation import firm_library, simulate, write_frames
-from tests.unit.frame.oracle import is_same
+from tests.frame.oracle import is_same
 
 SEED = 20241123
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "middlewares.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "add-a-middleware.md"
 MODULE = Path(__file__).parent / "parcel.py"
 POSE, SCAN = MessageName("lab", "Pose"), MessageName("lab", "Scan")
 DEFINITIONS = {
@@ -182,7 +182,7 @@ def test_a_system_speaks_it(package: Path) -> None:
         f"raise SystemExit(main(['system', 'check', {str(specification)!r}, '--path', {str(package)!r}]))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=PAGE.parents[1]
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=PAGE.parents[2]
     )
     assert done.stdout.endswith("lab is right: 1 subscriber, 0 accelerators, 1 publisher\n"), done.stderr
 
