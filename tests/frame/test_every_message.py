@@ -81,6 +81,7 @@ def check_all(
         check(frame, serialise, stimuli.message(name, kind), kind)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("ros", "distribution"), [(ros, name) for ros in RosVersion for name in distributions(ros)])
 def test_every_message_of_a_distribution_against_rosbags(ros: RosVersion, distribution: str) -> None:
     chance = new_seed()
