@@ -53,6 +53,7 @@ def test_random_states_and_latency(tmp_path: Path) -> None:
     assert int(found[1]) == LATENCY
 
 
+@pytest.mark.check
 def test_ros2(tmp_path: Path) -> None:
     system = simulation(for_ros2("robotic_arm", tmp_path), tmp_path / "system", *CORES)
     assert system.passes(SEED=4)
@@ -75,6 +76,7 @@ def test_synthesis_makes_no_latch_and_verilog(accelerator: Library) -> None:
     assert not re.search(r"\$signed\([^;]*>>[^>]", netlist)
 
 
+@pytest.mark.check
 def test_the_netlist_answers_alike(tmp_path: Path) -> None:
     """Of the first states of the stimuli, which hold all kinds: a netlist is slow."""
     stimuli = yaml.safe_load((ARM / "stimuli.yaml").read_text())

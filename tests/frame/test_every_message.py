@@ -73,6 +73,7 @@ def check_all(
         check(frame, serialise, stimuli.message(name, kind), kind)
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("ros", "distribution"), [(ros, name) for ros in (ROS1, ROS2) for name in ros.distributions()])
 def test_every_message_of_a_distribution_against_rosbags(ros: Middleware, distribution: str) -> None:
     chance = new_seed()

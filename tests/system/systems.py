@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from fusesoc_firm.message import ROS1, ROS2
@@ -57,6 +58,30 @@ def read(folder: Path, text: str) -> tuple[Specification, Diagnostics]:
 def derived(folder: Path, text: str) -> DerivedSystem:
     found, faults = read(folder, text)
     return derive(found, folder, LIBRARIES, faults)
+
+
+_INSTANCE = re.compile(
+    r"^  (\w+) : (?:entity|component) [\w.]+\n(.*?)^    port map \(\n(.*?)^    \);", re.DOTALL | re.MULTILINE
+)
+_ASSOCIATION = re.compile(r"^ +(\S+) +=> (.*?),?$", re.MULTILINE)
+
+
+def maps(text: str) -> dict[str, tuple[dict[str, str], dict[str, str]]]:
+    """The generic and the port map of each instance of a top level, by its label."""
+    found = _INSTANCE.findall(text)
+    return {
+        label: (dict(_ASSOCIATION.findall(given)), dict(_ASSOCIATION.findall(ports))) for label, given, ports in found
+    }
+
+
+def signals(text: str) -> list[str]:
+    """The signals that a top level declares."""
+    return re.findall(r"^  signal (\w+) ", text, re.MULTILINE)
+
+
+def targets(text: str) -> list[str]:
+    """The targets of the assignments of a top level."""
+    return re.findall(r"^  (\S+) +<= ", text, re.MULTILINE)
 
 
 def connections(system: DerivedSystem) -> list[str]:

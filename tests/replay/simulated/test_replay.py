@@ -75,6 +75,7 @@ def pass_through(system: PassThrough, folder: Path) -> None:
     assert received(target) == sent
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("distribution", FEW)
 def test_what_passes_through_is_the_same(tmp_path: Path, distribution: str) -> None:
     pass_through(PassThrough(distribution, FEW[distribution], 6, SEED), tmp_path)
@@ -131,6 +132,7 @@ def test_frames_that_interrupt_each_other(tmp_path: Path, builds: Path, monkeypa
     assert len(bursts) > len(found)
 
 
+@pytest.mark.check
 def test_a_system_answers_the_same_wherever_a_block_is(tmp_path: Path, builds: Path) -> None:
     chance, oracle = random.Random(SEED), Oracle(ROS1)
     images = [oracle.serialise("sensor_msgs/Image", image("ROS", chance, 4, 6, 3)) for _ in range(4)]
