@@ -9,7 +9,7 @@ from fractions import Fraction
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
@@ -46,7 +46,7 @@ from fusesoc_firm.system.hardware.hls import WRAPPER_TEMPLATE, wrapper_configura
 from fusesoc_firm.system.written.specification import Accelerator, Specification, is_core, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.text.naming import identifier
-from fusesoc_firm.text.render import render
+from fusesoc_firm.text.render import Context, render
 
 CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
 """Finds the folders of the messages of cores, given by name and place. Raises `InputError` for an unknown one."""
@@ -214,7 +214,7 @@ class Artifact:
     path: str
     part: Part
     template: str
-    configuration: Configuration
+    configuration: Context
 
     @cached_property
     def text(self) -> str:
