@@ -158,6 +158,30 @@ def test_files_of_all_targets_and_flags_are_found(project: Path) -> None:
     assert "firm_generator.py" in {path.name for path in cores["generators"].files}
 
 
+def test_conditions_and_appended_lists_are_read_as_fusesoc_does(project: Path) -> None:
+    filesets = """\
+filesets:
+  base: &base
+    files: ["!tool_ghdl ? (a.vhd target_sim ? (b.vhd c.vhd))", "d.vhd e.vhd": {file_type: vhdlSource-93}]
+    depend: [">=me:p:leaf:0.9", "tool_ghdl ? (^me:p:branch:1.0)"]
+  rest: {files_append: [f.vhd], depend_append: ["me:p:top:1.0"]}
+"""
+    (project / "other/other.core").write_text(OTHER.replace("targets:", f"{filesets}targets:"))
+    (core,) = [core for core in project_cores() if core.vlnv == "me:p:other:1.0"]
+    assert [path.stem for path in core.files] == ["other", *"abcdef"]
+    assert core.depends == {"me:p:leaf", "me:p:branch", "me:p:top"}
+
+
+def test_the_configuration_is_the_one_that_fusesoc_is_told(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    conf = (project / "fusesoc.conf").rename(project / "another.conf")
+    assert main(["graph", "me:p:branch", "--format", "dot"]) == 1
+    monkeypatch.setenv("FUSESOC_CONFIG", str(conf))
+    assert main(["graph", "me:p:branch", "--format", "dot"]) == 0
+    assert "me:p:branch" in capsys.readouterr().out
+
+
 def test_graph(project: Path, capsys: Captured) -> None:
     assert main(["graph", "me:p:top", "--format", "dot"]) == 0
     lines = capsys.readouterr().out.splitlines()
