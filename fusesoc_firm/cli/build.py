@@ -117,7 +117,8 @@ def _generate(plan: Plan, jobs: int, bar: Any) -> None:
 
 def _answer(line: Sequence[str]) -> bool:
     """Answer a call of one of our generators, of which this is the command line, from the store."""
-    from fusesoc_firm.plugin.gapi import GENERATORS, answer_from_store
+    from fusesoc_firm.plugin.answer import answer_from_store
+    from fusesoc_firm.plugin.generators import GENERATORS
     from fusesoc_firm.tools.library_path import library_root
 
     *_, script, path = line

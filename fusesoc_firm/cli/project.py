@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import add_picture, command
-from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.diagnostics import InputError, SourceRef, fail
 
 if TYPE_CHECKING:
     from fusesoc_firm.building.cores import Instance, ProjectCore
-    from fusesoc_firm.plugin.gapi import MessageCores
     from fusesoc_firm.plugin.lock import Lock
-    from fusesoc_firm.request.request import Request
-    from fusesoc_firm.store.reads import Input
+    from fusesoc_firm.request.request import LoadedRequest, Request
 
 
 def add_project(commands: Any) -> None:
@@ -115,12 +113,12 @@ def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
     return lock_of(core, depends, calls)
 
 
-def _calls(core: ProjectCore) -> Iterator[tuple[Request, Sequence[Input]]]:
-    from fusesoc_firm.plugin.gapi import GENERATORS, MESSAGES
+def _calls(core: ProjectCore) -> Iterator[tuple[Request, LoadedRequest]]:
+    from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES
 
     for instance in core.instances:
         if instance.generator != MESSAGES and (request := _request(instance)):
-            yield request, GENERATORS[request.command].inputs(request)
+            yield request, GENERATORS[request.command].load(request)
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
@@ -142,38 +140,36 @@ def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
 
 def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
     """All that a generated core is made of, our own files too."""
-    from fusesoc_firm.plugin.gapi import GENERATORS, used_before
-    from fusesoc_firm.store.own_code import PACKAGE, digests
+    from fusesoc_firm.store.own_code import PACKAGE, names
 
     try:
         request = _request(instance)
         if request is None:
             return set()
         files = set(_input_files(request))
-        used = used_before(request, GENERATORS[request.command])
     except InputError:
         # It cannot be made: whatever changed beside it, or in our own files, may be why.
         roots = (instance.files_root.resolve(), PACKAGE)
         return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
-    # What was not made before may use any.
-    return files | {PACKAGE / name for name in (digests() if used is None else used)}
+    return files | {PACKAGE / name for name in names()}
 
 
 def _request(instance: Instance) -> Request | None:
     """The request that FuseSoC would make; None for a generator that is not ours."""
-    from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
+    from fusesoc_firm.plugin.generators import GENERATORS
+    from fusesoc_firm.request.calls import make_request
+    from fusesoc_firm.request.request import GeneratorCall
 
     if instance.generator not in GENERATORS:
         return None
-    known = GENERATORS[instance.generator]
-    call = Call(instance.vlnv, instance.files_root, instance.parameters)
-    return make_request(instance.generator, call, known, message_folders)
+    call = GeneratorCall(instance.generator, instance.vlnv, str(instance.files_root), instance.parameters)
+    return make_request(call, GENERATORS[instance.generator].parameters, message_folders)
 
 
-def message_folders(names: MessageCores) -> tuple[Path, ...]:
+def message_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     """The folders of cores that carry messages, where these lie: there is no run that copies them."""
     from fusesoc_firm.building.cores import project_cores
-    from fusesoc_firm.plugin.gapi import MESSAGES
+    from fusesoc_firm.plugin.generators import MESSAGES
     from fusesoc_firm.request.message_core import folders
 
     found: list[Path] = []
@@ -189,9 +185,10 @@ def message_folders(names: MessageCores) -> tuple[Path, ...]:
 
 def _input_files(request: Request) -> list[Path]:
     """The files that a request depends on, be it in part."""
-    from fusesoc_firm.plugin.gapi import GENERATORS
+    from fusesoc_firm.plugin.generators import GENERATORS
 
-    found = (item if isinstance(item, Path) else item.path for item in GENERATORS[request.command].inputs(request))
+    inputs = GENERATORS[request.command].load(request).inputs
+    found = (item if isinstance(item, Path) else item.path for item in inputs)
     return [*dict.fromkeys(path.resolve() for path in found)]
 
 

@@ -28,7 +28,8 @@ def add_why(commands: Any) -> None:
 
 
 def _tell_why(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.plugin.gapi import GENERATORS, read_request
+    from fusesoc_firm.plugin.answer import read_request
+    from fusesoc_firm.plugin.generators import GENERATORS
     from fusesoc_firm.plugin.why import call_file, reasons, rendering_of
 
     path, number = _split(arguments.place)
@@ -36,13 +37,13 @@ def _tell_why(arguments: argparse.Namespace) -> None:
         fail(f"there is no file {path}", hint="after its name stands a line, or nothing: FILE:LINE")
     call, name = call_file(path)
     command_ = _generator(call)
-    request = read_request(command_, call, GENERATORS[command_], is_this_run=False)
+    request = read_request(command_, call, GENERATORS[command_])
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         fail(f"{path} is no text that can be read: {error}")
-    generator = GENERATORS[command_]
-    rendering = rendering_of(lambda: generator.generate(request), name, text, generator.inputs(request))
+    loaded = GENERATORS[command_].load(request)
+    rendering = rendering_of(loaded.generate, name, text, loaded.inputs)
     found = reasons(rendering, _names(request))
     if number is None:
         for count, reason in enumerate(found, start=1):
@@ -66,7 +67,7 @@ def _split(text: str) -> tuple[Path, int | None]:
 
 def _generator(call: Path) -> str:
     """The generator that a call is for: FuseSoC does not write it down."""
-    from fusesoc_firm.plugin.gapi import MESSAGES
+    from fusesoc_firm.plugin.generators import MESSAGES
     from fusesoc_firm.text.yaml_text import yaml_data
 
     given = yaml_data(call.read_text(encoding="utf-8")).get("parameters") or {}

@@ -16,7 +16,8 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.message.library import libraries
-from fusesoc_firm.system.system_core import CoreFolders, LoadedSystem, load_system, no_core_folders, with_paths
+from fusesoc_firm.request.request import CoreFolders, no_core_folders
+from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.yaml_text import yaml_data
 
