@@ -5,39 +5,24 @@ What a core consists of is read for all its targets and flags together, so nothi
 
 from __future__ import annotations
 
-import re
+import os
 import subprocess
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from fusesoc_firm.request.core_reader import CoreFile, read_core
+from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import render
-from fusesoc_firm.text.yaml_text import yaml_data
 
 GRAPH_TEMPLATE = "dot/cores.dot"
-
-# A part of a core that depends on a flag: `target_sim ? (x)`.
-_CONDITION = re.compile(r"!?\w+\s*\?\s*\(([^()]*)\)")
-_RELATIONS = "<>=~^ "
-
-
-@dataclass(frozen=True)
-class Instance:
-    """A generated core that a core asks for: its full name, and the call of its generator."""
-
-    vlnv: str
-    generator: str
-    files_root: Path
-    parameters: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class ProjectCore:
-    """A core: its name, its files with its description first, what it depends on, what it has generated.
+    """A core: its name, its files with its description first, what it depends on, the calls of generators it makes.
 
     `names` are those by which others can depend on it, and `depends` names of that kind: vendor, library and name.
     """
@@ -46,15 +31,14 @@ class ProjectCore:
     names: frozenset[str]
     files: tuple[Path, ...]
     depends: frozenset[str]
-    instances: tuple[Instance, ...]
+    calls: tuple[GeneratorCall, ...]
 
 
 def project_cores() -> list[ProjectCore]:
     """Every core in FuseSoC's libraries, as `fusesoc` finds them in the current folder, sorted by name."""
-    from fusesoc.config import Config
     from fusesoc.fusesoc import Fusesoc
 
-    found = Fusesoc(Config()).get_cores()
+    found = Fusesoc(configuration()).get_cores()
     return [_core(name, Path(found[name].core_file)) for name in sorted(found)]
 
 
@@ -63,10 +47,10 @@ def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
 
     Raises `InputError` if there is no such core, or if something that it depends on is missing.
     """
-    manager, top = _found(core)
+    fusesoc, top = _found(core)
     needed: dict[str, Path] = {}
     for target in top.get_data({}).targets:
-        needed |= {str(item.name): Path(item.core_file) for item in _solved(manager, top, target)}
+        needed |= {str(item.name): Path(item.core_file) for item, _ in solved(fusesoc, top, target)}
     needed.pop(str(top.name), None)
     return _core(str(top.name), Path(top.core_file)), [_core(name, needed[name]) for name in sorted(needed)]
 
@@ -112,26 +96,21 @@ def _git(folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]]) -> str:
+def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list[str]]) -> str:
     """What a target of a core depends on, in Graphviz's language: cores, what is generated for them, and of what.
 
     Raises `InputError` if there is no such core or target, or if something that it depends on is missing.
     """
-    manager, top = _found(core)
-    flags = _flags(top, target)
-    solved = _solved(manager, top, target)
-    names = {name: str(item.name) for item in solved for name in _names(item.core_file)}
+    fusesoc, top = _found(core)
+    cores = solved(fusesoc, top, target)
+    names = {name: str(item.name) for item, _ in cores for name in _names(read_core(Path(item.core_file)))}
     edges: list[tuple[str, str]] = []
     generated: dict[str, str] = {}
     sources: dict[str, None] = {}
-    for item in solved:
-        own = {**flags, "is_toplevel": item is solved[-1]}
-        needed = [names.get(_short(str(depend)), "") for depend in item.get_depends(own)]
+    for item, flags in cores:
+        needed = [names.get(_short(str(depend)), "") for depend in item.get_depends(flags)]
         edges += [(str(item.name), name) for name in needed if name]
-        for call in item.get_ttptttg(own):
-            made = Instance(
-                _instance_name(str(item.name), call["name"]), call["generator"], Path(item.files_root), call["config"]
-            )
+        for made in calls_of(item, flags):
             generated[made.vlnv] = made.generator
             edges.append((str(item.name), made.vlnv))
             for source in inputs_of(made):
@@ -140,7 +119,7 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
     return render(
         GRAPH_TEMPLATE,
         {
-            "cores": [{"name": str(item.name)} for item in solved],
+            "cores": [{"name": str(item.name)} for item, _ in cores],
             "generated": [{"name": name, "generator": generator} for name, generator in generated.items()],
             "sources": [{"name": name} for name in sources],
             "edges": [{"from": start, "to": end} for start, end in edges],
@@ -148,86 +127,90 @@ def core_graph(core: str, target: str, inputs_of: Callable[[Instance], list[str]
     )
 
 
-def _found(core: str) -> tuple[Any, Any]:
-    """FuseSoC's manager of cores, and the core of this name."""
+def configuration() -> Any:
+    """What FuseSoC is configured to in the current folder, as its own command reads it."""
     from fusesoc.config import Config
+
+    return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
+
+
+def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, Any]]]:
+    """All cores of a target, those that others depend on first, the core itself last, each with its flags.
+
+    Raises `InputError` if there is no such target, or if something that it depends on is missing.
+    """
+    from fusesoc.coremanager import DependencyError
+
+    try:
+        flags = {**top.get_flags(target), "target": target}
+        cores = fusesoc.cm.get_depends(top.name, {**flags, "is_toplevel": True})
+    except DependencyError as error:
+        fail(f"{top.name} depends on what FuseSoC does not know here: {error.value}")
+    except RuntimeError as error:
+        fail(str(error))
+    return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
+
+
+def _found(core: str) -> tuple[Any, Any]:
+    """FuseSoC, and the core of this name."""
     from fusesoc.coremanager import DependencyError
     from fusesoc.fusesoc import Fusesoc
-    from fusesoc.vlnv import Vlnv
 
-    manager = Fusesoc(Config()).cm
+    fusesoc = Fusesoc(configuration())
     try:
-        return manager, manager.get_core(Vlnv(core))
+        return fusesoc, fusesoc.get_core(core)
     except (DependencyError, SyntaxError):
         fail(f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
 
 
-def _flags(top: Any, target: str) -> dict[str, Any]:
-    try:
-        return {**top.get_flags(target), "target": target}
-    except RuntimeError as error:
-        fail(str(error))
-
-
-def _solved(manager: Any, top: Any, target: str) -> list[Any]:
-    """All cores of a target, those that others depend on first, the core itself last."""
-    from fusesoc.coremanager import DependencyError
-
-    try:
-        return list(manager.get_depends(top.name, {**_flags(top, target), "is_toplevel": True}))
-    except DependencyError as error:
-        fail(f"{top.name} depends on what FuseSoC does not know here: {error}")
+def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
+    """The calls of generators that a core of FuseSoC makes with these flags."""
+    for call in core.get_ttptttg(dict(flags)):
+        yield _call(str(core.name), call["name"], call["generator"], core.files_root, call["config"])
 
 
 def _core(vlnv: str, path: Path) -> ProjectCore:
-    data = _data(path)
-    filesets = [item for item in _mapping(data, "filesets").values() if isinstance(item, dict)]
-    files = [file for fileset in filesets for item in fileset.get("files") or () for file in _words(_file(item))]
-    files += [str(item["command"]) for item in _mapping(data, "generators").values() if "command" in item]
-    depends = {_short(word) for fileset in filesets for item in fileset.get("depend") or () for word in _words(item)}
+    core = read_core(path)
+    filesets = core.section("filesets").values()
+    files = [word for fileset in filesets for item in _listed(fileset, "files") for word in _words(_file(item))]
+    files += [str(item["command"]) for item in core.section("generators").values() if "command" in item]
+    depends = {_short(word) for fileset in filesets for item in _listed(fileset, "depend") for word in _words(item)}
     return ProjectCore(
         vlnv,
-        frozenset(_names(path)),
+        frozenset(_names(core)),
         (path.resolve(), *((path.parent / file).resolve() for file in dict.fromkeys(files))),
         frozenset(depends),
-        tuple(_instances(vlnv, path, data)),
+        tuple(_calls(vlnv, core)),
     )
 
 
-def _instances(vlnv: str, path: Path, data: Mapping[str, Any]) -> Iterator[Instance]:
-    """Each instance, and again with the parameters that a target changes."""
-    known = _mapping(data, "generate")
-    calls: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
-    for target in _mapping(data, "targets").values():
-        for item in target.get("generate") or ():
-            calls += item.items() if isinstance(item, dict) else ()
-    for name, changed in calls:
-        section = known.get(name) or {}
-        parameters = {**(section.get("parameters") or {}), **changed}
-        yield Instance(_instance_name(vlnv, name), str(section.get("generator")), path.parent, parameters)
+def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
+    """The call of each instance, and again with the parameters that a target changes."""
+    known = core.section("generate")
+    changes: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
+    for target in core.section("targets").values():
+        for item in _listed(target, "generate"):
+            changes += item.items() if isinstance(item, dict) else ()
+    for name, changed in changes:
+        generator = str(known.get(name, {}).get("generator"))
+        yield _call(vlnv, name, generator, core.path.parent, {**core.parameters(name), **(changed or {})})
 
 
-def _instance_name(vlnv: str, instance: str) -> str:
+def _call(vlnv: str, instance: str, generator: str, folder: Path | str, parameters: Mapping[str, Any]) -> GeneratorCall:
     vendor, library, name, version = vlnv.split(":")
-    return f"{vendor}:{library}:{name}-{instance}:{version}"
+    return GeneratorCall(
+        generator, f"{vendor}:{library}:{name}-{instance}:{version}", str(Path(folder).absolute()), parameters
+    )
 
 
-def _names(path: Path | str) -> list[str]:
+def _names(core: CoreFile) -> list[str]:
     """The names that a core has or stands for."""
-    data = _data(Path(path))
-    return [_short(str(name)) for name in (data.get("name", ""), *(data.get("virtual") or ()))]
+    return [_short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
 
 
-def _data(path: Path) -> dict[str, Any]:
-    try:
-        data = yaml_data(path.read_text(encoding="utf-8").removeprefix("CAPI=2:"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        fail(f"cannot read {path}: {error}")
-    return data if isinstance(data, dict) else {}
-
-
-def _mapping(data: Mapping[str, Any], section: str) -> dict[str, Any]:
-    return {name: item or {} for name, item in (data.get(section) or {}).items()}
+def _listed(section: Mapping[str, Any], key: str) -> list[Any]:
+    """A list of a section, with what it adds to an inherited one."""
+    return [item for name in (key, f"{key}_append") for item in section.get(name) or ()]
 
 
 def _file(item: object) -> str:
@@ -236,14 +219,25 @@ def _file(item: object) -> str:
 
 
 def _words(item: object) -> list[str]:
-    """What a condition gives when it holds, or the words themselves."""
-    text, count = str(item), 1
-    while count:
-        text, count = _CONDITION.subn(r"\1", text)
-    return text.split()
+    """What a text means for any flags: `target_sim ? (x)` is x. One that FuseSoC refuses stays as it is."""
+    from fusesoc.capi2.exprs import parse
+
+    def words(tree: Iterable[Any]) -> Iterator[str]:
+        for part in tree:
+            yield from part.split() if isinstance(part, str) else words(part[2])
+
+    try:
+        return [*words(parse(str(item)))]
+    except ValueError:
+        return [str(item)]
 
 
-def _short(vlnv: str) -> str:
-    """Vendor, library and name of a core, whatever its version."""
-    parts = vlnv.strip(_RELATIONS).split(":")
-    return ":".join(parts[:3])
+def _short(name: str) -> str:
+    """Vendor, library and name of a core, whatever its version. A name that FuseSoC refuses stays as it is."""
+    from fusesoc.vlnv import Vlnv
+
+    try:
+        core = Vlnv(name)
+    except SyntaxError:
+        return name
+    return f"{core.vendor}:{core.library}:{core.name}"

@@ -23,6 +23,7 @@ from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES, Generator
 from fusesoc_firm.plugin.recall import LOCKED, SEARCHED, call_digest, hold, messages_fact
 from fusesoc_firm.plugin.run import message_folders, run_of, write_core
 from fusesoc_firm.request.calls import make_request, read_call
+from fusesoc_firm.request.core_reader import core_name
 from fusesoc_firm.request.request import LoadedRequest, Request, as_files
 from fusesoc_firm.request.requesting_core import find_requesting_core
 from fusesoc_firm.store import own_code
@@ -134,10 +135,10 @@ def read_request(
 
     def find(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
         if further is not None:
-            further.extend(messages_fact(str(generated), _core_name(name), run or "") for name in names)
+            further.extend(messages_fact(str(generated), core_name(name), run or "") for name in names)
         return _folders_of_run(names, str(generated), run)
 
-    return make_request(read_call(command, path), generator.parameters, find)
+    return make_request(read_call(path, command), generator.parameters, find)
 
 
 def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
@@ -199,18 +200,13 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
     faults = Diagnostics()
     found: list[Path] = []
     for name, source in names.items():
-        current = message_folders(generated, _core_name(name), run)
+        current = message_folders(generated, core_name(name), run)
         if not current:
             hint = "the requesting core depends on it, and it has the generator firm_messages in its target 'default'"
             faults.error(f"there are no messages of core '{name}'", source, hint)
         found += map(Path, current)
     faults.raise_if_any()
     return tuple(found)
-
-
-def _core_name(vlnv: str) -> str:
-    """The name of a core without its version."""
-    return ":".join(vlnv.split(":")[:3])
 
 
 def _check_locked(request: Request, loaded: LoadedRequest) -> bool:
@@ -223,7 +219,7 @@ def _check_locked(request: Request, loaded: LoadedRequest) -> bool:
             fail(f"{LOCKED} is '{name}'", hint=f"a generator has a folder of its own; write {LOCKED}=$PWD/{name}")
         places.append(Path(name))
     for place in places:
-        from fusesoc_firm.plugin.lock import check_request
+        from fusesoc_firm.plugin.lock_file import check_request
 
         check_request(place, request, loaded)
     return bool(places)

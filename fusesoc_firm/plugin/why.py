@@ -12,10 +12,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fusesoc_firm.converter.converter_core import order_of_request
 from fusesoc_firm.message.model import MessageName, nested_message
 from fusesoc_firm.message.signature import Definitions
-from fusesoc_firm.request.request import GeneratedCore
+from fusesoc_firm.plugin.answer import read_request
+from fusesoc_firm.plugin.generators import GENERATORS
+from fusesoc_firm.request.calls import read_call
+from fusesoc_firm.request.request import GeneratedCore, Request
+from fusesoc_firm.request.requesting_core import find_requesting_core
 from fusesoc_firm.store.reads import Input
+from fusesoc_firm.system.system_core import load_requested
 from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.naming import identifier
@@ -45,6 +51,40 @@ class Names:
     blocks: Mapping[str, SourceRef]
     fields: Mapping[str, Mapping[str, SourceRef]]
     messages: Mapping[str, Mapping[str, SourceRef]]
+
+
+def why(path: Path) -> list[Reason]:
+    """Why each line of a generated file of a build is as it is. Raises `InputError`."""
+    call, name = call_file(path)
+    command = _generator(call)
+    request = read_request(command, call, GENERATORS[command])
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        fail(f"{path} is no text that can be read: {error}")
+    loaded = GENERATORS[command].load(request)
+    rendering = rendering_of(loaded.generate, name, text, loaded.inputs)
+    return reasons(rendering, _names(request))
+
+
+def _generator(path: Path) -> str:
+    """The generator that a call is for. FuseSoC's file does not say it, but the core that makes the call does."""
+    call = read_call(path)
+    generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
+    if generator not in GENERATORS:
+        fail(
+            f"no core in {call.files_root} has a generator of ours make {call.vlnv} any more",
+            hint="generate it again with fusesoc run --setup",
+        )
+    return generator
+
+
+def _names(request: Request) -> Names:
+    """What a line of a generated core may name."""
+    if request.command == "far":
+        loaded = load_requested(request)
+        return names_of(loaded.specification, loaded.messages())
+    return names_of(None, [(wanted.message, wanted.definitions) for wanted in order_of_request(request).messages])
 
 
 def rendering_of(

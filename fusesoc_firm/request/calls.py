@@ -14,7 +14,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 from fusesoc_firm.text.yaml_text import yaml_data
 
 
-def read_call(generator: str, path: Path) -> GeneratorCall:
+def read_call(path: Path, generator: str = "") -> GeneratorCall:
     """The call in FuseSoC's file, which does not name the generator. Raises `InputError`."""
     try:
         call = yaml_data(path.read_text(encoding="utf-8"))

@@ -10,7 +10,6 @@ folder of the build. A second call builds what has changed.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
 import re
@@ -18,19 +17,20 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from fusesoc_firm.request.core_reader import CoreFile, read_core
 from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.store.layout import default_root
-from fusesoc_firm.system.beside import core_content, core_of, load_beside
+from fusesoc_firm.system.beside import core_of, load_beside
 from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
 from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.text.files import write_if_changed
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import missing, simulation_programs, ways
@@ -93,7 +93,7 @@ def build_simulator(
         fail(f"not installed: {' '.join(absent)}", hint="; ".join(ways(program) for program in absent))
     spec = spec.resolve()
     folder = _build_folder(spec, tool, build_root or Path(default_root()) / "simulators")
-    with _alone_in(folder):
+    with locked(folder):
         core = core_of(spec) or _write_core(spec, folder / "core", sources or CoreSources())
         work = folder / "work"
         is_new = not work.exists()
@@ -108,7 +108,7 @@ def build_simulator(
         return BuiltSimulator(tool, work, tuple(_words(work, tool)))
 
 
-def _write_core(spec: Path, folder: Path, sources: CoreSources) -> Path:
+def _write_core(spec: Path, folder: Path, sources: CoreSources) -> CoreFile:
     """A core for a specification that has none."""
     paths = [path.absolute() for path in sources.paths]
     loaded = load_beside(spec, paths, sources.distro or None, core_folders=sources.core_folders)
@@ -122,7 +122,7 @@ def _write_core(spec: Path, folder: Path, sources: CoreSources) -> Path:
     )
     core = folder / f"{_short_name(spec)}.core"
     write_if_changed(core, new_core(system, str(spec), options))
-    return core
+    return read_core(core)
 
 
 def _build_folder(spec: Path, tool: str, root: Path) -> Path:
@@ -141,24 +141,16 @@ def _short_name(spec: Path) -> str:
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", spec.stem).lstrip("-")[:60]
 
 
-@contextmanager
-def _alone_in(folder: Path) -> Iterator[None]:
-    """Two builds in one folder wait for each other."""
-    with (folder / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-
-
-def _build(spec: Path, core: Path, tool: str, work: Path) -> None:
+def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
     """Have FuseSoC set the target up, and make what it says."""
-    content, target = core_content(core), _TARGETS[tool]
-    if target not in content.get("targets", {}):
-        fail(f"{core} has no target '{target}'", hint=f"firm system core {spec}")
-    made_with = content["targets"][target].get("flow_options", {}).get("tool", tool)
+    targets, target = core.section("targets"), _TARGETS[tool]
+    if target not in targets:
+        fail(f"{core.path} has no target '{target}'", hint=f"firm system core {spec}")
+    made_with = targets[target].get("flow_options", {}).get("tool", tool)
     if made_with != tool:
-        fail(f"{core}: target '{target}' is for {made_with}", hint=f"--tool {made_with}")
-    command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.parent]
-    command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, content["name"]]
+        fail(f"{core.path}: target '{target}' is for {made_with}", hint=f"--tool {made_with}")
+    command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
+    command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, core.data.get("name", "")]
     _run(spec, list(map(str, command)), _project_folder(spec))
     if tool == GHDL:
         # FuseSoC builds nothing before it runs.

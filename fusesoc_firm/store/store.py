@@ -14,7 +14,6 @@ only save work: they need not hold between machines, and are never trusted. `sha
 
 from __future__ import annotations
 
-import fcntl
 import os
 import platform
 import re
@@ -32,6 +31,7 @@ from fusesoc_firm.store import layout, shared_files
 from fusesoc_firm.store.layout import CALL, ENTRY, KEPT, LAYOUT, LOCK, digest, digest_of, place
 from fusesoc_firm.store.own_code import IMPORTED
 from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.file_lock import take
 from fusesoc_firm.text.files import TEMPORARY
 
 Files = Mapping[str, bytes]
@@ -44,7 +44,6 @@ _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 _KEPT_OF_LIMIT = 0.8
 # Who makes an entry may be stopped, or be on a machine that is no more. It is longer than generation takes.
 _LONGEST_WAIT_SECONDS = 120
-_POLL_SECONDS = 0.02
 # What a process that was killed left behind; no file takes so long to be written.
 _ABANDONED_SECONDS = 3600
 
@@ -256,20 +255,8 @@ def _locked(root: str, name: str) -> tuple[int, bool]:
     end = time.monotonic() + _LONGEST_WAIT_SECONDS
     while True:
         handle = shared_files.open_lock(root, name)
-        while not (is_held := _take(handle)) and time.monotonic() < end:
-            time.sleep(_POLL_SECONDS)
+        is_held = take(handle, end - time.monotonic())
         there = shared_files.state(root, name)
         if not is_held or (there and os.path.samestat(os.fstat(handle), there)):
             return handle, is_held
         os.close(handle)
-
-
-def _take(handle: int) -> bool:
-    """Lock a file unless another process has it; a lock that cannot be had at all counts as taken."""
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True

@@ -44,9 +44,9 @@ class Bounds:
 
 
 SMALL = Bounds(2**20, 50_000)
-"""A specification, a configuration, a board, a core."""
+"""A specification, a configuration, a board."""
 LARGE = Bounds(2**26, 5_000_000)
-"""Data, such as stimuli with images."""
+"""Data, such as stimuli with images, and what others may have generated, such as a core."""
 
 
 class TooLargeError(Exception):
@@ -255,12 +255,23 @@ def integer(text: str) -> int:
 def yaml_data(text: str) -> Any:
     """What a text means: mappings, lists and scalars. Raises `yaml.YAMLError` for whatever means nothing."""
     try:
-        constructor = yaml.SafeLoader("")
-        root = _composed(text, LARGE)
-        return None if root is None else constructor.construct_document(root)
-    except (ValueError, TypeError, LookupError, OverflowError, TooLargeError) as error:
+        return data_of(_composed(text, LARGE))
+    except TooLargeError as error:
+        raise yaml.YAMLError(str(error)) from error
+
+
+def data_of(root: yaml.Node | None) -> Any:
+    """What the nodes of a text mean. Raises `yaml.YAMLError` for whatever means nothing."""
+    try:
+        return None if root is None else yaml.SafeLoader("").construct_document(root)
+    except (ValueError, TypeError, LookupError, OverflowError) as error:
         # A number of thousands of digits or of none, a date that is none, a key that is a list.
         raise yaml.YAMLError(str(error)) from error
+
+
+def yaml_dump(data: Any) -> str:
+    """Data as a text for people to read: in its own order."""
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
 
 
 def is_null(node: yaml.Node) -> bool:

@@ -6,14 +6,11 @@ The file holds no dates and no paths: where the same tools build the same, it is
 
 from __future__ import annotations
 
-import fcntl
 import json
-import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
+from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.tools.programs import PROGRAMS, facts_of, find, packages
 
 FILE = "manifest.json"
@@ -29,7 +26,8 @@ def note(program: str, folder: Path) -> None:
         return
     programs = (program, *PROGRAMS[program].starts)
     found = packages(_PACKAGES) | {name: facts_of(name, path) for name in programs if (path := find(name))}
-    with _locked(folder):
+    # Of the folder, so no file is left over.
+    with locked(folder):
         tools = read(folder) | found
         _replace(folder / FILE, json.dumps({"tools": tools}, indent=2, sort_keys=True) + "\n")
 
@@ -41,17 +39,6 @@ def read(folder: Path) -> dict[str, dict[str, str]]:
     except (OSError, ValueError, LookupError, TypeError):
         return {}
     return dict(tools) if isinstance(tools, dict) else {}
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """One process at a time. What is locked is the folder, so no file is left over."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(handle)
 
 
 def _replace(path: Path, text: str) -> None:

@@ -16,7 +16,7 @@ from fusesoc_firm.text.render import render
 from tests.bench.designs import CORES, PUBLISHER, SUBSCRIBER, Converter, NotConvertedError, generate
 from tests.bench.tables import FAILED, MET, MISSED, NOT_CONVERTED, Table, Tell
 from tests.bench.yosys import Cells, SynthesisError, Yosys
-from tests.sim.ghdl import Generic, GhdlError, Library, core_files
+from tests.hdl.ghdl import Generic, GhdlError, Library, core_files
 
 WIDTHS = (8, 64, 128)
 STREAM_WIDTHS = (8, 16, 32, 64, 128, 256, 512)

@@ -15,7 +15,7 @@ from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.tools.library_path import library_root
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 TITLE = "200 converters, generated with an empty store"
 CONVERTERS = 200

@@ -15,7 +15,7 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.text.diagnostics import InputError
-from tests.sim.ghdl import REPOSITORY, Library, core_files
+from tests.hdl.ghdl import REPOSITORY, Library, core_files
 
 SUBSCRIBER, PUBLISHER = "subscriber", "publisher"
 CORES = ("axis/package", "axis/axis", "sched/package", "sched/fixed_priority", "manager/manager")

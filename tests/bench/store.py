@@ -19,7 +19,7 @@ import yaml
 from fusesoc_firm.store.own_code import PACKAGE
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 RUN_TITLE = "A second run of the applications' target `sim`"
 EDIT_TITLE = "An edit in a project of 60 messages"

@@ -21,8 +21,8 @@ from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import load_system
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
+from tests.hdl.ghdl import REPOSITORY
 from tests.random_systems import random_system
-from tests.sim.ghdl import REPOSITORY
 
 TITLE = "A system of 60 blocks and 40 messages"
 BLOCKS, MESSAGES = 60, 40

@@ -1,4 +1,4 @@
-"""The bench itself: what it counts, how it judges payloads, and that docs/figures.md holds all that it measures."""
+"""The bench itself: what it counts, how it judges payloads, and that docs/figures holds all that it measures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.bench.model import FrameError, Message, publisher_model, subscriber_m
 from tests.bench.payloads import BrokenPayloadError, Payloads
 from tests.bench.tables import FAILED, Table
 from tests.bench.yosys import ECP5, ICE40, Cells, SynthesisError, Yosys, count_cells
-from tests.sim.ghdl import Library
+from tests.hdl.ghdl import Library
 
 SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"
@@ -54,8 +54,12 @@ end architecture;
 """
 
 
+def test_every_part_has_one_page() -> None:
+    assert sorted(part for page in figures.PAGES for part in page.parts) == sorted(figures.parts())
+
+
 def test_every_row_is_in_the_document() -> None:
-    lines = figures.FIGURES.read_text(encoding="utf-8").splitlines()
+    lines = figures.written().splitlines()
     for title, keys in figures.keys().items():
         start = lines.index(f"### {title}")
         end = next((n for n in range(start + 1, len(lines)) if lines[n].startswith("#")), len(lines))
@@ -68,6 +72,7 @@ def test_every_row_is_in_the_document() -> None:
             )
 
 
+@pytest.mark.check
 @needs_yosys
 def test_luts_and_flip_flops_of_a_tiny_entity(tmp_path: Path) -> None:
     (tmp_path / "tiny.vhd").write_text(_TINY, encoding="ascii")
@@ -132,6 +137,7 @@ def test_a_column_without_entries_is_left_out() -> None:
     assert not table.is_good
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("ros", list(RosVersion))
 @pytest.mark.parametrize("message", sorted({message for _, message in fuzz.MESSAGES}))
 def test_two_readers_agree_on_what_is_broken(ros: RosVersion, message: str) -> None:
@@ -165,6 +171,7 @@ def _is_read(payloads: Payloads, payload: bytes) -> bool:
     return True
 
 
+@pytest.mark.check
 @needs_verilator
 @pytest.mark.parametrize(
     "converter", [row for row in fuzz.rows() if row.ros == 2], ids=lambda row: f"{row.message}-{row.width}"
@@ -177,6 +184,7 @@ def test_a_thousand_broken_frames(tmp_path: Path, converter: Converter) -> None:
     assert tally.delivered == tally.good > 300
 
 
+@pytest.mark.check
 @needs_verilator
 def test_cycles_are_counted(tmp_path: Path) -> None:
     payloads = Payloads(RosVersion.ROS1, QUATERNION)
@@ -189,6 +197,7 @@ def test_cycles_are_counted(tmp_path: Path) -> None:
         assert all(each.beat_cycles == beats and each.message_cycles <= 2 for each in found)
 
 
+@pytest.mark.check
 @needs_verilator
 def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
     """Each way in which the records can differ from what was sent."""
@@ -215,6 +224,7 @@ def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
         assert fuzz.difference(model, frames, wrong)
 
 
+@pytest.mark.check
 def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
     """And what is measured ends well: a broken call would be measured as well."""
     systems.write_system(tmp_path, SEED)
@@ -230,6 +240,7 @@ def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
         systems.run(systems.JOBS[0], tmp_path)
 
 
+@pytest.mark.check
 def test_an_edit_makes_just_its_dependants_anew() -> None:
     """The rows of the bench, of a sixth of its messages; FuseSoC runs as it does there."""
     rows = [*store.edit_rows(6)]

@@ -34,7 +34,7 @@ def specifications() -> list[Path]:
     required = {name for name, (_, entry) in keys_of(Specification).items() if entry.is_required}
     found = []
     for path in sorted(SPECS.glob("*/*.yaml")):
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
         if isinstance(content, dict) and required <= content.keys():
             found.append(path)
     return found

@@ -110,11 +110,14 @@ def test_make_without_a_target_lists_them() -> None:
         "help",
         "sim",
         "test",
+        "check",
+        "docs",
         "corpus",
         "bench",
         "bitstream",
         "matrix",
         "proofs",
+        "policies",
         "fuzz-netlist",
         "lint",
         "setup",
@@ -246,6 +249,7 @@ def test_why_pip_failed_is_shown(checkout: Checkout) -> None:
     assert checkout.calls("fusesoc") == []
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

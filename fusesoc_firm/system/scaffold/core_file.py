@@ -6,21 +6,21 @@ that a target that is new there comes to every system; those of the author's own
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
-import yaml
-
+from fusesoc_firm.request.core_reader import read_core
 from fusesoc_firm.system.boards.board import FOLDER, QUARTUS, VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.verilog_bench import translated_unit
+from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
 from fusesoc_firm.text.render import render
-from fusesoc_firm.text.yaml_text import yaml_data
 
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
@@ -51,8 +51,24 @@ class CoreOptions:
     stimuli: str = "stimuli.yaml"
     model: str = "model.py"
     environment: Sequence[str] = ()
-    paths: Sequence[str] = ()
+    paths: Sequence[str | Path] = ()
     distro: str = ""
+
+
+def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
+    """The text of the `.core` in `path` for the system of a specification: of one that is there, with new targets.
+
+    The `paths` of `options` are told from the current folder. Raises `InputError`.
+    """
+    if path.exists():
+        return updated_core(loaded.system, path)
+    folder = path.absolute().parent
+    options = replace(
+        options,
+        depend=[*options.depend, *loaded.specification.message_cores],
+        paths=[os.path.relpath(item, folder) for item in options.paths],
+    )
+    return new_core(loaded.system, os.path.relpath(spec, folder), options)
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
@@ -78,14 +94,16 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
 
 def updated_core(system: DerivedSystem, path: Path) -> str:
     """The text of the `.core` in `path` with the targets of today. Raises `InputError` if it is none of a system."""
-    text = path.read_text(encoding="utf-8")
-    instances = _instances(path, text)
+    core = read_core(path)
+    if not isinstance(core.data.get("generate"), dict):
+        fail(f"{path} is no core with a section 'generate'")
+    instances, text = core.section("generate"), path.read_text(encoding="utf-8")
     if _GENERATORS in text and _SYSTEM_CORE not in text:
         fail(f"{path} does not depend on '{_SYSTEM_CORE}', which has the generator 'far'", hint=f"{_GENERATORS} had it")
     if _SYSTEM not in instances:
         fail(f"{path} has no instance '{_SYSTEM}' under 'generate'; without the file, this command writes another one")
     is_simulated = _SIMULATION in instances
-    has_environment = is_simulated and bool(instances[_SIMULATION].get("parameters", {}).get("environment"))
+    has_environment = is_simulated and bool(core.parameters(_SIMULATION).get("environment"))
     targets = _targets(system, is_simulated=is_simulated, has_environment=has_environment)
     if not (section := _SECTION.search(text)):
         return f"{text.rstrip()}\n\n{targets}"
@@ -151,16 +169,6 @@ def _value(value: str | Sequence[str]) -> str:
     return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
 
 
-def _instances(path: Path, text: str) -> dict[str, dict[str, dict[str, object]]]:
-    """The generator's instances of a core."""
-    try:
-        content = yaml_data(text.replace("CAPI=2:", "", 1))
-        instances = dict(content["generate"])
-    except (yaml.YAMLError, TypeError, KeyError, ValueError):
-        fail(f"{path} is no core with a section 'generate'")
-    return instances
-
-
-def _paths(items: Sequence[str]) -> str:
+def _paths(items: Sequence[str | Path]) -> str:
     """A list on one line; nothing if it is empty."""
     return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""
