@@ -246,8 +246,9 @@ def _write(files: Files, request: Request, marks: str, run: str) -> None:
             raise
         fail(f"cannot write {error.filename}: {error.strerror}")
     if found:
+        unit, other = found
         fail(
-            f"{request.vlnv} and {found.core} define the design unit '{found.unit}' in two ways, and a tool keeps one",
+            f"{request.vlnv} and {other} define the design unit '{unit}' in two ways, and a tool keeps one",
             find_requesting_core(request.files_root, request.name).instance(),
             "the parameter 'name' of generator 'firm' gives the units of a core names of their own: name: left",
         )

@@ -17,7 +17,6 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import NamedTuple
 
 from fusesoc_firm.text.files import read_file, write_if_changed
 
@@ -31,11 +30,8 @@ _VERILOG = re.compile(rb"^[ \t]*module[ \t]+(\w+)", re.MULTILINE)
 _PATTERNS = {".vhd": _VHDL, ".vhdl": _VHDL, ".v": _VERILOG, ".sv": _VERILOG}
 
 
-class Clash(NamedTuple):
-    """A unit that another core of the run, by its full name, defines in another way."""
-
-    unit: str
-    core: str
+Clash = tuple[str, str]
+"""A unit, and another core of the run, by its full name, that defines it in another way."""
 
 
 def run_of(fusesoc: int) -> str:
@@ -93,7 +89,7 @@ def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
     for core, others in _others(folder, run):
         for unit, digest in others.items():
             if units.get(unit, digest) != digest:
-                return Clash(unit, core)
+                return unit, core
     return None
 
 
