@@ -175,8 +175,8 @@ def _parts(lines: list[str]) -> Iterator[list[str]]:
 
 
 def _difference(place: str, expected: Sequence[str], found: Sequence[str]) -> list[str]:
-    texts = [[_TIME.sub("0", line) for line in lines] for lines in (expected, found)]
-    return list(difflib.unified_diff(*texts, place, "printed", lineterm=""))
+    shown, printed = ([_TIME.sub("0", line) for line in lines] for lines in (expected, found))
+    return list(difflib.unified_diff(shown, printed, place, "printed", lineterm=""))
 
 
 def _pictures(page: Page, made: dict[str, Path], *, is_updated: bool) -> Iterator[str]:
