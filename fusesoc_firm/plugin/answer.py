@@ -112,11 +112,12 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
     is_locked = _check_locked(request, loaded)
     key, entry = obtain(request, generator, loaded, basis, is_only_looked_up=is_only_looked_up)
     marks = find_requesting_core(request.files_root, request.name).name if command == MESSAGES else ""
-    _write(entry.files, request, marks, run)
-    # What is locked is compared on every run, and what is missing is said.
+    # What is locked is compared on every run, and what is missing is reported. This comes before the core is written,
+    # which may lie in a folder that was searched.
     if not (absent or is_locked) and basis.holds():
         note = {"key": key.digest, "facts": basis.facts(), "name": request.name, "core": request.vlnv, "marks": marks}
         default_store().note(call_digest(command, path.read_bytes()), note)
+    _write(entry.files, request, marks, run)
     # It can be generated and not be run.
     if absent:
         print(f"{command}: {explanation(absent)}", flush=True)

@@ -303,3 +303,13 @@ def test_next_to_nothing_is_imported(calls: Calls) -> None:
     heavy = {"yaml", "chevron", "rosbags", "numpy", "dataclasses", "inspect", "subprocess", "shutil", "tempfile"}
     assert not imported & heavy
     assert "importlib.metadata" not in done[-1].split()
+
+
+def test_a_call_is_recalled_whose_folder_is_searched_for_messages(calls: Calls) -> None:
+    """As in a project that names its root, which builds lie below."""
+    calls.folder = calls.project / "build"
+    arguments = calls.call("size", message="my_msgs/Size", ros=2, paths=["."])
+    assert main("firm", arguments) == 0
+    # FuseSoC empties the folder of a call.
+    clear()
+    assert answer("firm", arguments)
