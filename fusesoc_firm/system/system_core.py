@@ -15,7 +15,8 @@ from fusesoc_firm.converter.converter_core import VHDL, constants_configurations
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
-from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
+from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.request.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
 from fusesoc_firm.store.reads import Input
@@ -69,7 +70,7 @@ class LoadedSystem:
 
     specification: Specification
     folder: Path
-    libraries: Mapping[RosVersion, MessageLibrary]
+    libraries: Mapping[Middleware, MessageLibrary]
     system: DerivedSystem
     board: Board | None = None
     warnings: tuple[Diagnostic, ...] = ()
@@ -97,7 +98,7 @@ class LoadedSystem:
 
 def load_system(
     path: Path,
-    libraries: Mapping[RosVersion, MessageLibrary],
+    libraries: Mapping[Middleware, MessageLibrary],
     *,
     needs_sources: bool = True,
     board: Board | None = None,
@@ -121,12 +122,12 @@ def load_system(
 
 
 def with_paths(
-    known: Mapping[RosVersion, MessageLibrary],
+    known: Mapping[Middleware, MessageLibrary],
     paths: Mapping[str, SourceRef | None],
     folder: Path,
     core_folders: CoreFolders,
     faults: Diagnostics,
-) -> dict[RosVersion, MessageLibrary]:
+) -> dict[Middleware, MessageLibrary]:
     """The libraries with the `paths` of a specification in `folder` before all else.
 
     Raises `InputError` with all `faults` if one of these paths is wrong, since unknown messages would follow from it.
@@ -138,7 +139,7 @@ def with_paths(
             places |= dict.fromkeys(core_folders({item: source}) if is_core(item) else [folder / item], source)
         except InputError as error:
             faults.take(error, source)
-    own: dict[RosVersion, MessageLibrary] = {}
+    own: dict[Middleware, MessageLibrary] = {}
     for ros in known:
         try:
             own[ros] = known[ros].before(places)
