@@ -41,6 +41,7 @@ def load(request: Request) -> LoadedRequest:
     """The converters that a request asks for. Raises `InputError`."""
     order = order_of_request(request)
     return LoadedRequest(
+        request,
         order.files,
         lambda: converters_core(order),
         lambda: [(order.libraries[wanted.ros], wanted.definitions) for wanted in order.messages],

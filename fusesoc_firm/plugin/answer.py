@@ -109,8 +109,8 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
     basis.further += facts("program", generator.programs(request))
     absent = missing(generator.programs(request))
     loaded = load(request, generator, basis)
-    is_locked = _check_locked(request, loaded)
-    key, entry = obtain(request, generator, loaded, basis, is_only_looked_up=is_only_looked_up)
+    is_locked = _check_locked(loaded)
+    key, entry = obtain(loaded, generator, basis, is_only_looked_up=is_only_looked_up)
     marks = find_requesting_core(request.files_root, request.name).name if command == MESSAGES else ""
     # What is locked is compared on every run, and what is missing is reported. This comes before the core is written,
     # which may lie in a folder that was searched.
@@ -149,7 +149,7 @@ def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
 
 
 def obtain(
-    request: Request, generator: Generator, loaded: LoadedRequest, basis: Basis, *, is_only_looked_up: bool = False
+    loaded: LoadedRequest, generator: Generator, basis: Basis, *, is_only_looked_up: bool = False
 ) -> tuple[Key, Entry]:
     """The core that a request asks for, with its key, from the store if it has it.
 
@@ -163,13 +163,14 @@ def obtain(
         with noted(reads):
             core = loaded.generate()
         _check_declared(reads, basis.reads)
-        return as_files(core, request)
+        return as_files(core, loaded.request)
 
-    key = _key(request, generator, loaded, basis)
+    key = _key(loaded, generator, basis)
     return key, default_store().obtain(key, build, basis.holds)
 
 
-def _key(request: Request, generator: Generator, loaded: LoadedRequest, basis: Basis) -> Key:
+def _key(loaded: LoadedRequest, generator: Generator, basis: Basis) -> Key:
+    request = loaded.request
     tools = dict(generator.tools(request))
     basis.further += facts("program", sorted(tools))
     asked = {
@@ -210,8 +211,9 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
     return tuple(found)
 
 
-def _check_locked(request: Request, loaded: LoadedRequest) -> bool:
+def _check_locked(loaded: LoadedRequest) -> bool:
     """Tell whether a request is held to a lock file. Raises `InputError` with what differs from one."""
+    request = loaded.request
     places: list[Path] = []
     if name := request.parameters.get("locked"):
         places.append(request.files_root / str(name))
@@ -222,7 +224,7 @@ def _check_locked(request: Request, loaded: LoadedRequest) -> bool:
     for place in places:
         from fusesoc_firm.plugin.lock_file import check_request
 
-        check_request(place, request, loaded)
+        check_request(place, loaded)
     return bool(places)
 
 

@@ -97,7 +97,7 @@ def main() -> None:
     for item in json.load(sys.stdin):
         with suppress(InputError):
             request, basis = _request(GeneratorCall(**item)), Basis("", [*code])
-            obtain(request, generator, load(request, generator, basis), basis)
+            obtain(load(request, generator, basis), generator, basis)
         os.write(sys.stdout.fileno(), b".")
 
 

@@ -57,12 +57,14 @@ def _load_system(request: Request) -> LoadedRequest:
 
     if request.parameters["product"] == "live":
         inputs = simulation_core.live_inputs(request, loaded)
-        return LoadedRequest(inputs, lambda: simulation_core.live_core(request, loaded), loaded.definitions)
+        return LoadedRequest(request, inputs, lambda: simulation_core.live_core(request, loaded), loaded.definitions)
     if _is_simulation(request):
         inputs = simulation_core.inputs(request, loaded)
-        return LoadedRequest(inputs, lambda: simulation_core.simulation_core(request, loaded), loaded.definitions)
+        return LoadedRequest(
+            request, inputs, lambda: simulation_core.simulation_core(request, loaded), loaded.definitions
+        )
     inputs = [*system_core.inputs(request, loaded), *package.headers()]
-    return LoadedRequest(inputs, generate, loaded.definitions)
+    return LoadedRequest(request, inputs, generate, loaded.definitions)
 
 
 def _simulator_programs(request: Request) -> Sequence[str]:

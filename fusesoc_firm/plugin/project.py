@@ -85,11 +85,11 @@ def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
     return lock_of(core, depends, calls)
 
 
-def _requests(core: ProjectCore) -> Iterator[tuple[Request, LoadedRequest]]:
+def _requests(core: ProjectCore) -> Iterator[LoadedRequest]:
     """What a core has generated, and what that leads to."""
     for call in core.calls:
         if call.generator != MESSAGES and (request := _request(call)):
-            yield request, GENERATORS[request.command].load(request)
+            yield GENERATORS[request.command].load(request)
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:

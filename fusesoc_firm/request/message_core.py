@@ -28,7 +28,7 @@ def load(request: Request) -> LoadedRequest:
     """The definitions as a core, one folder a package, those of the cores that it names too."""
     found = list(_files(request))
     # None of them is parsed.
-    return LoadedRequest([path for _, path in found], lambda: _core(request, found), list)
+    return LoadedRequest(request, [path for _, path in found], lambda: _core(request, found), list)
 
 
 def _core(request: Request, found: list[tuple[str, Path]]) -> GeneratedCore:

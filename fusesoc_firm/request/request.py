@@ -109,12 +109,13 @@ class GeneratedCore:
 
 @dataclass(frozen=True)
 class LoadedRequest:
-    """What a request leads to, derived once.
+    """A request, and what it leads to, derived once.
 
     `inputs` are the files whose content the core depends on; a path of them need not exist. `generate` makes the core,
     `definitions` gives the library of each message with all definitions within it. Both raise `InputError`.
     """
 
+    request: Request
     inputs: Sequence[Input]
     generate: Callable[[], GeneratedCore]
     definitions: Callable[[], Sequence[tuple[MessageLibrary, Definitions]]]

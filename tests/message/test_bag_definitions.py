@@ -132,7 +132,7 @@ class Calls:
 
     def is_stored(self) -> bool:
         request, basis = self.request(), Basis("")
-        return obtain(request, FIRM, load(request, FIRM, basis), basis)[1].is_from_store
+        return obtain(load(request, FIRM, basis), FIRM, basis)[1].is_from_store
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -180,7 +180,7 @@ def test_whoever_reads_the_bag_itself_must_declare_it(
         return loaded.generate()
 
     with pytest.raises(InputError, match="was read, which is no input"):
-        obtain(request, FIRM, replace(loaded, generate=generate), basis)
+        obtain(replace(loaded, generate=generate), FIRM, basis)
 
 
 def test_a_repeated_call_is_recalled_until_the_bag_is_touched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,7 @@ class Echo:
 
     def load(self, request: Request) -> LoadedRequest:
         path = request.files_root / str(request.parameters["file"] or request.parameters["spec"])
-        return LoadedRequest([path], lambda: self.generate(request, path), list)
+        return LoadedRequest(request, [path], lambda: self.generate(request, path), list)
 
     def generate(self, request: Request, path: Path) -> GeneratedCore:
         self.calls += 1

@@ -64,7 +64,7 @@ def test_a_call_is_derived_once(
     Path("call.yml").write_text(yaml.safe_dump(text))
     if is_locked:
         request = read_request(command, Path("call.yml"), GENERATORS[command])
-        messages = _messages(request, GENERATORS[command].load(request))
+        messages = _messages(GENERATORS[command].load(request))
         Path("a.lock").write_text(lock_text({"messages": messages, "cores": {}, "tools": {}}))
         monkeypatch.setenv("FUSESOC_FIRM_LOCKED", str(Path("a.lock").absolute()))
         counts.clear()
