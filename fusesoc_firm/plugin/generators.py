@@ -47,24 +47,20 @@ def _load_system(request: Request) -> LoadedRequest:
     from fusesoc_firm.simulation import simulation_core
     from fusesoc_firm.system import system_core
 
-    loaded = system_core.load_requested(request)
-
-    def generate() -> GeneratedCore:
+    def make_system(_: Request, loaded: system_core.LoadedSystem) -> GeneratedCore:
         for warning in loaded.warnings:
             print(warning, file=sys.stderr)
         core = system_core.system_core(loaded)
         return replace(core, files={**core.files, **package.generated_files(loaded)})
 
+    loaded = system_core.load_requested(request)
     if request.parameters["product"] == "live":
-        inputs = simulation_core.live_inputs(request, loaded)
-        return LoadedRequest(request, inputs, lambda: simulation_core.live_core(request, loaded), loaded.definitions)
-    if _is_simulation(request):
-        inputs = simulation_core.inputs(request, loaded)
-        return LoadedRequest(
-            request, inputs, lambda: simulation_core.simulation_core(request, loaded), loaded.definitions
-        )
-    inputs = [*system_core.inputs(request, loaded), *package.headers()]
-    return LoadedRequest(request, inputs, generate, loaded.definitions)
+        inputs, make = simulation_core.live_inputs(request, loaded), simulation_core.live_core
+    elif _is_simulation(request):
+        inputs, make = simulation_core.inputs(request, loaded), simulation_core.simulation_core
+    else:
+        inputs, make = [*system_core.inputs(request, loaded), *package.headers()], make_system
+    return LoadedRequest(request, inputs, lambda: make(request, loaded), loaded.definitions)
 
 
 def _simulator_programs(request: Request) -> Sequence[str]:
