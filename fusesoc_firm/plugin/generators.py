@@ -54,6 +54,7 @@ def _load_system(request: Request) -> LoadedRequest:
         return replace(core, files={**core.files, **package.generated_files(loaded)})
 
     loaded = system_core.load_requested(request)
+    make: Callable[[Request, system_core.LoadedSystem], GeneratedCore]
     if request.parameters["product"] == "live":
         inputs, make = simulation_core.live_inputs(request, loaded), simulation_core.live_core
     elif _is_simulation(request):
