@@ -15,7 +15,7 @@ import yaml
 from fusesoc_firm import __version__
 from fusesoc_firm.building.cores import project_cores
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.gapi import main as generate
+from fusesoc_firm.plugin.answer import main as generate
 from fusesoc_firm.store.own_code import PACKAGE
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import Program
@@ -123,18 +123,12 @@ def test_a_new_file_that_hides_another_one_counts(project: Path, capsys: Capture
     assert touched(capsys) == {"top": "top/msg/geometry_msgs/msg/Point.msg"}
 
 
-def test_our_own_files_count_where_they_were_used(
-    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["templates/core/system.core.mustache", "text/naming.py"])
+def test_our_own_files_touch_what_is_generated(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    def edited(name: str) -> dict[str, str]:
-        monkeypatch.setattr("fusesoc_firm.plugin.project.changed_files", lambda *_: [PACKAGE / name])
-        return touched(capsys)
-
-    # What was never made may use any of them.
-    assert "top" in edited("templates/core/system.core.mustache")
-    monkeypatch.setattr("fusesoc_firm.plugin.project.used_before", lambda *_: ["naming.py"])
-    assert edited("templates/core/system.core.mustache") == {}
-    assert list(edited("naming.py"))[-1] == "top"
+    monkeypatch.setattr("fusesoc_firm.plugin.project.changed_files", lambda *_: [PACKAGE / name])
+    assert touched(capsys) == {"top": str(PACKAGE / name)}
 
 
 def test_what_is_no_revision_or_no_repository_is_a_fault(project: Path, capsys: Captured) -> None:
@@ -316,7 +310,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     capsys.readouterr()
     install("GHDL 2.0.0")
     assert locked(capsys) == []
-    monkeypatch.setattr("fusesoc_firm.store.own_code.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.store.own_code.digest", lambda: "edited")
     (found,) = locked(capsys)
     assert found.startswith("tool fusesoc-firm: sha256 is ")
 
@@ -381,7 +375,7 @@ def test_a_generator_refuses_what_is_not_locked(
     size.write_text("uint8 a\n")
     # It is in the store, and compared all the same.
     assert call(project, **more) == 0
-    monkeypatch.setattr("fusesoc_firm.store.own_code.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.store.own_code.digest", lambda: "edited")
     assert call(project, **more) == 1
     assert "tool fusesoc-firm: sha256 is " in capsys.readouterr().err
     monkeypatch.undo()
