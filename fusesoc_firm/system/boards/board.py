@@ -115,7 +115,7 @@ def board_path(name: str, folder: Path) -> Path:
     return folder / name if name.endswith((".yaml", ".yml")) else FOLDER / f"{name}.yaml"
 
 
-def read_board(name: str, folder: Path) -> Board:
+def read_board(name: str, folder: Path = Path()) -> Board:
     """The board that `board_path` says. Raises `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
