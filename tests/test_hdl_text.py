@@ -16,7 +16,8 @@ _HDL = re.compile(
     r"""<=|=>|'[01]'|x"|'[bd][01z]|\bdownto\b|std_logic|\b(un)?signed\(|\bothers\b.*=>| [?] """
     r"""|^ *assign |\balways @|\bposedge\b|\bend(module|function|case)$|^begin$|\bcase \(|^(reg|wire)$"""
     r"""|^  (reg|wire|initial|function) """
-    r"""|^ (and|or|&) |^"0+" & """
+    # A bare conjunction joins words of messages, too.
+    r"""|^ (and|or)\s.|^ & |^"0+" & """
 )
 
 _LITERAL, _OPERAND, _CONDITION = "a literal", "one operand", "a condition of one list of operands"
@@ -28,7 +29,7 @@ REASONS = {
         "hexadecimal": _LITERAL,
         "bits_of_bool": _OPERAND,
         "within": _CONDITION,
-        "all_of": _CONDITION,
+        "any_of": _CONDITION,
     },
     "converter/configuration.py": {"_literal": _LITERAL},
     "converter/constants.py": {"_value": _LITERAL, "_bytes": _LITERAL},
