@@ -31,6 +31,8 @@ CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
 # Parts of the bench, all if empty, such as BENCH='area cycles'; BENCH=--help lists them.
 BENCH ?=
+# Options and pages for make docs, such as DOCS=--update or DOCS=README.md; all pages if none is named.
+DOCS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
 # What tests run beside Python.
@@ -56,7 +58,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
-.PHONY: help sim test check ros bitstream bench matrix proofs corpus fuzz-netlist lint setup tools clean distclean
+.PHONY: help sim test check docs ros bitstream bench matrix proofs policies corpus fuzz-netlist lint setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -77,6 +79,12 @@ test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTION
 check: setup ros lint ## Run what takes longer: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest -m "check and not thorough" $(PYTEST_OPTIONS)
 
+docs: TOOLS = dot:graphviz
+docs: tools $(VENV)/.extra-docs ## Run the commands of the pages, build their site in build/docs; DOCS=--update writes their output into the pages
+	@$(BIN)/python -m tests.pages $(DOCS)
+	@$(BIN)/zensical build --clean --strict
+	@echo "The site: build/docs/index.html"
+
 # Both are there for some of the tests, which are skipped without them.
 ros: $(VENV)/.ros2
 	@./.ci/install-tools $(ROS1) >/dev/null || echo "No ROS 1: the tests with it are skipped" >&2
@@ -95,7 +103,7 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
+bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
@@ -110,8 +118,11 @@ matrix: TOOLS = verilator
 matrix: tools $(VENV)/.extra-matrix ## Try each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' names more
 	@$(BIN)/python -m tests.matrix $(PYTHONS)
 
-proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
+proofs: setup ## Prove the Manager and the schedulers, write docs/figures/proofs.md
 	@$(BIN)/python -m tests.proofs
+
+policies: $(VENV)/.installed ## Write the lists of schedulers in cores/sched from fusesoc_firm/scheduling/policies.py
+	@$(BIN)/python -m tests.cores.policies
 
 fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'

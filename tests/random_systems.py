@@ -21,8 +21,7 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.system.derived.timing import WITH_DEADLINES, WITH_TRANSFER_TIMES
-from fusesoc_firm.system.written.specification import SCHEDULERS
+from fusesoc_firm.scheduling.policies import POLICIES
 
 # The longest payload that is stored, and how often a thing is done that may be done.
 _BUFFER = 4096
@@ -244,7 +243,7 @@ class _Maker:
     # --- text --------------------------------------------------------------------------------------------------
 
     def _specification(self) -> dict[str, Any]:
-        timeless = [policy for policy in SCHEDULERS if policy not in (*WITH_DEADLINES, *WITH_TRANSFER_TIMES)]
+        timeless = [name for name, policy in POLICIES.items() if not policy.has_deadlines]
         project = {
             "name": "random",
             "width": self.chance.choice(WIDTHS[:5]),

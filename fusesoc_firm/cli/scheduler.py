@@ -76,7 +76,7 @@ def _bench_schedulers(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.scheduling.evaluation.bench import Places, Selection, bench, names_of, numbers_of
     from fusesoc_firm.scheduling.evaluation.jobs import Settings
     from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, REQUESTERS, Distribution
-    from fusesoc_firm.scheduling.models import POLICIES
+    from fusesoc_firm.scheduling.policies import POLICIES
 
     def names(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
         return tuple(legal) if text == "all" else names_of(text, legal, what)

@@ -15,7 +15,7 @@ def add_simulator(commands: Any) -> None:
     simulator = command(
         commands,
         "simulator",
-        "build the simulator of a system, and print the command that starts it (docs/transport.md)",
+        "build the simulator of a system, and print the command that starts it (docs/reference/transports.md)",
         'robot_node --transport "pipe:$(firm simulator robot.yaml)"',
         _build_simulator,
     )

@@ -1,7 +1,7 @@
 """The Frame model: the second stage, a message as bytes on the wire.
 
 A frame is `id` (1 byte) | `length` (uint32, little-endian) | payload. The payload is a tree of nodes in wire order;
-docs/frames.md shows it by example:
+docs/explanation/frames.md shows it by example:
 
 * `Fixed`: bytes whose arrangement is known here, padding included.
 * `Pad`: padding that depends on the position, which only the run knows.

@@ -1,6 +1,6 @@
 """What the two generations of ROS allow in a `.msg` file: one table each, so that the parser never tells them apart.
 
-ROS 1 follows genmsg 0.6.0, ROS 2 follows rosidl_adapter 4.9.5. docs/messages.md lists the few places where FIRM
+ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few places where FIRM
 takes more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
 """
 

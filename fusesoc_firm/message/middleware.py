@@ -1,7 +1,7 @@
 """What a middleware is to all other rooms: where its messages come from, and how they lie on the wire.
 
 A middleware is a module with one `Middleware` value, and the line in `message/__init__.py` that registers it.
-docs/middlewares.md shows how a third one is added.
+docs/how-to/add-a-middleware.md shows how a third one is added.
 """
 
 from __future__ import annotations

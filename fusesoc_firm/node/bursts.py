@@ -1,4 +1,4 @@
-"""Bursts from a preemptive Manager, joined to frames (docs/manager.md, 'Bursts').
+"""Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, 'Bursts').
 
     joiner = BurstJoiner(publishers=4, width=64)
     for burst in bursts:                    # the bytes between two `tlast`, those that `tkeep` marks

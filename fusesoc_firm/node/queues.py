@@ -1,4 +1,4 @@
-"""Frames to the hardware: a queue for each subscriber, and a policy that says which is next (docs/host_scheduling.md).
+"""Frames to the hardware: a queue for each subscriber, and a policy (docs/reference/host-queues.md).
 
     queues = SubscriberQueues(subscribers=3, capacity=10)          # least recently used
     queues.put(subscriber, frame)                                  # any thread, a middleware's callback

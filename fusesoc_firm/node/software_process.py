@@ -3,8 +3,8 @@
     python3 -m fusesoc_firm.node.software_process robot.yaml
 
 So a node in C++ runs blocks of type ROS-SW: to it they are a transport as the hardware is (`software:COMMAND`,
-docs/nodes.md). The ids are the software's own, in the order of `software_ports`. The end of the input is the end of the
-process, with status 0, when all is answered. What the functions print goes to standard error.
+docs/reference/node-library.md). The ids are the software's own, in the order of `software_ports`. The end of the input
+is the end of the process, with status 0, when all is answered. What the functions print goes to standard error.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -
 
 
 def at_address(address: str) -> OpenTransport:
-    """Open what a transport's address says, such as `uart:DEVICE:BAUD` (docs/transport.md)."""
+    """Open what a transport's address says, such as `uart:DEVICE:BAUD` (docs/reference/transports.md)."""
     return lambda listener: open_transport(address, _PACE, partial(_tell, listener))
 
 

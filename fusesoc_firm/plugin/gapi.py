@@ -281,7 +281,7 @@ def _check_locked(request: Request) -> bool:
             fail(f"{LOCKED} is '{name}'", hint=f"a generator has a folder of its own; write {LOCKED}=$PWD/{name}")
         places.append(Path(name))
     for place in places:
-        from fusesoc_firm.plugin.lock import check_request
+        from fusesoc_firm.plugin.lock_file import check_request
 
         check_request(place, request, has_messages=request.command != MESSAGES)
     return bool(places)
@@ -297,19 +297,23 @@ def read_request(command: str, path: Path, generator: Generator, *, is_this_run:
 
     Raises `InputError`.
     """
-    try:
-        call: dict[str, Any] = yaml_data(path.read_text(encoding="utf-8"))
-        vlnv, files_root = str(call["vlnv"]), Path(call["files_root"])
-        given = call.get("parameters") or {}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
-        fail(f"{path} is no file of FuseSoC's generator call: {error}")
+    call = read_call(path)
 
     def beside(names: MessageCores) -> tuple[Path, ...]:
         from fusesoc_firm.request.message_core import folders_of_run
 
         return folders_of_run(names, path.absolute().parent.parent, is_this_run=is_this_run)
 
-    return make_request(command, Call(vlnv, files_root, given), generator, beside)
+    return make_request(command, call, generator, beside)
+
+
+def read_call(path: Path) -> Call:
+    """What FuseSoC's file says. Raises `InputError`."""
+    try:
+        call: dict[str, Any] = yaml_data(path.read_text(encoding="utf-8"))
+        return Call(str(call["vlnv"]), Path(call["files_root"]), call.get("parameters") or {})
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+        fail(f"{path} is no file of FuseSoC's generator call: {error}")
 
 
 def make_request(

@@ -12,10 +12,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from fusesoc_firm.converter.converter_core import order_of_request
 from fusesoc_firm.message.model import MessageName, nested_message
 from fusesoc_firm.message.signature import Definitions
-from fusesoc_firm.request.request import GeneratedCore
+from fusesoc_firm.plugin.gapi import GENERATORS, read_call, read_request
+from fusesoc_firm.request.request import GeneratedCore, Request
+from fusesoc_firm.request.requesting_core import find_requesting_core
 from fusesoc_firm.store.reads import Input
+from fusesoc_firm.system.system_core import load_requested
 from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.naming import identifier
@@ -45,6 +49,40 @@ class Names:
     blocks: Mapping[str, SourceRef]
     fields: Mapping[str, Mapping[str, SourceRef]]
     messages: Mapping[str, Mapping[str, SourceRef]]
+
+
+def why(path: Path) -> list[Reason]:
+    """Why each line of a generated file of a build is as it is. Raises `InputError`."""
+    call, name = call_file(path)
+    command = _generator(call)
+    generator = GENERATORS[command]
+    request = read_request(command, call, generator, is_this_run=False)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        fail(f"{path} is no text that can be read: {error}")
+    rendering = rendering_of(lambda: generator.generate(request), name, text, generator.inputs(request))
+    return reasons(rendering, _names(request))
+
+
+def _generator(path: Path) -> str:
+    """The generator that a call is for. FuseSoC's file does not say it, but the core that makes the call does."""
+    call = read_call(path)
+    generator = find_requesting_core(call.files_root, call.vlnv.split(":")[2]).generator
+    if generator not in GENERATORS:
+        fail(
+            f"no core in {call.files_root} has a generator of ours make {call.vlnv} any more",
+            hint="generate it again with fusesoc run --setup",
+        )
+    return generator
+
+
+def _names(request: Request) -> Names:
+    """What a line of a generated core may name."""
+    if request.command == "far":
+        loaded = load_requested(request)
+        return names_of(loaded.specification, loaded.messages())
+    return names_of(None, [(wanted.message, wanted.definitions) for wanted in order_of_request(request).messages])
 
 
 def rendering_of(

@@ -10,9 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.yaml_text import yaml_dump
 
 _LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None
@@ -110,7 +109,7 @@ def core_text(core: GeneratedCore, vlnv: str) -> str:
         "filesets": {"generated": {"files": [{path: _attributes(file)} for path, file in core.files.items()]}},
         "targets": {"default": {"filesets": ["generated"]}},
     }
-    return "CAPI=2:\n" + yaml.safe_dump(description, sort_keys=False, allow_unicode=True, width=120)
+    return "CAPI=2:\n" + yaml_dump(description)
 
 
 def _attributes(file: GeneratedFile) -> dict[str, object]:

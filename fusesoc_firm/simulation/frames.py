@@ -1,4 +1,4 @@
-"""The simulated host's two files: stimuli and expected frames as text (docs/simulation.md)."""
+"""The simulated host's two files: stimuli and expected frames as text (docs/reference/simulation-host.md)."""
 
 from __future__ import annotations
 

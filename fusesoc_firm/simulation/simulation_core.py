@@ -1,6 +1,7 @@
 """The simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels.
 
-A live one has a test bench that does what another program requests over a pipe (docs/transport.md), and no frames.
+A live one has no frames, but a test bench that does what another program requests over a pipe
+(docs/reference/transports.md).
 """
 
 from __future__ import annotations

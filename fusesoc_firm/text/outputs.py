@@ -23,6 +23,12 @@ def check_output(path: Path, endings: Sequence[str] = ()) -> None:
     check_parent(path)
 
 
+def shown(path: Path) -> str:
+    """A path as short as it can be told here."""
+    here = Path.cwd().resolve()
+    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
+
+
 def check_parent(path: Path) -> None:
     """Raise `InputError` unless the folder is there that something is to be written into."""
     if not path.absolute().parent.is_dir():

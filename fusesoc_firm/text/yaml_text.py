@@ -269,6 +269,11 @@ def data_of(root: yaml.Node | None) -> Any:
         raise yaml.YAMLError(str(error)) from error
 
 
+def yaml_dump(data: Any) -> str:
+    """Data as a text for people to read: in its own order."""
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+
+
 def is_null(node: yaml.Node) -> bool:
     """Tell whether a key was written without a value, as listing 6.1 of the dissertation does with `type:`."""
     return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"

@@ -116,7 +116,10 @@ def _security(distributed: Any, address: str) -> Any:
     files |= {"client.key": security.tls_client_key} if security.tls_client_key else {}
     for name, file in files.items():
         if not file:
-            hint = "Dask's configuration names the certificates: ca-file, client.cert and client.key (docs/security.md)"
+            hint = (
+                "Dask's configuration names the certificates: ca-file, client.cert and client.key "
+                "(docs/explanation/security.md)"
+            )
             fail(f"'{address}' needs distributed.comm.tls.{name}", hint=hint)
         if not Path(file).is_file():
             fail(f"there is no file '{file}', which Dask's configuration names as distributed.comm.tls.{name}")

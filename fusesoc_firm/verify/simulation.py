@@ -78,7 +78,7 @@ def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, tim
 
 
 def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes]) -> None:
-    """The host's two files (docs/simulation.md): stimulus k causes answer k, and nothing else comes."""
+    """The host's two files (docs/reference/simulation-host.md): stimulus k causes answer k, and nothing else comes."""
     sent = (f"> stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(stimuli))
     expected = (f"< @{number} answer to stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(answers))
     (folder / STIMULUS_FILE).write_text("".join(sent), encoding="ascii")

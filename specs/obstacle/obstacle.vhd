@@ -22,7 +22,8 @@ entity obstacle is
     -- std_msgs/Bool
     out_data          : out std_logic;
     out_segment_valid : out std_logic_vector(0 downto 0);
-    out_msg_ready     : in  std_logic);
+    out_msg_ready     : in  std_logic
+  );
 end entity obstacle;
 
 architecture rtl of obstacle is

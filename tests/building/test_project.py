@@ -127,12 +127,12 @@ def test_our_own_files_count_where_they_were_used(
     project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def edited(name: str) -> dict[str, str]:
-        monkeypatch.setattr("fusesoc_firm.building.cores.changed_files", lambda *_: [PACKAGE / name])
+        monkeypatch.setattr("fusesoc_firm.plugin.project.changed_files", lambda *_: [PACKAGE / name])
         return touched(capsys)
 
     # What was never made may use any of them.
     assert "top" in edited("templates/core/system.core.mustache")
-    monkeypatch.setattr("fusesoc_firm.plugin.gapi.used_before", lambda *_: ["naming.py"])
+    monkeypatch.setattr("fusesoc_firm.plugin.project.used_before", lambda *_: ["naming.py"])
     assert edited("templates/core/system.core.mustache") == {}
     assert list(edited("naming.py"))[-1] == "top"
 

@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.cli.message import STAGES
+from fusesoc_firm.converter.stages import STAGES
 from fusesoc_firm.tools.library_path import demos_root, library_root
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -28,8 +28,11 @@ def build(folder: Path, application: str = "quat2euler", **parameters: object) -
     """A build as FuseSoC leaves it: the generated core and its copy, which is returned."""
     given = {"spec": f"{application}.yaml"} | parameters
     generator = "far" if "spec" in parameters or not parameters else "firm"
-    given = given if generator == "far" else parameters
     root, vlnv = SPECS / application, f"robot:sys:{application}-system:{__version__}"
+    if generator == "firm":
+        given, root = parameters, folder
+        core = {"name": f"robot:sys:{application}:1", "generate": {"system": {"generator": "firm"}}}
+        (folder / "converters.core").write_text(f"CAPI=2:\n{yaml.safe_dump(core)}")
     request = make_request(generator, Call(vlnv, root, given), GENERATORS[generator], no_messages)
     made = folder / "generator_cache" / f"robot_sys_{application}-system_{__version__}-1234"
     for name, content in as_files(GENERATORS[generator].generate(request), request).items():
@@ -120,6 +123,10 @@ def test_a_core_of_converters_alone_and_all_lines(tmp_path: Path, capsys: Captur
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == len(path.read_text().splitlines())
     assert all(line.startswith(f"{number}: ") for number, line in enumerate(lines, start=1))
+    # Which generator it was, nobody else knows.
+    (tmp_path / "converters.core").unlink()
+    assert main(["why", str(path)]) == 1
+    assert f"error: no core in {tmp_path} has a generator of ours make " in capsys.readouterr().err
 
 
 def test_the_generated_core_itself_may_be_named(tmp_path: Path, capsys: Captured) -> None:

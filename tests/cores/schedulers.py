@@ -3,60 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusesoc_firm.scheduling.models import POLICIES, Combined, Scheduler
+from fusesoc_firm.scheduling.models import Combined, Scheduler, make_model
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.cores.sched_trace import Trace, read_trace
 from tests.hdl.ghdl import Generic, Library, core_files
 
 BENCH = "firm_sched_trace_tb"
-POLICY_CORES = ("queue", "engine", "fixed_priority", "round_robin", "lru", "edf_resources", "edf_latency", "lst")
+POLICY_CORES = ("queue", "engine", *dict.fromkeys(policy.core_file for policy in POLICIES.values()))
 SEED = 20240503
 
 _WITHOUT_POLICIES = ("axis/package", "axis/axis", "sim/host", "sched/package")
 
-
-@dataclass(frozen=True)
-class PolicyEntity:
-    """The entity of a policy, what makes it so, how many requesters it can have, and with how many it is immediate.
-
-    An immediate one chooses in the cycle of a request or of a task's last beat. Those with keys take a cycle more, and
-    have times among their generics.
-    """
-
-    entity: str
-    generics: Mapping[str, Generic] = field(default_factory=dict)
-    most_requesters: int = 256
-    most_immediate: int = 256
-    is_preemptive: bool = False
-
-    @property
-    def has_times(self) -> bool:
-        return not self.most_immediate
+NON_PREEMPTIVE = [name for name, policy in POLICIES.items() if not policy.is_preemptive]
 
 
-# By their names in policy_t, and in its order.
-ENTITIES: Mapping[str, PolicyEntity] = {
-    "fixed_priority": PolicyEntity("firm_sched_fixed_priority"),
-    "fixed_priority_preemptive": PolicyEntity("firm_sched_fixed_priority", {"PREEMPTIVE": True}, is_preemptive=True),
-    "round_robin": PolicyEntity("firm_sched_round_robin"),
-    "lru": PolicyEntity("firm_sched_lru", most_immediate=16),
-    "edf_resources": PolicyEntity("firm_sched_edf_resources", most_immediate=0, is_preemptive=True),
-    "edf_latency": PolicyEntity("firm_sched_edf_latency", most_immediate=0, is_preemptive=True),
-    "lst": PolicyEntity("firm_sched_lst", most_immediate=0, is_preemptive=True),
-}
-NON_PREEMPTIVE = [policy for policy, entity in ENTITIES.items() if not entity.is_preemptive]
+def preset_generics(policy: str) -> dict[str, Generic]:
+    """What makes the entity of a policy so."""
+    return {"PREEMPTIVE": True} if "PREEMPTIVE" in POLICIES[policy].generics else {}
 
 
-def cases(policies: list[str], sizes: tuple[int, ...]) -> list[tuple[str, int]]:
-    """Each policy with each number of requesters that it can have."""
-    return [(policy, size) for policy in policies for size in sizes if size <= ENTITIES[policy].most_requesters]
+def cases(policies: Iterable[str], sizes: tuple[int, ...]) -> list[tuple[str, int]]:
+    """Each policy with each number of requesters."""
+    return [(policy, size) for policy in policies for size in sizes]
 
 
 def immediate_cases(sizes: tuple[int, ...]) -> list[tuple[str, int]]:
-    """Each policy with each number of requesters with which it is immediate."""
-    return [(policy, size) for policy, size in cases(list(ENTITIES), sizes) if size <= ENTITIES[policy].most_immediate]
+    """Each policy with each number of requesters with which it is immediate.
+
+    An immediate one chooses in the cycle of a request or of a task's last beat. Those with deadlines take a cycle more.
+    """
+    untimed = [name for name, policy in POLICIES.items() if not policy.has_deadlines]
+    return [(policy, size) for policy, size in cases(untimed, sizes) if size <= POLICIES[policy].most_at_once]
 
 
 def analysed(folder: Path) -> Library:
@@ -88,13 +67,13 @@ def trace_of(library: Library, folder: Path, **generics: Generic) -> Trace:
 def model_of(trace: Trace, policy: str, groups: str = "") -> Scheduler:
     """The model of what the bench makes of its generics POLICY and GROUP_POLICIES."""
     if not groups:
-        return POLICIES[policy](trace.generics)
-    names = list(ENTITIES)
+        return make_model(policy, trace.generics)
+    names = list(POLICIES)
     members, first = [], 0
     for digit, size in zip(groups, trace.head["sizes"], strict=True):
-        members.append(POLICIES[names[int(digit)]](trace.generics.part(slice(first, first + size))))
+        members.append(make_model(names[int(digit)], trace.generics.part(slice(first, first + size))))
         first += size
-    return Combined(members, POLICIES[policy](trace.generics.part(slice(0, len(groups)))))
+    return Combined(members, make_model(policy, trace.generics.part(slice(0, len(groups)))))
 
 
 def timed_generics(trace: Trace) -> dict[str, str]:

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.cores.sched_trace import idle_grants, interruptions, most_overtaken
 from tests.cores.schedulers import (
-    ENTITIES,
     NON_PREEMPTIVE,
-    PolicyEntity,
     analyse_bench,
     analysed,
     cases,
     immediate_cases,
+    preset_generics,
     trace_of,
 )
 from tests.hdl.ghdl import Generic, Library
@@ -49,7 +49,7 @@ def test_who_asks_does_not_wait_for_who_is_idle(library: Library, tmp_path: Path
 
 
 @pytest.mark.one_in(4)
-@pytest.mark.parametrize(("policy", "requesters"), cases(list(ENTITIES), FEW_REQUESTERS))
+@pytest.mark.parametrize(("policy", "requesters"), cases(POLICIES, FEW_REQUESTERS))
 def test_only_preemptive_policies_interrupt(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
     trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters)
     assert (interruptions(trace) == 0) == (policy in NON_PREEMPTIVE)
@@ -85,7 +85,7 @@ def test_the_netlist_does_the_same(
     trace_of(library, tmp_path, **bench)
     source = (tmp_path / "trace.txt").read_text()
     netlists = analysed(tmp_path)
-    netlists.replace_by_netlist(ENTITIES[policy].entity, generics_of(policy, requesters, shortest_run))
+    netlists.replace_by_netlist(POLICIES[policy].entity, generics_of(policy, requesters, shortest_run))
     analyse_bench(netlists)
     trace_of(netlists, tmp_path, **bench)
     assert (tmp_path / "trace.txt").read_text() == source
@@ -95,22 +95,22 @@ def test_the_netlist_does_the_same(
 @pytest.mark.parametrize(("policy", "requesters"), immediate_cases(REQUESTERS))
 @pytest.mark.parametrize("shortest_run", [1, 3])
 def test_it_is_latch_free(library: Library, policy: str, requesters: int, shortest_run: int) -> None:
-    assert library.latches(ENTITIES[policy].entity, generics_of(policy, requesters, shortest_run)) == []
+    assert library.latches(POLICIES[policy].entity, generics_of(policy, requesters, shortest_run)) == []
 
 
 def generics_of(policy: str, requesters: int, shortest_run: int) -> dict[str, Generic]:
     """Those of the entity of a policy."""
-    entity = ENTITIES[policy]
-    own = {"SHORTEST_RUN": shortest_run} if entity.is_preemptive else {}
-    return {"REQUESTERS": requesters, **entity.generics, **own}
+    own = {"SHORTEST_RUN": shortest_run} if POLICIES[policy].is_preemptive else {}
+    return {"REQUESTERS": requesters, **preset_generics(policy), **own}
 
 
-@pytest.mark.parametrize("entity", [entity for entity in ENTITIES.values() if not entity.has_times])
-def test_illegal_numbers_of_requesters_are_named(library: Library, entity: PolicyEntity) -> None:
-    for requesters in (-1, 0, entity.most_requesters + 1):
-        result = library.run(entity.entity, {"REQUESTERS": requesters, **entity.generics})
+@pytest.mark.parametrize("policy", [name for name, policy in POLICIES.items() if not policy.has_deadlines])
+def test_illegal_numbers_of_requesters_are_named(library: Library, policy: str) -> None:
+    entity = POLICIES[policy].entity
+    for requesters in (-1, 0, 257):
+        result = library.run(entity, {"REQUESTERS": requesters, **preset_generics(policy)})
         assert result.exit_code != 0
-        assert f"{entity.entity}: REQUESTERS is {requesters}; legal: 1 to {entity.most_requesters}" in result.output
+        assert f"{entity}: REQUESTERS is {requesters}; legal: 1 to 256" in result.output
 
 
 @pytest.mark.parametrize("is_preemptive", [False, True])

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.cores.sched_trace import Trace, first_difference, read_trace
 from tests.cores.schedulers import (
-    ENTITIES,
     aggregate,
     analyse_bench,
     analysed,
@@ -58,7 +58,7 @@ def test_the_netlist_does_what_source_and_models_do(tmp_path: Path, top: str, gr
 
 def _generics(trace: Trace, top: str, groups: str) -> dict[str, str]:
     """The generics as they are in the trace's bench."""
-    names = [name.upper() for name in ENTITIES]
+    names = [name.upper() for name in POLICIES]
     return timed_generics(trace) | {
         "REQUESTERS": str(trace.requesters),
         "SIZES": aggregate(trace.head["sizes"]),

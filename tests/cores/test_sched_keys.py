@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fusesoc_firm.scheduling.models.engine import rows_and_columns
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.cores.sched_trace import Trace, first_difference, most_overtaken
 from tests.cores.schedulers import (
-    ENTITIES,
     aggregate,
     analyse_bench,
     analysed,
@@ -21,7 +21,7 @@ from tests.cores.schedulers import (
 )
 from tests.hdl.ghdl import Library
 
-TIMED = [policy for policy, entity in ENTITIES.items() if entity.has_times]
+TIMED = [policy for policy, entity in POLICIES.items() if entity.has_deadlines]
 # Each policy with each way to keep its tasks: in a heap, in a sorted queue, all at once.
 LST_IN_HEAP = 20
 SIZES = [
@@ -255,7 +255,7 @@ ILLEGAL = [
 def test_illegal_generics_are_named(tmp_path: Path, policy: str, requesters: int, generics: str, message: str) -> None:
     if policy == "lst":
         generics += "; TRANSFER_TIMES => (1, 1)"
-    entity = ENTITIES[policy].entity
+    entity = POLICIES[policy].entity
     assert f"{entity}: {message}" in _refusal(analysed(tmp_path), entity, requesters, generics)
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.cores.sched_trace import first_difference
-from tests.cores.schedulers import ENTITIES, analysed, cases, model_of, trace_of
+from tests.cores.schedulers import analysed, cases, model_of, trace_of
 from tests.hdl.ghdl import Library
 
 REQUESTERS = (1, 2, 3, 5, 8, 16, 32, 100, 256)
@@ -31,7 +32,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 
 @pytest.mark.one_in(8)
-@pytest.mark.parametrize(("policy", "requesters"), cases(list(ENTITIES), REQUESTERS))
+@pytest.mark.parametrize(("policy", "requesters"), cases(POLICIES, REQUESTERS))
 def test_grants_are_those_of_the_model(library: Library, tmp_path: Path, policy: str, requesters: int) -> None:
     trace = trace_of(library, tmp_path, POLICY=policy, REQUESTERS=requesters, SEGMENTS=10, CYCLES=2000)
     assert trace.beat.any()
@@ -68,7 +69,7 @@ def test_combined_grants_are_those_of_the_models(
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("policy", "requesters"), cases(list(ENTITIES), MANY_REQUESTERS))
+@pytest.mark.parametrize(("policy", "requesters"), cases(POLICIES, MANY_REQUESTERS))
 def test_a_million_grants_are_those_of_the_model(
     library: Library, tmp_path: Path, policy: str, requesters: int
 ) -> None:

@@ -1,4 +1,4 @@
-"""Frames and the files of the simulation host, as docs/simulation.md defines them, for tests of the cores."""
+"""Frames and the files of the simulated host (docs/reference/simulation-host.md), for tests of the cores."""
 
 from __future__ import annotations
 

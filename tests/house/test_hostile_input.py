@@ -26,7 +26,7 @@ from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName, RosVersion
 from fusesoc_firm.message.parser import parse_message, parse_name
-from fusesoc_firm.plugin.lock import read_lock
+from fusesoc_firm.plugin.lock_file import read_lock
 from fusesoc_firm.simulation.stimuli import read_stimuli
 from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.system.written.specification import read_specification
@@ -69,7 +69,7 @@ DEEP = {
 _GENERATE = """
 import sys
 from pathlib import Path
-from fusesoc_firm.cli.message import STAGES, _stage
+from fusesoc_firm.converter.stages import STAGES
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
@@ -82,7 +82,7 @@ for ros in RosVersion:
         if not (ros == 1 and "bounded" in word):
             definitions = library.closure(name)
             assert statistics(name, definitions).depth == 60
-            print(*(len(_stage(stage, name, definitions, 8)) for stage in STAGES if stage != "config"))
+            print(*(len(text(name, definitions, 8)) for stage, text in STAGES.items() if stage != "config"))
 """
 
 

@@ -1,4 +1,4 @@
-"""docs/types.md: all features of the dissertation's Table 5.1 with its marks, and tests that exist."""
+"""docs/reference/data-types.md: all features of the dissertation's Table 5.1 with its marks, and tests that exist."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "types.md"
+PAGE = ROOT / "docs" / "reference" / "data-types.md"
 
 # Number, ROS 1, ROS 2 and FIRM as the dissertation's Table 5.1 has them.
 TABLE_5_1 = """

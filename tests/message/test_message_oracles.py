@@ -191,14 +191,14 @@ def random_line(chance: random.Random) -> str:
 
 
 def is_wider(line: str, ros: RosVersion) -> bool:
-    """Whether we mean to take the line though the reference does not; docs/messages.md has the list."""
+    """Whether we mean to take the line though the reference does not; docs/reference/messages.md has the list."""
     if ros is ROS1:
         return "\t" in line
     return line[0].isspace() or "[ ]" in line
 
 
 def is_narrower(line: str, ros: RosVersion) -> bool:
-    """Whether we mean to refuse the line though the reference takes it; docs/messages.md has the list."""
+    """Whether we mean to refuse the line though the reference takes it; docs/reference/messages.md has the list."""
     code = line.partition("#")[0].strip()
     if "float32" in code and "1e39" in code:
         return True

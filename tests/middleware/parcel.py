@@ -1,4 +1,4 @@
-"""Parcel, a middleware that there is not: the example of docs/middlewares.md.
+"""Parcel, a middleware that there is not: the example of docs/how-to/add-a-middleware.md.
 
 A definition is a file `<Message>.parcel` in the folder of its package, a line for each field:
 

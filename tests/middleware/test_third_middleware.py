@@ -31,7 +31,7 @@ from fusesoc_firm.verify.simulation import firm_library, simulate, write_frames
 from tests.frame.oracle import is_same
 
 SEED = 20241123
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "middlewares.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "add-a-middleware.md"
 MODULE = Path(__file__).parent / "parcel.py"
 POSE, SCAN = MessageName("lab", "Pose"), MessageName("lab", "Scan")
 DEFINITIONS = {
@@ -182,7 +182,7 @@ def test_a_system_speaks_it(package: Path) -> None:
         f"raise SystemExit(main(['system', 'check', {str(specification)!r}, '--path', {str(package)!r}]))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=PAGE.parents[1]
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=PAGE.parents[2]
     )
     assert done.stdout.endswith("lab is right: 1 subscriber, 0 accelerators, 1 publisher\n"), done.stderr
 

@@ -1,4 +1,4 @@
-"""`make fuzz-netlist`: random designs, their netlists held against GHDL's simulation; see docs/simulation.md."""
+"""`make fuzz-netlist`: random designs, their netlists held against GHDL's simulation; see docs/reference/netlist.md."""
 
 from __future__ import annotations
 

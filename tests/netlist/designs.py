@@ -5,7 +5,7 @@ defined: nothing is divided by zero, no index and no integer leaves its range, a
 reset. So GHDL's simulation is right by definition, and a netlist must say the same.
 
 What is left out on purpose, as GHDL 2.0 synthesises it wrongly or not at all and a netlist does not show it, is listed
-in docs/simulation.md and marked with "Left out" here.
+in docs/reference/netlist.md and marked with "Left out" here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A simulator's end of the pipe (docs/transport.md) before a model of a system: every frame comes back as it is.
+"""A simulator's end of the pipe (docs/reference/transports.md) before a model of a system: each frame comes back.
 
 It is started as a command. `--fault` says what is to go wrong, when the frame with number `--at` has been taken.
 """

@@ -56,4 +56,4 @@ def test_a_mutation_must_find_its_text_once(file: str, old: str, tmp_path: Path)
 def test_the_document_holds_what_is_proved() -> None:
     tables = document.tables()
     for line in [*document.properties(), *(document.row(proof) for proof in PROOFS)]:
-        assert line in tables, f"docs/proofs.md has no row {line} `make proofs` writes it"
+        assert line in tables, f"docs/figures/proofs.md has no row {line} `make proofs` writes it"

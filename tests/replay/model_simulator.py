@@ -1,4 +1,4 @@
-"""A simulator of no system, for tests of who talks to one (docs/transport.md): `model_simulator.py WIDTH KIND...`.
+"""A simulator without a system (docs/reference/transports.md): `model_simulator.py WIDTH KIND...`.
 
 What the system does with a frame for subscriber k is the k-th of these kinds:
 

@@ -12,8 +12,7 @@ import pytest
 from fusesoc_firm.scheduling.analysis import Channel, analyse, overheads_of
 from fusesoc_firm.scheduling.evaluation.simulation import simulate
 from fusesoc_firm.scheduling.evaluation.workloads import Times, Workload
-from fusesoc_firm.scheduling.models import POLICIES as MODELS
-from fusesoc_firm.scheduling.models import Generics
+from fusesoc_firm.scheduling.models import Generics, make_model
 from fusesoc_firm.scheduling.policies import POLICIES
 from fusesoc_firm.scheduling.tasks import Task
 
@@ -44,7 +43,7 @@ def worst_responses(
         for key in ("transfer_time", "period", "deadline")
     )
     workload = Workload(transfer, pauses, periods)
-    model = MODELS[policy](Generics(periods, transfer, deadlines, channel.shortest_run))
+    model = make_model(policy, Generics(periods, transfer, deadlines, channel.shortest_run))
     resume = 1 if POLICIES[policy].is_preemptive else 0
     trace = simulate(model, workload, cycles, first, resume)
     found = trace.tasks
@@ -69,6 +68,7 @@ def slack(policy: str, tasks: list[Task], first: Times, pauses: Times, cycles: i
     return left
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("count", [2, 3])
 def test_over_the_hyperperiod_from_every_phase(policy: str, count: int) -> None:
@@ -101,6 +101,7 @@ def test_alone(policy: str) -> None:
         assert left == [0] or overheads_of(policy, 1).acceptance, f"seed {SEED}: {tasks}, {left}"
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("count", [4, 7, 12, 20])
 def test_with_random_requests(policy: str, count: int) -> None:

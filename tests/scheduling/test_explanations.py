@@ -1,4 +1,4 @@
-"""What docs/scheduling.md says of why our values and the dissertation's differ: the large data set, by other models.
+"""The reasons in docs/explanation/scheduler-differences.md: the large data set, by other models.
 
 Each claim of the page that rests on an experiment is one here, with the page's seed and all 200 sets.
 """

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fusesoc_firm.scheduling.models import POLICIES, Combined, Generics, Scheduler
+from fusesoc_firm.scheduling.models import Combined, Generics, Scheduler, make_model
+from fusesoc_firm.scheduling.policies import POLICIES
 
 
 def grants(scheduler: Scheduler, tasks: list[list[int]], cycles: int) -> list[list[int]]:
@@ -27,7 +28,7 @@ def grants(scheduler: Scheduler, tasks: list[list[int]], cycles: int) -> list[li
 
 def scheduler_of(policy: str, requesters: int = 2, batch: int = 1, shortest_run: int = 1) -> Scheduler:
     times = np.full((batch, requesters), 100)
-    return POLICIES[policy](Generics(times, transfer_times=times // 2, shortest_run=shortest_run))
+    return make_model(policy, Generics(times, transfer_times=times // 2, shortest_run=shortest_run))
 
 
 @pytest.mark.parametrize(
@@ -85,14 +86,14 @@ def test_input_is_left_as_it_was() -> None:
 def test_times_that_do_not_fit_are_named(policy: str, requesters: int) -> None:
     periods = np.full((1, requesters), 32)
     with pytest.raises(ValueError, match="time_bits is 8; legal: 9 and more for a deadline of 32 cycles"):
-        POLICIES[policy](Generics(periods, periods, time_bits=8))
+        make_model(policy, Generics(periods, periods, time_bits=8))
     with pytest.raises(ValueError, match="time_bits is 32; legal: 8 to 31"):
-        POLICIES[policy](Generics(periods, periods, time_bits=32))
+        make_model(policy, Generics(periods, periods, time_bits=32))
 
 
 def test_least_slack_time_needs_transfer_times() -> None:
     with pytest.raises(ValueError, match="transfer_times is None; legal: the beats of each requester's tasks"):
-        POLICIES["lst"](Generics(np.full((1, 2), 10)))
+        make_model("lst", Generics(np.full((1, 2), 10)))
 
 
 def test_illegal_generics_are_named() -> None:

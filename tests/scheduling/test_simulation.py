@@ -8,7 +8,7 @@ import pytest
 from fusesoc_firm.scheduling.evaluation.simulation import Trace, simulate
 from fusesoc_firm.scheduling.evaluation.timeline import Recorder
 from fusesoc_firm.scheduling.evaluation.workloads import Times, Workload
-from fusesoc_firm.scheduling.models import POLICIES, Generics
+from fusesoc_firm.scheduling.models import Generics, make_model
 from tests.scheduling.numbers import times
 
 
@@ -21,7 +21,8 @@ def run(
     resume_beats: int = 0,
 ) -> Trace:
     workload = Workload(transfers, pauses)
-    model = POLICIES["fixed_priority_preemptive" if is_preemptive else "fixed_priority"](Generics(workload.deadlines))
+    policy = "fixed_priority_preemptive" if is_preemptive else "fixed_priority"
+    model = make_model(policy, Generics(workload.deadlines))
     return simulate(model, workload, cycles, first, resume_beats)
 
 
@@ -81,7 +82,7 @@ def test_sets_do_not_touch_each_other() -> None:
 
 def test_the_scheduler_sees_requests_that_stay_until_the_last_beat() -> None:
     workload = Workload(times([3, 2]), times([4, 4]))
-    model = Recorder(POLICIES["fixed_priority"](Generics(workload.deadlines)))
+    model = Recorder(make_model("fixed_priority", Generics(workload.deadlines)))
     simulate(model, workload, 12, times([0, 1]))
     request = "".join("-01b"[int(r[0, 0]) * 1 + int(r[0, 1]) * 2] for r in model.request)
     assert request == "0bbb11--00bb"

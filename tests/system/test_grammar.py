@@ -12,7 +12,7 @@ from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 from tests.system.systems import read
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "reference"
 _FORMS = {"text": "word", "texts": "words"}
 
 
@@ -125,7 +125,9 @@ def _default(section: type[Section], field: str, entry: Key) -> str:
     return "none" if default in (None, ()) else str(default)
 
 
-@pytest.mark.parametrize(("page", "grammar"), [("specification.md", Specification), ("converters.md", ConfigFile)])
+@pytest.mark.parametrize(
+    ("page", "grammar"), [("specification.md", Specification), ("converter-configuration.md", ConfigFile)]
+)
 def test_the_page_has_every_key_as_it_is(page: str, grammar: type[Section]) -> None:
     lines = (DOCS / page).read_text(encoding="utf-8").splitlines()
     start = lines.index("| section | key | form | default | legal | meaning |") + 2

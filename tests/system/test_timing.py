@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.scheduling.policies import POLICIES
 from fusesoc_firm.system.derived.model import DerivedSystem, PublisherTimes, Scheduling
 from fusesoc_firm.system.derived.timing import bounds_of, frame_beats
 from fusesoc_firm.system.hardware.configuration import system_configuration
 from fusesoc_firm.system.views.show import derived_description
-from fusesoc_firm.system.written.specification import SCHEDULERS
 from tests.system.systems import converter, derived, specification
 
 PREEMPTIVE = {"fixed_priority_preemptive", "edf_resources", "edf_latency", "lst"}
@@ -70,7 +70,7 @@ def test_a_message_without_bound_is_sent_for_nobody_knows_how_long(tmp_path: Pat
     assert times(tmp_path, "message: std_msgs/String, period: 500, wcet: 90").transfer_time == 90
 
 
-@pytest.mark.parametrize("policy", SCHEDULERS)
+@pytest.mark.parametrize("policy", POLICIES)
 def test_every_policy_gets_its_generics(tmp_path: Path, policy: str) -> None:
     keys = ("period: 500", "period: 90, deadline: 80, wcet: 30")
     found = system(tmp_path, f"scheduler: {policy}, shortestRun: 4", *keys)

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TOOLS = Path(__file__).resolve().parent
 ZYNQ = ("zynq7000", "zcu104")
 WITH_KERNELS = "quat2euler_hls"
-# Six applications (docs/applications.md), and two of them with accelerators in C++ and in Verilog.
+# Six applications (docs/reference/applications.md), and two of them with accelerators in C++ and in Verilog.
 CORES = (
     *("image_pipeline", "mobile_robot", "multi_type", "quat2euler", "robotic_arm", "sobel"),
     *(WITH_KERNELS, "multi_type_verilog"),

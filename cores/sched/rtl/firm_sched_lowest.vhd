@@ -11,7 +11,8 @@ use firm.firm_sched_pkg.all;
 
 entity firm_sched_lowest is
   generic (
-    REQUESTERS : integer := 2);
+    REQUESTERS : integer := 2
+  );
   port (
     request     : in  std_logic_vector(REQUESTERS-1 downto 0);
     index       : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
@@ -19,7 +20,8 @@ entity firm_sched_lowest is
     asks        : out std_logic;  -- the given one
     found       : out std_logic;  -- another one asks
     is_before   : out std_logic;  -- one of a lower index does
-    lowest      : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));  -- any if none is found
+    lowest      : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)  -- any if none is found
+  );
 end entity firm_sched_lowest;
 
 architecture rtl of firm_sched_lowest is
@@ -101,11 +103,13 @@ begin
     u_of_first : entity firm.firm_axis_select
       generic map (
         WORDS => ROWS,
-        WIDTH => COLUMNS)
+        WIDTH => COLUMNS
+      )
       port map (
         words_in => padded,
         index    => first_row,
-        word     => of_first);
+        word     => of_first
+      );
 
     of_row     <= word_at(padded, row);
     left       <= of_row and not is_column;

@@ -35,7 +35,8 @@ entity firm_sched_trace_tb is
     -- At the beginning of a stretch nobody takes a beat for as many cycles at most.
     LONGEST_STALL : integer := 0;
     TRACE     : string  := "trace.txt";
-    EXPECTED  : string  := "");
+    EXPECTED  : string  := ""
+  );
 end entity firm_sched_trace_tb;
 
 architecture simulation of firm_sched_trace_tb is
@@ -143,7 +144,8 @@ begin
         TRANSFER_TIMES => TRANSFER_TIMES,
         DEADLINES      => DEADLINES,
         TIME_BITS      => TIME_BITS,
-        SHORTEST_RUN   => SHORTEST_RUN)
+        SHORTEST_RUN   => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -151,7 +153,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate plain;
 
   of_groups : if IS_COMBINED generate
@@ -165,7 +168,8 @@ begin
         TRANSFER_TIMES => TRANSFER_TIMES,
         DEADLINES      => DEADLINES,
         TIME_BITS      => TIME_BITS,
-        SHORTEST_RUN   => SHORTEST_RUN)
+        SHORTEST_RUN   => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -173,7 +177,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_groups;
 
   drive : process

@@ -1,1 +1,1 @@
-"""How frames get between the host's software and the hardware, be it simulated or not (docs/transport.md)."""
+"""How frames get between the host's software and hardware, simulated or not (docs/reference/transports.md)."""

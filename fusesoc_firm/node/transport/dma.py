@@ -1,8 +1,9 @@
 """AXI DMA between memory and the system's streams, as the block design of a board with a processor has it.
 
-That is one with scatter and gather, 26 bits of length, 32 of address, and no realignment (docs/boards.md). Each
-direction has a ring of descriptors with a buffer each: frames are copied into the buffers that are free, a burst comes
-into the next ones. What is longer than a buffer goes on in the next one. Registers and descriptors: PG021 (AXI DMA).
+That is one with scatter and gather, 26 bits of length, 32 of address, and no realignment
+(docs/how-to/build-for-a-board.md). Each direction has a ring of descriptors with a buffer each: frames are copied
+into the buffers that are free, a burst comes into the next ones. What is longer than a buffer goes on in the next
+one. Registers and descriptors: PG021 (AXI DMA).
 
 Python has no barrier between memory and registers. It relies on the many instructions between a write to the one and a
 write to the other, which a program in C++ could not.

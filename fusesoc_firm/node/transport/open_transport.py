@@ -1,4 +1,4 @@
-"""A transport by its address, as it stands on a command line or in a launch file (docs/transport.md).
+"""A transport by its address, as it stands on a command line or in a launch file (docs/reference/transports.md).
 
 pipe:COMMAND                      a simulator
 uart:DEVICE:BAUD[:rtscts]         a serial line, with flow control by wires

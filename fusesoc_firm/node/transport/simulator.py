@@ -1,4 +1,4 @@
-"""A simulated system at the end of a pipe (docs/transport.md, 'A simulator's pipe').
+"""A simulated system at the end of a pipe (docs/reference/transports.md, 'A simulator's pipe').
 
     with Simulator(command, folder) as simulator:               # step by step: the same requests, the same reports
         simulator.request(pack_frame(0, payload))

@@ -132,7 +132,7 @@ def _report(selection: Selection, tables: Sequence[Table], figures: Sequence[Fig
     settings = selection.settings
     data_sets = "\n".join(f"* {_heading(name, settings)}" for name in selection.data_sets)
     intro = f"""The dissertation's section 4.3 again, by `firm scheduler bench`: {_of_all(settings)}.
-Times are in clock cycles; docs/scheduling.md defines the metrics.
+Times are in clock cycles; docs/explanation/scheduler-evaluation.md defines the metrics.
 
 {data_sets}
 """

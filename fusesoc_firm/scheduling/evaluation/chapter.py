@@ -11,7 +11,7 @@ from fusesoc_firm.scheduling.dissertation import dissertation
 from fusesoc_firm.scheduling.evaluation.combinations import BASELINES, COMBINATIONS, COMBINED_REQUESTERS
 from fusesoc_firm.scheduling.evaluation.jobs import Key
 from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, REQUESTERS
-from fusesoc_firm.scheduling.policies import EVALUATED, POLICIES
+from fusesoc_firm.scheduling.policies import EVALUATED, POLICIES, TABLE_ORDER
 from fusesoc_firm.scheduling.tables import UNKNOWN, Figure, Panel, Table, decimal
 
 LARGE = "large"
@@ -41,7 +41,7 @@ class Evaluation:
     def policies(self, data_set: str) -> tuple[str, ...]:
         """The policies that were evaluated, in the order of the tables."""
         found = {key.policy for key in self.means if key.data_set == data_set}
-        return tuple(name for name in POLICIES if name in found)
+        return tuple(name for name in TABLE_ORDER if name in found)
 
 
 def tables(evaluation: Evaluation) -> Iterator[Table]:

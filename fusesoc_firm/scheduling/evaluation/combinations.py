@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fusesoc_firm.scheduling.models import POLICIES, Combined, Generics
+from fusesoc_firm.scheduling.models import Combined, Generics, make_model
 
 COMBINED_REQUESTERS = 256
 """The accelerators of figure 4.18 and of table 4.5."""
@@ -33,5 +33,5 @@ def combined(policies: tuple[str, str], generics: Generics) -> Combined:
     """The model of a combination, whose two halves have the requesters in their order."""
     half = generics.requesters // 2
     parts = (slice(0, half), slice(half, None))
-    groups = [POLICIES[policy](generics.part(part)) for policy, part in zip(policies, parts, strict=True)]
-    return Combined(groups, POLICIES[TOP](Generics(np.ones((generics.batch, 2), np.int64))))
+    groups = [make_model(policy, generics.part(part)) for policy, part in zip(policies, parts, strict=True)]
+    return Combined(groups, make_model(TOP, Generics(np.ones((generics.batch, 2), np.int64))))

@@ -10,8 +10,7 @@ from fusesoc_firm.scheduling.evaluation.combinations import COMBINATIONS, COMBIN
 from fusesoc_firm.scheduling.evaluation.metrics import Metrics, measure
 from fusesoc_firm.scheduling.evaluation.simulation import SchedulerModel, simulate
 from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, Distribution, Workload, draw
-from fusesoc_firm.scheduling.models import POLICIES as MODELS
-from fusesoc_firm.scheduling.models import Generics
+from fusesoc_firm.scheduling.models import Generics, make_model
 from fusesoc_firm.tools.workers import Workers
 
 
@@ -74,7 +73,7 @@ def model_of(policy: str, workload: Workload, shortest_run: int = 1) -> Schedule
     generics = Generics(workload.deadlines, workload.transfer_times, shortest_run=shortest_run)
     if policy in COMBINATIONS:
         return combined(COMBINATIONS[policy], generics)
-    return MODELS[policy](generics)
+    return make_model(policy, generics)
 
 
 def evaluate(job: Job) -> Outcome:

@@ -5,7 +5,7 @@ are taken over the tasks of a set, then the mean of each over the sets: so table
 three columns, and the models of the fixed priorities and of LRU come to their values with it.
 
 The response time is that of every granted task, though equation 4.4 speaks of completed transactions: the maxima of
-table 4.3 come out only with those that the simulation's end cut short (docs/scheduling.md).
+table 4.3 come out only with those that the simulation's end cut short (docs/explanation/scheduler-evaluation.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Derived System -> template configuration: constraints of clocks, and of the paths between them (docs/clocks.md)."""
+"""Derived System -> template configuration: constraints of clocks, and of the paths between them.
+
+docs/how-to/use-several-clocks.md lists them.
+"""
 
 from __future__ import annotations
 

@@ -15,19 +15,15 @@ from math import ceil, floor
 from typing import TYPE_CHECKING
 
 from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
 from fusesoc_firm.scheduling.tasks import Task
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, PublisherTimes, Scheduling
-from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, SCHEDULERS, Block, Project
+from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, Block, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.yaml_text import Text
 
 if TYPE_CHECKING:
     from fusesoc_firm.scheduling.analysis import Bound, Channel
-
-# Policies that may interrupt a frame, that compare deadlines, and that compare what is left of them.
-PREEMPTIVE = ("fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
-WITH_DEADLINES = ("edf_resources", "edf_latency", "lst")
-WITH_TRANSFER_TIMES = ("lst",)
 
 # Bytes of a frame before its payload: id and length.
 _HEADER_BYTES = 5
@@ -69,7 +65,7 @@ def scheduling_of(
     _check_complete(policy, [blocks[item.block] for item in publishers], times, faults)
     if policy == AUTO_SCHEDULER:
         policy, reasons = _chosen(project, publishers, times)
-    return Scheduling(policy, times, policy in PREEMPTIVE, project.shortest_run, _time_bits(times), reasons)
+    return Scheduling(policy, times, POLICIES[policy].is_preemptive, project.shortest_run, _time_bits(times), reasons)
 
 
 def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
@@ -125,7 +121,7 @@ def _chosen(
 
     tasks = _tasks(publishers, times)
     if len(tasks) < len(publishers) or project.shortest_run < 1:
-        return SCHEDULERS[0], ()
+        return DEFAULT, ()
     channel = Channel(project.width // 8, project.shortest_run)
     # Publishers have their priorities by their ids, which the host knows: these stay as they are.
     choice = choose(tasks, Criterion.LUTS, channel, is_ordered=True)
@@ -167,14 +163,17 @@ def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
 
 def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
     """Note what a policy must know of a publisher and is not said."""
+    is_auto = policy == AUTO_SCHEDULER
+    has_deadlines = not is_auto and POLICIES[policy].has_deadlines
+    has_transfer_times = is_auto or POLICIES[policy].has_transfer_times
     for block, item in zip(blocks, times, strict=True):
         # What cannot be read is noted already.
-        if policy == AUTO_SCHEDULER and item.period is None and block.period is None:
+        if is_auto and item.period is None and block.period is None:
             faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
-        if policy in WITH_DEADLINES and item.deadline is None and block.period is None and block.deadline is None:
+        if has_deadlines and item.deadline is None and block.period is None and block.deadline is None:
             message = f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'"
             faults.error(message, block.name.source, _PERIOD)
-        if policy in (*WITH_TRANSFER_TIMES, AUTO_SCHEDULER) and item.transfer_time is None and block.wcet is None:
+        if has_transfer_times and item.transfer_time is None and block.wcet is None:
             message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound"
             faults.error(message, block.name.source, _WCET)
 

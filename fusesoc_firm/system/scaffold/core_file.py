@@ -6,15 +6,17 @@ that a target that is new there comes to every system; those of the author's own
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.request.core_reader import read_core
 from fusesoc_firm.system.boards.board import FOLDER, QUARTUS, VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.verilog_bench import translated_unit
+from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
@@ -49,8 +51,24 @@ class CoreOptions:
     stimuli: str = "stimuli.yaml"
     model: str = "model.py"
     environment: Sequence[str] = ()
-    paths: Sequence[str] = ()
+    paths: Sequence[str | Path] = ()
     distro: str = ""
+
+
+def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
+    """The text of the `.core` in `path` for the system of a specification: of one that is there, with new targets.
+
+    The `paths` of `options` are told from the current folder. Raises `InputError`.
+    """
+    if path.exists():
+        return updated_core(loaded.system, path)
+    folder = path.absolute().parent
+    options = replace(
+        options,
+        depend=[*options.depend, *loaded.specification.message_cores],
+        paths=[os.path.relpath(item, folder) for item in options.paths],
+    )
+    return new_core(loaded.system, os.path.relpath(spec, folder), options)
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
@@ -151,6 +169,6 @@ def _value(value: str | Sequence[str]) -> str:
     return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
 
 
-def _paths(items: Sequence[str]) -> str:
+def _paths(items: Sequence[str | Path]) -> str:
     """A list on one line; nothing if it is empty."""
     return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

@@ -73,6 +73,19 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
     }
 
 
+def counts(system: DerivedSystem) -> str:
+    """How many blocks of each kind a system has, in words."""
+    found = [
+        (len(system.subscribers), "subscriber"),
+        (len(system.accelerators), "accelerator"),
+        (len(system.publishers), "publisher"),
+    ]
+    if system.software.blocks:
+        found.append((len(system.software.blocks), "accelerator"))
+    words = ", ".join(f"{count} {word}{'' if count == 1 else 's'}" for count, word in found)
+    return words + (" in software" if system.software.blocks else "")
+
+
 def _clocks(system: DerivedSystem) -> dict[str, Any]:
     """The further clocks, each with its port and its frequency in Hz."""
     clocks = [{"name": item.name, "port": item.port, "hertz": float(item.frequency)} for item in system.clocks]

@@ -14,6 +14,7 @@ from typing import Any
 
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.message.model import MIDDLEWARES
+from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.text.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
@@ -34,17 +35,7 @@ SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
 CONVERTER, ACCELERATOR = "converter", "accelerator"
 # What makes a block a converter.
 CONVERTER_KEYS = ("middleware", "mode", "message")
-# Cores of robot:sched, each with the policy it is called after.
-SCHEDULERS = (
-    "fixed_priority",
-    "fixed_priority_preemptive",
-    "round_robin",
-    "lru",
-    "edf_resources",
-    "edf_latency",
-    "lst",
-)
-# The smallest of these that holds all deadlines.
+# The smallest of the schedulers that holds all deadlines.
 AUTO_SCHEDULER = "auto"
 # How frames get between the host and the system: the top level's own streams, or a link of bytes (cores/board).
 AXI_STREAM = "axi_stream"
@@ -88,9 +79,7 @@ class Project(Section):
     # The dissertation's listings 6.1, 6.6 and 5.1 spell it in three ways.
     fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
     width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
-    scheduler: Text = key(
-        "who may send to the host next", choices=(*SCHEDULERS, AUTO_SCHEDULER), default=Text(SCHEDULERS[0])
-    )
+    scheduler: Text = key("who may send to the host next", choices=(*POLICIES, AUTO_SCHEDULER), default=Text(DEFAULT))
     shortest_run: int = key(
         "beats that a publisher sends at least before a preemptive scheduler interrupts it",
         name="shortestRun",

@@ -16,7 +16,8 @@ entity sobel is
   generic (
     WIDTH       : integer := 8;
     -- The widest image; a wider one becomes an empty one.
-    MAX_COLUMNS : integer := 2048);
+    MAX_COLUMNS : integer := 2048
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -81,7 +82,8 @@ entity sobel is
     out_data_axis_tready            : in  std_logic;
     out_segment_valid               : out std_logic_vector(2 downto 0);
     out_msg_valid                   : out std_logic;
-    out_msg_ready                   : in  std_logic);
+    out_msg_ready                   : in  std_logic
+  );
 end entity sobel;
 
 architecture rtl of sobel is
@@ -197,7 +199,8 @@ begin
     generic map (
       WIDTH        => WIDTH,
       GROUP_BYTES  => LANES,
-      MAX_COLUMNS  => MAX_COLUMNS)
+      MAX_COLUMNS  => MAX_COLUMNS
+    )
     port map (
       clk                             => clk,
       rst_n                           => rst_n,
@@ -261,7 +264,8 @@ begin
       result_count                    => result_count,
       result_last                     => result_last,
       result_valid                    => result_valid,
-      result_ready                    => result_ready);
+      result_ready                    => result_ready
+    );
 
   advance <= result_ready or not out_r;
   -- Where a row is one group, the next one may not be read before this one is written.

@@ -4,7 +4,7 @@
     pair = bench.pair(RosVersion.ROS2, "geometry_msgs/Point")
     result = pair.run(tmp_path, [pair.frame_of(payload)], SEED=7, STALL_PERCENT=30)
 
-Payloads come from rosbags; which frames are good, and why not, is decided here by the text of docs/converters.md
+Payloads come from rosbags; which frames are good, and why not, is decided here by docs/reference/converters.md
 and not by the templates' configuration.
 """
 

@@ -6,7 +6,8 @@ use ieee.numeric_std.all;
 
 entity arithmetic is
   generic (
-    OFFSET : integer := 1);
+    OFFSET : integer := 1
+  );
   port (
     clk      : in  std_logic;
     a        : in  std_logic_vector(15 downto 0);
@@ -21,7 +22,8 @@ entity arithmetic is
     by_bits  : out std_logic_vector(15 downto 0);
     by_bit   : out std_logic;
     turn     : out std_logic_vector(15 downto 0);
-    driven   : out std_logic_vector(3 downto 0));
+    driven   : out std_logic_vector(3 downto 0)
+  );
 end entity arithmetic;
 
 architecture rtl of arithmetic is

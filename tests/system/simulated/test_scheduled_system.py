@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.system.written.specification import SCHEDULERS
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.system.simulated.systems import GeneratedSystem, build, call
 
 SEED = 20241008
@@ -69,7 +69,7 @@ def system(folder: Path, scheduler: str, width: int) -> GeneratedSystem:
 
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 64])
-@pytest.mark.parametrize("scheduler", [*SCHEDULERS, "auto"])
+@pytest.mark.parametrize("scheduler", [*POLICIES, "auto"])
 def test_every_message_comes_back(tmp_path: Path, scheduler: str, width: int) -> None:
     made = system(tmp_path, scheduler, width)
     assert made.passes(STALL_PERCENT=0)

@@ -26,7 +26,8 @@ entity firm_image_header is
     -- The widest image; 65535/OUT_BYTES at most.
     MAX_COLUMNS : integer := 65535;
     -- A longer frame_id is cut.
-    FRAME_ID_BYTES : integer := 256);
+    FRAME_ID_BYTES : integer := 256
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -79,7 +80,8 @@ entity firm_image_header is
     rows      : out std_logic_vector(15 downto 0);  -- none where all data is to be dropped
     -- The beats of the pixels may be shown; they have all been taken.
     show      : out std_logic;
-    done      : in  std_logic);
+    done      : in  std_logic
+  );
 end entity firm_image_header;
 
 architecture rtl of firm_image_header is
@@ -234,7 +236,8 @@ begin
   u_frame_id : entity firm.firm_axis_fifo
     generic map (
       WIDTH => WIDTH,
-      DEPTH => FRAME_ID_BEATS)
+      DEPTH => FRAME_ID_BEATS
+    )
     port map (
       clk           => clk,
       rst_n         => store_rst_n,
@@ -247,7 +250,8 @@ begin
       m_axis_tkeep  => out_header_frame_id_axis_tkeep,
       m_axis_tvalid => frame_id_valid,
       m_axis_tlast  => frame_id_last,
-      m_axis_tready => frame_id_pop);
+      m_axis_tready => frame_id_pop
+    );
 
   in_encoding_axis_tready <= '1' when state_r = ENCODING and in_segment_valid(1) = '1' else '0';
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Bursts from a preemptive Manager, joined to frames (docs/manager.md, "Bursts"): what fusesoc_firm/node/bursts.py does,
+/* Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, "Bursts"): what fusesoc_firm/node/bursts.py does,
  * with a buffer for each publisher. Both are tested with the same bursts. */
 #ifndef FIRM_BURSTS_H
 #define FIRM_BURSTS_H

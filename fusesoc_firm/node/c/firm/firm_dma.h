@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* AXI DMA between memory and the system's streams, as the block design of a board with a processor has it
- * (docs/boards.md): scatter and gather, 26 bits of length, 32 of address, no realignment. PG021 has registers and
+ * (docs/how-to/build-for-a-board.md): scatter and gather, 26 bits of length, 32 of address, no realignment. PG021 has registers and
  * descriptors. What is C++ in firm/dma_transport.hpp is C here, with static memory and caches. */
 #ifndef FIRM_DMA_H
 #define FIRM_DMA_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Frames to the hardware: a queue for each subscriber, and the least recently used one is next (the dissertation's section
- * 6.3.3; docs/host_scheduling.md). What fusesoc_firm/node/queues.py does by default, in a static array.
+ * 6.3.3; docs/reference/host-queues.md). What fusesoc_firm/node/queues.py does by default, in a static array.
  *
  * A payload is copied once, outside of the lock, into a slot that becomes the frame's until it has been sent. */
 #ifndef FIRM_QUEUES_H

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bursts from a preemptive Manager, joined to frames (docs/manager.md, "Bursts").
+// Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, "Bursts").
 //
 //     firm::BurstJoiner joiner(4, 64);                     // publishers, bits of the stream
 //     if (auto frame = joiner.push(bytes, size)) {         // the bytes between two tlast, those that tkeep marks

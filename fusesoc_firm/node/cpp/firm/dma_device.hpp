@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a driver in user space needs of AXI DMA under Linux: its registers and its interrupt by UIO, and memory that
 // processor and engine share by u-dma-buf (https://github.com/ikwzm/udmabuf). Which device tree this needs is in
-// docs/nodes.md.
+// docs/reference/node-library.md.
 #pragma once
 
 #include <fcntl.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // AXI DMA between memory and the system's streams, as the block design of a board with a processor has it
-// (docs/boards.md): scatter and gather, 26 bits of length, 32 of address, no realignment.
+// (docs/how-to/build-for-a-board.md): scatter and gather, 26 bits of length, 32 of address, no realignment.
 //
 // Each direction has a ring of descriptors with a buffer each. Frames are copied into the buffers that are free and
 // follow each other without a pause; a burst comes into the next buffers that are free, so several may come while the

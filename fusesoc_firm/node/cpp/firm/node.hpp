@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A node's engine, whatever its middleware: payloads to the hardware, payloads from it (docs/nodes.md).
+// A node's engine, whatever its middleware: payloads to the hardware, payloads from it (docs/reference/node-library.md).
 //
 //     firm::NodeConfiguration system;                       // its width, subscribers, publishers
 //     firm::Node node(system, "dma:/dev/uio0:udmabuf0", publish);   // called with publisher, payload, size

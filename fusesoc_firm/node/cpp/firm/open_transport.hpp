@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A transport by its address, as it stands in a launch file or on a command line (docs/transport.md):
+// A transport by its address, as it stands in a launch file or on a command line (docs/reference/transports.md):
 //
 //     pipe:COMMAND                      a simulator
 //     uart:DEVICE:BAUD[:rtscts]         a serial link, with flow control by wires

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A simulator as hardware: a command that does what it is asked through a pipe (docs/transport.md, "A simulator's pipe").
+// A simulator as hardware: a command that does what it is asked through a pipe (docs/reference/transports.md, "A simulator's pipe").
 //
 // A thread of its own asks: it hands over the frames that wait, lets the simulator run, and takes its reports. It sleeps
 // when nothing has moved for a while, and when nobody takes the bursts that have come: that is the back-pressure.

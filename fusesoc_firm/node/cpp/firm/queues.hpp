@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Frames to the hardware: a queue for each subscriber, and a policy that says which is next (the dissertation's section
-// 6.3.3, figure 6.4b; docs/host_scheduling.md).
+// 6.3.3, figure 6.4b; docs/reference/host-queues.md).
 //
 //     firm::SubscriberQueues<Frame> queues(3, 10);         // subscribers, frames in each; least recently used
 //     queues.put(subscriber, frame);                       // any thread, a middleware's callback

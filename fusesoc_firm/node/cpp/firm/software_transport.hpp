@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Blocks in software as if they were hardware: a child process that takes frames at its standard input and gives frames
-// at its standard output, with ids of its own (docs/nodes.md, "Blocks in software").
+// at its standard output, with ids of its own (docs/reference/node-library.md, "Blocks in software").
 //
 // `python3 -m fusesoc_firm.node.software_process SPEC` is one; any program may be.
 #pragma once

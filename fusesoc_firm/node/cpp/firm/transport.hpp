@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The one interface to the hardware: frames to it, bursts from it (docs/transport.md).
+// The one interface to the hardware: frames to it, bursts from it (docs/reference/transports.md).
 //
 //     auto transport = firm::open_transport("pipe:./simulator");   // firm/open_transport.hpp
 //     transport->send(frame.data(), frame.size());                 // waits while the hardware takes no more

@@ -29,7 +29,8 @@ entity merge is
     out1_y             : out std_logic_vector(63 downto 0);
     out1_z             : out std_logic_vector(63 downto 0);
     out1_segment_valid : out std_logic_vector(0 downto 0);
-    out1_msg_ready     : in  std_logic);
+    out1_msg_ready     : in  std_logic
+  );
 end entity merge;
 
 architecture rtl of merge is

@@ -17,7 +17,8 @@ entity rotate is
     out_y             : out std_logic_vector(63 downto 0);
     out_z             : out std_logic_vector(63 downto 0);
     out_segment_valid : out std_logic_vector(0 downto 0);
-    out_msg_ready     : in  std_logic);
+    out_msg_ready     : in  std_logic
+  );
 end entity rotate;
 
 architecture rtl of rotate is

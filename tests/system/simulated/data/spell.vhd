@@ -6,7 +6,8 @@ use ieee.numeric_std.all;
 
 entity spell is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk                  : in  std_logic;
     rst_n                : in  std_logic;
@@ -22,7 +23,8 @@ entity spell is
     out_data_axis_tready : in  std_logic;
     out_segment_valid    : out std_logic_vector(0 downto 0);
     out_msg_valid        : out std_logic;
-    out_msg_ready        : in  std_logic);
+    out_msg_ready        : in  std_logic
+  );
 end entity spell;
 
 architecture rtl of spell is

@@ -15,7 +15,8 @@ entity swap is
     out_position_x    : out std_logic_vector(63 downto 0);
     out_position_y    : out std_logic_vector(63 downto 0);
     out_segment_valid : out std_logic_vector(0 downto 0);
-    out_msg_ready     : in  std_logic);
+    out_msg_ready     : in  std_logic
+  );
 end entity swap;
 
 architecture rtl of swap is
