@@ -26,7 +26,7 @@ ALLOWED: dict[str, str] = {
     "netlist": "text tools",
     "scheduling": "text tools",
     "building": "request text tools",
-    "system": "converter frame message request scheduling store text",
+    "system": "converter frame message request scheduling store text tools",
     "verify": "converter frame message request text tools",
     "bags": "frame message system text",
     "simulation": "bags converter frame message request store system text tools",

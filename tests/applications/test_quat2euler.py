@@ -197,7 +197,7 @@ def arctangent(index: int, precision: int) -> Fraction:
 
 def test_the_table_of_angles() -> None:
     """Every literal is exact to its last bit, and still is when rounded to any fraction that may use it."""
-    entries = [int(digits, 16) for digits in re.findall(r'X"([0-9A-F]{24})"', TABLE.read_text())]
+    entries = [int(digits, 16) for digits in re.findall(r'x"([0-9a-f]{24})"', TABLE.read_text())]
     assert len(entries) == 64
     for index, entry in enumerate(entries):
         exact = arctangent(index, 140)
