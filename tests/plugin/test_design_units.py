@@ -82,6 +82,7 @@ def project(tmp_path: Path) -> Project:
     return Project(tmp_path / "project")
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("right", "unit"),
     [("ros: 2, width: 32", "axis_to_geometry_msgs_point"), ("ros: 1", "geometry_msgs_point_pkg")],

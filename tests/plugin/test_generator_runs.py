@@ -145,6 +145,7 @@ def test_a_call_that_is_killed_at_any_moment(calls: Calls, right: dict[str, byte
     assert right.items() <= calls.written("killed0").items()
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("count", [2, 8])
 @pytest.mark.parametrize("is_one_folder", [False, True], ids=["own_folders", "one_folder"])
 def test_calls_at_once(calls: Calls, right: dict[str, bytes], count: int, is_one_folder: bool) -> None:
@@ -182,6 +183,7 @@ DAMAGE: dict[str, Callable[[Path], object]] = {
 }
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("suffix", [ENTRY, CALL])
 @pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
 def test_a_damaged_store(calls: Calls, right: dict[str, bytes], damage: Callable[[Path], object], suffix: str) -> None:

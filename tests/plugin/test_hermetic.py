@@ -58,6 +58,8 @@ THERE = {
     "USER": "there",
     "HOME": "/tmp",
 }
+# What all compare with is made once.
+pytestmark = pytest.mark.xdist_group("hermetic")
 IS_NAMESPACE_ALLOWED = subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
 
 
