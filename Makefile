@@ -58,7 +58,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
-.PHONY: help sim test check docs ros bitstream bench matrix proofs policies corpus fuzz-netlist lint setup tools clean distclean
+.PHONY: help sim test check docs ros bitstream bench matrix proofs policies corpus fuzz-netlist lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -128,9 +128,16 @@ fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
 	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
-lint: setup ## Check style and types
+lint: setup $(VENV)/.extra-lint ## Check style and types: Python, and VHDL, also a sample of what is generated
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/python .ci/lint_vhdl.py
+
+# All extras, since all are listed.
+licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
+licences: TOOLS = $(TEST_TOOLS)
+licences: tools ros ## List what the project depends on and under which licences, in docs/reference/licences.md
+	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 
 setup: tools $(VENV)/.extra-test ## Install what the other targets need: programs by apt, Python packages into .venv
 

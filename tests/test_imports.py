@@ -11,6 +11,7 @@ import pytest
 
 from tests.rooms import NAME, PACKAGE, arrows, imported_rooms, modules, reduced, room_of
 
+TABLE = PACKAGE.parent / "docs" / "architecture.md"
 PICTURE = PACKAGE.parent / "docs" / "pictures" / "house.svg"
 
 # Each room, from the ground up, and the rooms below it that it may import from.
@@ -25,7 +26,7 @@ ALLOWED: dict[str, str] = {
     "netlist": "text tools",
     "scheduling": "text tools",
     "building": "request text tools",
-    "system": "converter frame message request scheduling store text",
+    "system": "converter frame message request scheduling store text tools",
     "verify": "converter frame message request text tools",
     "bags": "frame message system text",
     "simulation": "bags converter frame message request store system text tools",
@@ -98,6 +99,17 @@ def test_the_picture_is_that_of_the_imports() -> None:
     assert sorted(drawn) == sorted((room, other) for room, rooms in reduced(arrows()).items() for other in rooms), (
         command
     )
+
+
+def test_the_table_of_changes_names_files_that_exist() -> None:
+    rows = re.findall(r"^\| .* \| `([\w/.]+)` \| (.*) \|$", TABLE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(rows) >= 30
+    for room, files in rows:
+        places = [PACKAGE / room, PACKAGE, PACKAGE.parent]
+        for name in re.findall(r"`([\w/.]+\.\w+)`", files):
+            # A core's files are named by their endings.
+            assert name.startswith(".") or any((place / name).exists() for place in places), (room, name)
+        assert any((place / room).is_dir() for place in places), room
 
 
 def test_imports_go_one_way() -> None:

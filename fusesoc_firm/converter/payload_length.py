@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fusesoc_firm.converter.message_ports import LENGTH_BITS, message_side
-from fusesoc_firm.converter.ports import ros_path, vhdl_type
+from fusesoc_firm.converter.ports import ros_path
 from fusesoc_firm.frame.length import Align, Bytes, Repeat, Term, sent_length_of
 from fusesoc_firm.frame.model import Data, Frame, Loop, Path
 from fusesoc_firm.text.naming import entity_name
@@ -62,7 +62,6 @@ def payload_length_configuration(frame: Frame, suffix: str = "") -> Configuratio
     total = _Sum(_modulus(length.terms), {path: f"unsigned({name})" for path, name in names.items()}, [])
     total.add(length.terms)
     total.add_bytes(length.prefix)
-    column = max(len(name) for name in ["payload_length", *names.values()])
     return {
         "entity": length_entity(frame, suffix),
         "message": str(frame.message),
@@ -71,31 +70,16 @@ def payload_length_configuration(frame: Frame, suffix: str = "") -> Configuratio
         "has_paddings": total.modulus > 1,
         "chain_length": _chain_length(total.statements),
         "place_bits": total.modulus.bit_length() - 1,
-        "ports": [
-            {
-                "name": names[part.path].ljust(column),
-                "type": vhdl_type(LENGTH_BITS),
-                "comment": f"{ros_path(part.path)}: {part.ros_type}",
-            }
-            for part in parts
-        ],
-        "payload_length": "payload_length".ljust(column),
-        "type": vhdl_type(LENGTH_BITS),
-        "has_signals": bool(total.statements),
-        "signals": _declarations(total.statements),
+        "ports": [{"name": names[part.path], "comment": f"{ros_path(part.path)}: {part.ros_type}"} for part in parts],
         "statements": [
-            {"target": item.signal, "value": item.value, "has_comment": bool(item.comment), "comment": item.comment}
+            {"signal": item.signal, "bits": item.bits, "value": item.value, "comment": item.comment}
             for item in total.statements
         ],
-        "elements": [{"name": name} for name in total.elements],
-        "rest": " + ".join([f"to_unsigned({total.constant}, {total.rest_bits})", *total.paddings]),
-        "rest_high": total.rest_bits - 1,
+        "elements": [*total.elements],
+        "constant": total.constant,
+        "paddings": [*total.paddings],
+        "rest_bits": total.rest_bits,
     }
-
-
-def _declarations(statements: Sequence[Statement]) -> list[Configuration]:
-    column = max((len(item.signal) for item in statements), default=0)
-    return [{"name": item.signal.ljust(column), "high": item.bits - 1} for item in statements]
 
 
 def _chain_length(statements: Sequence[Statement]) -> int:

@@ -33,6 +33,7 @@ from fusesoc_firm.text.files import hide_generated, write_if_changed
 from fusesoc_firm.text.naming import PREFIX_RULE, is_prefix
 from fusesoc_firm.text.yaml_text import yaml_data
 from fusesoc_firm.tools.programs import explanation, missing, simulation_programs
+from fusesoc_firm.tools.simulators import SIMULATORS, default_simulator
 
 # The generator of cores that carry messages.
 MESSAGES = "firm_messages"
@@ -202,7 +203,11 @@ GENERATORS: Mapping[str, Generator] = {
                 "environment", "list", "VHDL files that play what is at the pins; the last is called as its entity"
             ),
             Parameter(
-                "simulator", "str", "what shall run the simulation", "ghdl", choices=("ghdl", "icarus", "verilator")
+                "simulator",
+                "str",
+                "what shall run the simulation",
+                default_simulator(),
+                choices=tuple(SIMULATORS),
             ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),

@@ -30,10 +30,7 @@ from fusesoc_firm.system.hardware.verilog_bench import (
 )
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.render import render
-
-GHDL = "ghdl"
-# The first one is what a core asks for unless it says so. The others read Verilog.
-SIMULATORS = (GHDL, "icarus", "verilator")
+from fusesoc_firm.tools.simulators import SIMULATORS, fitting
 
 # A test bench is nothing that synthesis, or a translation to Verilog, should see.
 _BENCH_TAGS = ("simulation",)
@@ -59,7 +56,7 @@ def generate(request: Request) -> GeneratedCore:
     environment = environment_files(_environment(request), system)
     configuration = test_bench_configuration(system, seed, stall_percent, _entity(environment), is_live=False)
     files = _surroundings(loaded, environment)
-    if request.parameters["simulator"] == GHDL:
+    if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
         files |= _vhdl_bench(configuration)
     else:
         frames = max(len(found.stimuli), len(found.responses))
@@ -84,7 +81,7 @@ def generate_live(request: Request) -> GeneratedCore:
     environment = environment_files(_environment(request), system)
     configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
     files = _surroundings(loaded, environment)
-    if request.parameters["simulator"] == GHDL:
+    if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
         files |= _vhdl_bench(configuration)
     else:
         files |= _verilog_bench(configuration, system)
@@ -109,24 +106,27 @@ def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
 def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None:
     """Fail if an accelerator is written in what the simulator does not understand, or the host's end of a link is.
 
-    GHDL's `target` is what a user is pointed to.
+    A user is pointed to the `target` of the default one.
     """
-    if simulator != GHDL and system.clocks:
+    known = SIMULATORS[simulator]
+    if not known.reads_vhdl and system.clocks:
         fail(
             f"{simulator} cannot simulate a system of several clocks",
             hint=f"the clocks beside the host's are made in VHDL: --target={target}",
         )
-    if simulator != GHDL and system.link:
+    if not known.reads_vhdl and system.link:
         fail(
             f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",
             hint=f"the host's end of a link is written in VHDL: --target={target}",
         )
     for type_ in system.accelerator_types:
         accelerator = type_.accelerator
-        if simulator == GHDL and accelerator.type == "Verilog":
-            hint = "'simulator: icarus' or 'verilator' link it with the Verilog that GHDL makes of the VHDL"
-            fail(f"GHDL simulates no Verilog, which '{accelerator.name}' is written in", accelerator.name.source, hint)
-        if simulator != GHDL and accelerator.type == "HLS":
+        if known.reads_vhdl and accelerator.type == "Verilog":
+            others = " or ".join(f"'{name}'" for name in fitting(has_verilog=True)).replace("'", "'simulator: ", 1)
+            hint = f"{others} link it with the Verilog that GHDL makes of the VHDL"
+            message = f"{known.title} simulates no Verilog, which '{accelerator.name}' is written in"
+            fail(message, accelerator.name.source, hint)
+        if not known.calls_functions and accelerator.type == "HLS":
             hint = f"only GHDL calls a C++ function from within a simulation: --target={target}"
             fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
 

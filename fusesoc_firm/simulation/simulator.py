@@ -34,12 +34,8 @@ from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.text.files import write_if_changed
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import missing, simulation_programs, ways
+from fusesoc_firm.tools.simulators import Live, default_simulator, fitting
 
-GHDL, VERILATOR = "ghdl", "verilator"
-TOOLS = (GHDL, VERILATOR)
-
-# The target of a system's core for each tool.
-_TARGETS = {GHDL: "live", VERILATOR: "live_verilator"}
 _SHOWN_LINES = 20
 
 
@@ -64,7 +60,7 @@ class BuiltSimulator:
 
     def command(self, *, seed: int = 1, stall_percent: int = 0) -> list[str]:
         """What starts it in `folder`; the streams stall in `stall_percent` of the cycles, as `seed` has it."""
-        mark = "-g" if self.tool == GHDL else "+"
+        mark = _live(self.tool).parameter
         return [*self.words, f"{mark}SEED={seed}", f"{mark}STALL_PERCENT={stall_percent}"]
 
     def script(self, *, seed: int = 1, stall_percent: int = 0) -> Path:
@@ -78,15 +74,15 @@ class BuiltSimulator:
 
 
 def build_simulator(
-    spec: Path, tool: str = GHDL, *, build_root: Path | None = None, sources: CoreSources | None = None
+    spec: Path, tool: str | None = None, *, build_root: Path | None = None, sources: CoreSources | None = None
 ) -> BuiltSimulator:
     """Build a simulator of the system of a specification, or what of it has changed. Raises `InputError`.
 
     `build_root` is shared by all systems and tools; its default is a folder of the user's cache. `sources` count where
     no core beside the specification names it.
     """
-    if tool not in TOOLS:
-        fail(f"there is no simulator '{tool}' of live systems", hint=f"legal: {', '.join(TOOLS)}")
+    tool = tool or default_simulator(is_live=True)
+    _live(tool)
     if not spec.is_file():
         fail(f"there is no specification '{spec}'")
     if absent := missing(dict.fromkeys([*simulation_programs(tool), "make"])):
@@ -143,7 +139,7 @@ def _short_name(spec: Path) -> str:
 
 def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
     """Have FuseSoC set the target up, and make what it says."""
-    targets, target = core.section("targets"), _TARGETS[tool]
+    targets, target = core.section("targets"), "live" if tool == default_simulator(is_live=True) else f"live_{tool}"
     if target not in targets:
         fail(f"{core.path} has no target '{target}'", hint=f"firm system core {spec}")
     made_with = targets[target].get("flow_options", {}).get("tool", tool)
@@ -152,9 +148,8 @@ def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
     command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
     command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, core.data.get("name", "")]
     _run(spec, list(map(str, command)), _project_folder(spec))
-    if tool == GHDL:
-        # FuseSoC builds nothing before it runs.
-        _run(spec, ["make", "analyze"], work)
+    if step := _live(tool).made_by:
+        _run(spec, ["make", step], work)
 
 
 def _project_folder(spec: Path) -> Path:
@@ -189,8 +184,14 @@ def _flow(work: Path) -> Any:
 
 def _words(work: Path, tool: str) -> list[str]:
     """What starts the simulator in its folder."""
-    if tool == VERILATOR:
+    if not (start := _live(tool).started_by):
         return [str(work / f"V{_flow(work)['toplevel']}")]
-    # The line of Edalize's makefile has the options of the analysis.
     steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).split("\n")
-    return shlex.split([line for line in steps if line.startswith("ghdl -r ")][-1])
+    return shlex.split([line for line in steps if line.startswith(start)][-1])
+
+
+def _live(tool: str) -> Live:
+    """How the tool simulates live. Raises `InputError` if it does not."""
+    if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
+        fail(f"there is no simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
+    return live

@@ -7,20 +7,27 @@ templates, and the tree is expanded here, by these rules:
 * `{{x}}` prints a string or an integer as it is. A bool or None has no agreed spelling.
 * `{{comment x}}` prints text of a user, quoted for where it stands in the language that the template's name ends with;
   `quoting` has the ways of each language. A partial is in the language of the template that includes it.
-* A key is looked up in the innermost scope and nowhere else. It must be there, also in a part that is left out.
+* `{{x-1}}` and `{{x+1}}` print an integer and a number more or less: `std_logic_vector({{width-1}} downto 0)`.
+* A key is looked up in the innermost scope and nowhere else; `../x` is the `x` of the scope around it. It must be
+  there, also in a part that is left out.
 * `{{#x}}` takes a bool (part or no part, same scope), a list (the part once an item), or a mapping or None (the part in
   the mapping's scope, or no part). `{{^x}}` is the part for false, an empty list or None.
-* A list holds mappings, each the scope of its turn, or strings and integers, which `{{.}}` prints.
+* `{{#x?}}` is a part in the same scope, once, if there is an `x`: if it is not false, "", an empty list or None.
+* A list holds mappings, each the scope of its turn, or strings and integers, which `{{.}}` prints. Within it, `@first`
+  and `@last` are bools: whether this is the first turn, and the last.
+* `{{|}}` begins a column: in neighbouring lines, what follows it begins at the same place. `{{|20}}` begins it behind
+  20 characters at least. `{{|!}}` in a line parts it from those before.
 * `{{> name}}` includes `partials/name.mustache`; alone on a line, its indentation is that of every line included.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 from chevron.tokenizer import ChevronError, tokenize
@@ -60,6 +67,12 @@ _RECORDS: list[dict[str, Rendering]] = []
 _MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
 # A line that is left out as a whole, whatever it gives.
 _STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
+# Where a column begins, and behind how many characters at least.
+_COLUMN = re.compile("\ue002(\\d*)\ue003")
+_PARTED = "\ue004"
+_COLUMN_KEY = re.compile(r"\|(?P<least>\d*)")
+_PARTED_KEY = "|!"
+_SUM_KEY = re.compile(r"(?P<name>.+?)(?P<addend>[+-]\d+)")
 
 
 @dataclass(frozen=True)
@@ -71,6 +84,7 @@ class _Literal:
 class _Value:
     key: str
     quote: str = ""
+    addend: int | None = None
 
 
 @dataclass(frozen=True)
@@ -78,6 +92,7 @@ class _Section:
     key: str
     is_inverted: bool
     body: tuple[_Node, ...]
+    is_question: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,14 +106,21 @@ _Node = _Literal | _Value | _Section | _Partial
 
 @dataclass(frozen=True)
 class _Scope:
-    """Where keys are looked up, and the way there from the context's root (`ports[3]`), for messages."""
+    """Where keys are looked up, and the way there from the context's root (`ports[3]`), for messages.
+
+    `turn` has `@first` and `@last` of the innermost list around.
+    """
 
     data: object
     path: str = ""
+    outer: _Scope | None = None
+    turn: Mapping[str, bool] = field(default_factory=dict)
 
     def path_to(self, key: str) -> str:
         if key == ".":
             return self.path
+        if key.startswith("../") and self.outer:
+            return self.outer.path_to(key.removeprefix("../"))
         return f"{self.path}.{key}" if self.path else key
 
 
@@ -111,7 +133,7 @@ def render(template_name: str, context: Mapping[str, object], templates: Path = 
     try:
         _require_plain(context, "")
         expansion = _Expansion(templates, _quotes(template_name))
-        text = expansion.expand(_parse(template_name, templates), _Scope(context), True)
+        text = _in_columns(expansion.expand(_parse(template_name, templates), _Scope(context), True))
     except TemplateError as error:
         raise TemplateError(f"template {template_name}: {error}") from error
     for renderings in _RECORDS:
@@ -135,14 +157,16 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
     name = rendering.template
     expansion = _TracedExpansion(TEMPLATES, _quotes(name))
     marked = expansion.expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
-    lines: list[TracedLine] = []
+    lines = marked.removesuffix("\n").split("\n")
+    texts = _in_columns(_MARK.sub("", "\n".join(lines))).split("\n")
+    traced: list[TracedLine] = []
     place = (f"{name}.mustache", 1, "")
-    for text in marked.removesuffix("\n").split("\n"):
+    for line, text in zip(lines, texts, strict=True):
         # A value may be of several lines, and a blank line has no mark: they belong to the one above.
-        if found := _MARK.search(text):
+        if found := _MARK.search(line):
             place = (found["file"], int(found["line"]), found["scope"])
-        lines.append(TracedLine(_MARK.sub("", text), *place))
-    return lines
+        traced.append(TracedLine(text, *place))
+    return traced
 
 
 def template_text(name: str, templates: Path = TEMPLATES) -> str:
@@ -182,9 +206,9 @@ class _Expansion:
         match node:
             case _Literal(text):
                 return self._literal(text, scope)
-            case _Value(key, quote):
+            case _Value(key):
                 value = _look_up(key, scope)
-                return self._quoted(quote, _printed(value, scope.path_to(key))) if is_taken else ""
+                return self._printed(node, value, scope.path_to(key)) if is_taken else ""
             case _Section():
                 return self._section(node, scope, is_taken)
             case _Partial(name, indentation):
@@ -197,6 +221,10 @@ class _Expansion:
     def _literal(self, text: str, _: _Scope) -> str:
         return text
 
+    def _printed(self, node: _Value, value: object, path: str) -> str:
+        number = value if node.addend is None else _sum(value, node.addend, path)
+        return self._quoted(node.quote, _printed(number, path))
+
     def _quoted(self, quote: str, text: str) -> str:
         if not quote:
             return text
@@ -208,7 +236,7 @@ class _Expansion:
     def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
         value = _look_up(section.key, scope)
         path = scope.path_to(section.key)
-        if not isinstance(value, bool | list | dict | None):
+        if not section.is_question and not isinstance(value, bool | list | dict | None):
             raise TemplateError(f"'{path}' is {_kind(value)}; a section takes a bool, a list, a mapping or None")
         return "".join(
             self.expand(section.body, inner, is_taken and is_inner_taken)
@@ -229,19 +257,30 @@ class _TracedExpansion(_Expansion):
 def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
     """The scopes in which a section's body is expanded, each with whether its text counts."""
     if section.is_inverted:
-        yield scope, value is None or value is False or value == []
-    elif isinstance(value, bool):
-        yield scope, value
+        yield scope, not _is_there(value)
+    elif section.is_question or isinstance(value, bool):
+        yield scope, _is_there(value)
     elif isinstance(value, list):
         for number, item in enumerate(value):
-            yield _Scope(item, f"{path}[{number}]"), True
+            turn = {"@first": number == 0, "@last": number == len(value) - 1}
+            yield _Scope(item, f"{path}[{number}]", scope, turn), True
     elif value is not None:
-        yield _Scope(value, path), True
+        yield _Scope(value, path, scope, scope.turn), True
+
+
+def _is_there(value: object) -> bool:
+    return not (value is None or value is False or value == [] or value == "")
 
 
 def _look_up(key: str, scope: _Scope) -> object:
+    while key.startswith("../"):
+        if scope.outer is None:
+            raise TemplateError(f"no scope is around {scope.path or 'the context'} for '{key}'")
+        key, scope = key.removeprefix("../"), scope.outer
     if key == ".":
         return scope.data
+    if key in scope.turn:
+        return scope.turn[key]
     value, path = scope.data, scope.path
     for step in key.split("."):
         if not isinstance(value, dict) or step not in value:
@@ -262,6 +301,12 @@ def _printed(value: object, path: str) -> str:
     return str(value)
 
 
+def _sum(value: object, addend: int, path: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TemplateError(f"'{path}' is {_kind(value)}; only to an integer can {addend} be added")
+    return value + addend
+
+
 def _kind(value: object) -> str:
     return "None" if value is None else f"of type {type(value).__name__}"
 
@@ -269,6 +314,34 @@ def _kind(value: object) -> str:
 def _indented(text: str, indentation: str) -> str:
     """Indent every line that is not empty; an empty one would only get blanks at its end."""
     return "\n".join(indentation + line if line.strip() else line for line in text.split("\n"))
+
+
+def _in_columns(text: str) -> str:
+    """The text with its columns aligned, each run of lines that have some for itself."""
+    if not _COLUMN.search(text):
+        return text
+    lines: list[str] = []
+    rows = (_COLUMN.split(line) for line in text.split("\n"))
+    for has_columns, run in groupby(rows, key=lambda row: len(row) > 1):
+        block: list[list[str]] = []
+        for first, *others in run:
+            if _PARTED in first:
+                lines += _aligned(block)
+                block = []
+            block.append([first.replace(_PARTED, ""), *others])
+        lines += _aligned(block) if has_columns else [line for (line,) in block]
+    return "\n".join(lines)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """The lines of rows of cells, between which stands how long the one before is at least."""
+    widths: dict[int, int] = {}
+    for row in rows:
+        for number, (cell, least) in enumerate(zip(row[:-1:2], row[1::2], strict=True)):
+            widths[number] = max(widths.get(number, 0), len(cell), int(least or 0))
+    for row in rows:
+        cells = (cell.ljust(widths[number]) for number, cell in enumerate(row[:-1:2]))
+        yield ("".join(cells) + row[-1]).rstrip()
 
 
 def _require_plain(value: object, path: str) -> None:
@@ -329,15 +402,27 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
             case "literal":
                 nodes.append(_Literal(key))
             case "variable" | "no escape":
-                quote, _, name = key.rpartition(" ")
-                nodes.append(_Value(name, quote))
+                nodes.append(_value(key))
             case "section" | "inverted section":
-                nodes.append(_Section(key, kind == "inverted section", _nodes(tokens)))
+                name, is_inverted = key.removesuffix("?"), kind == "inverted section"
+                nodes.append(_Section(name, is_inverted, _nodes(tokens), is_question=name != key))
             case "partial":
                 nodes.append(_Partial(key, _take_indentation(nodes)))
             case "end":
                 break
     return tuple(nodes)
+
+
+def _value(key: str) -> _Node:
+    """What a tag prints: `x`, `comment x` or `x-1`, or the beginning of a column."""
+    if key == _PARTED_KEY:
+        return _Literal(_PARTED)
+    if column := _COLUMN_KEY.fullmatch(key):
+        return _Literal(f"\ue002{column['least']}\ue003")
+    quote, _, name = key.rpartition(" ")
+    if found := _SUM_KEY.fullmatch(name):
+        return _Value(found["name"], quote, int(found["addend"]))
+    return _Value(name, quote)
 
 
 def _take_indentation(nodes: list[_Node]) -> str:

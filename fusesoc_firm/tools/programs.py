@@ -17,6 +17,8 @@ from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
 
+from fusesoc_firm.tools.simulators import SIMULATORS
+
 
 @dataclass(frozen=True)
 class Program:
@@ -60,10 +62,9 @@ PROGRAMS: Mapping[str, Program] = {
 _STARTED: Mapping[str, tuple[str, ...]] = {
     "ecppack": ("ecppack",),
     "gowinpack": ("gowin_pack",),
-    "icarus": ("iverilog",),
     "icepack": ("icepack",),
-    "verilator": ("verilator", "g++", "make"),
     "yosys": ("yosys",),
+    **{name: simulator.programs for name, simulator in SIMULATORS.items() if not simulator.reads_vhdl},
 }
 _NEXTPNR = {"ecp5": "nextpnr-ecp5", "gowin": "nextpnr-himbaechel", "ice40": "nextpnr-ice40"}
 _OWN = "fusesoc-firm"
@@ -97,8 +98,9 @@ def missing(programs: Iterable[str]) -> list[str]:
 
 
 def simulation_programs(simulator: str) -> tuple[str, ...]:
-    """The programs that a simulation needs, GHDL always among them."""
-    return ("ghdl", *programs_of(simulator))
+    """The programs that a simulation needs, GHDL among them where it makes a netlist."""
+    known = SIMULATORS[simulator]
+    return known.programs if known.reads_vhdl else ("ghdl", *known.programs)
 
 
 def ways(program: str) -> str:

@@ -171,7 +171,7 @@ def settles(found: Sequence[Answer], x: float, z: float) -> None:
         assert abs(mean - wanted) <= 0.01 * abs(wanted) + QUARTER / 4 * unit
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize(
     ("part", "x", "z"),
     [
@@ -297,6 +297,7 @@ def test_the_system_with_stalls(tmp_path: Path) -> None:
     assert system.passes(SEED=3, STALL_PERCENT=50)
 
 
+@pytest.mark.check
 def test_ros2(tmp_path: Path) -> None:
     robot = for_ros2("mobile_robot", tmp_path)
     stimuli = yaml.safe_load((robot / "stimuli.yaml").read_text())

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 import yaml
 
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.request.request import Plain
 from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
 from tests.applications.applications import SPECS, for_ros2, simulation
@@ -52,6 +53,7 @@ def test_random_states_and_latency(tmp_path: Path) -> None:
     assert int(found[1]) == LATENCY
 
 
+@pytest.mark.check
 def test_ros2(tmp_path: Path) -> None:
     system = simulation(for_ros2("robotic_arm", tmp_path), tmp_path / "system", *CORES)
     assert system.passes(SEED=4)
@@ -74,6 +76,7 @@ def test_synthesis_makes_no_latch_and_verilog(accelerator: Library) -> None:
     assert not re.search(r"\$signed\([^;]*>>[^>]", netlist)
 
 
+@pytest.mark.check
 def test_the_netlist_answers_alike(tmp_path: Path) -> None:
     """Of the first states of the stimuli, which hold all kinds: a netlist is slow."""
     stimuli = yaml.safe_load((ARM / "stimuli.yaml").read_text())
@@ -89,8 +92,8 @@ def test_the_state_as_franka_ros_publishes_it(tmp_path: Path) -> None:
     """The same answers to franka_msgs/FrankaState: our states within messages whose other fields are at random."""
     print(f"seed {SEED}")
     name = MessageName("franka_msgs", "FrankaState")
-    closure = MessageLibrary(RosVersion.ROS1, [ARM / "franka_msgs"]).closure(name)
-    draw = Stimuli(closure, RosVersion.ROS1, random.Random(SEED))
+    closure = MessageLibrary(ROS1, [ARM / "franka_msgs"]).closure(name)
+    draw = Stimuli(closure, ROS1, random.Random(SEED))
     messages = []
     for stimulus in states(6):
         state = stimulus["state"]

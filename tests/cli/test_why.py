@@ -80,9 +80,7 @@ def test_every_line_is_that_of_the_template_named(application: str) -> None:
 def test_scopes_are_paths_in_the_context(tmp_path: Path) -> None:
     (number,) = (
         line.scope
-        for line in traced_lines(
-            Rendering("partials/port_map", {"ports": [{"formal": "a", "actual": "b", "comma": ","}] * 3})
-        )[1:2]
+        for line in traced_lines(Rendering("partials/port_map", {"ports": [{"formal": "a", "actual": "b"}] * 3}))[1:2]
     )
     assert number == "ports[1]"
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
 
 from fusesoc_firm.converter.configuration import (
+    PUBLISHER_TEMPLATE,
     publisher_configuration,
     publisher_entity,
     subscriber_configuration,
@@ -15,21 +17,22 @@ from fusesoc_firm.converter.configuration import (
 from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoredBytes, StoreMap, Stream, ranges, stores_of
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.naming import KEYWORDS
+from fusesoc_firm.text.render import render
 from tests.frame.samples import AWKWARD
 from tests.frame.test_layout import layout
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 
-
-def ports(ros: RosVersion, text: str, others: dict[str, str] | None = None) -> list[tuple[str, str, str]]:
+def ports(ros: Middleware, text: str, others: dict[str, str] | None = None) -> list[tuple[str, str, str]]:
     """(name, type, comment) of each port."""
     return [(port.name, port.vhdl_type, port.comment) for port in field_ports(layout(ros, text, others))]
 
 
-def names(ros: RosVersion, text: str, others: dict[str, str] | None = None) -> list[str]:
+def names(ros: Middleware, text: str, others: dict[str, str] | None = None) -> list[str]:
     return [name for name, _, _ in ports(ros, text, others)]
 
 
@@ -81,14 +84,14 @@ def test_paths_that_meet() -> None:
     assert names(ROS1, "E a\nuint8 a_b\nuint8 a_b_2\n", {"p/E": "uint8 b\n"}) == ["a_b", "a_b_2", "a_b_2_2"]
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_both_converters_have_the_same_legal_names(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_both_converters_have_the_same_legal_names(ros: Middleware) -> None:
     for name, text in AWKWARD[ros].items():
         if "Inner" in text or any(word[0].isupper() for word in text.split()):
             continue
         frame = layout(ros, text)
-        given = [port["name"].strip() for port in publisher_configuration(frame, 8)["ports"]]
-        taken = [port["name"].strip() for port in subscriber_configuration(frame, 8)["ports"]]
+        given = [port["name"] for port in publisher_configuration(frame, 8)["ports"]]
+        taken = [port["name"] for port in subscriber_configuration(frame, 8)["ports"]]
         assert given == taken, name
         assert len({port.lower() for port in given}) == len(given)
         assert not KEYWORDS & {port.lower() for port in given}
@@ -128,15 +131,14 @@ def test_bools_are_pieces_of_a_bit_and_the_rest_is_cut_at_gaps_only() -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("ros", RosVersion)
-def test_a_publisher_drives_each_bit_once(ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_a_publisher_drives_each_bit_once(ros: Middleware, width: int) -> None:
     frame = layout(ros, "bool a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
     configuration = publisher_configuration(frame, width)
-    driven: list[int] = []
-    for piece in configuration["pieces"]:
-        high, low = piece["target"].strip().removeprefix("frame(").removesuffix(")").split(" downto ")
-        driven += range(int(low), int(high) + 1)
-    assert sorted(driven) == list(range(configuration["frame_high"] + 1))
+    text = render(PUBLISHER_TEMPLATE, configuration)
+    pieces = re.findall(r"^  frame\((\d+) downto (\d+)\) *<= ", text, re.MULTILINE)
+    driven = [bit for high, low in pieces for bit in range(int(low), int(high) + 1)]
+    assert sorted(driven) == list(range(configuration["all_bits"]))
 
 
 def test_lanes_that_are_used_in_the_same_beats_share_a_store() -> None:
@@ -150,14 +152,16 @@ def test_lanes_that_are_used_in_the_same_beats_share_a_store() -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("ros", RosVersion)
-def test_every_bit_of_a_field_comes_from_a_bit_of_its_own(ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_every_bit_of_a_field_comes_from_a_bit_of_its_own(ros: Middleware, width: int) -> None:
     frame = layout(ros, "int8 a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
     configuration = subscriber_configuration(frame, width)
     kept = sum(store.bits for store in stores_of(Stream(width), windows_of(frame.fields)))
     assert kept == sum(port.width or 1 for port in field_ports(frame))
-    read = [assignment["value"] for assignment in configuration["assignments"]]
-    assert len(set(read)) == len(read)
+    read = [
+        (field["register"], bit) for field in configuration["fields"] for bit in range(field["low"], field["high"] + 1)
+    ]
+    assert len(set(read)) == len(read) == kept
 
 
 def test_ranges() -> None:
@@ -166,7 +170,7 @@ def test_ranges() -> None:
     assert ranges([0, 1, 2, 5, 7, 8]) == [(0, 2), (5, 5), (7, 8)]
 
 
-def lengths(ros: RosVersion, count: int, width: int) -> list[list[list[str]]]:
+def lengths(ros: Middleware, count: int, width: int) -> list[list[list[str]]]:
     """For each beat with a part of the length, and each legal length, the bytes that it has there."""
     beats = subscriber_configuration(layout(ros, f"uint8[{count}] a\n"), width)["length_beats"]
     return [[[check["value"] for check in one["checks"]] for one in beat["candidates"]] for beat in beats]
@@ -193,9 +197,8 @@ def test_the_lengths_of_ros1_and_ros2() -> None:
 )
 def test_where_a_frame_may_end(width: int, last_beats: list[int], last_lanes: list[int]) -> None:
     configuration = subscriber_configuration(layout(ROS2, "uint8 a\n"), width)
-    places = ["is_first = '1'" if beat == 0 else f"position_r = {beat}" for beat in last_beats]
-    matches = [f"match({number}) = '1' and {place}" for number, place in enumerate(places)]
-    assert [end["condition"] for end in configuration["ends"]] == matches
+    beats = ["is_first = '1'" if beat == 0 else f"position_r = {beat}" for beat in last_beats]
+    assert [(end["number"], end["beat"]) for end in configuration["ends"]] == list(enumerate(beats))
     assert [end["lane"] for end in configuration["ends"]] == last_lanes
 
 
@@ -214,7 +217,7 @@ def test_where_a_frame_may_end(width: int, last_beats: list[int], last_lanes: li
 def test_the_states_beyond_the_beats(size: int, broken: str, ended: str, complete: str) -> None:
     configuration = subscriber_configuration(layout(ROS1, f"uint8[{size}] a\n"), 8)
     assert [configuration[name] for name in ("broken", "ended", "complete")] == [broken, ended, complete]
-    assert len(broken) == configuration["position_high"] + 1
+    assert len(broken) == configuration["position_bits"]
     # The last beat, behind 4 bytes of length, is none of them, and all of them have the same bits above the lowest.
     assert size + 3 < int(broken, 2)
     assert size + 3 < int("1" * (len(broken) - configuration["beyond_low"]) + "0" * configuration["beyond_low"], 2)
@@ -226,8 +229,8 @@ def test_the_states_beyond_the_beats(size: int, broken: str, ended: str, complet
 def test_the_publishers_beats(width: int, first: int, last: int, keep: str) -> None:
     configuration = publisher_configuration(layout(ROS1, "float64 a\n"), width)
     assert [configuration[name] for name in ("first_position", "last_position", "last_keep")] == [first, last, keep]
-    assert configuration["frame_high"] == (last + 1) * width - 1
-    assert configuration["has_partial_beat"] is ("0" in keep)
+    assert configuration["all_bits"] == (last + 1) * width
+    assert configuration["is_last_full"] is ("0" not in keep)
 
 
 def test_widths_without_a_template_are_refused() -> None:
@@ -239,7 +242,7 @@ def test_widths_without_a_template_are_refused() -> None:
 
 def test_a_frame_of_more_bits_than_vhdl_counts_is_refused() -> None:
     largest = layout(ROS1, "uint8[268435447] a\n")
-    assert publisher_configuration(largest, 8)["frame_high"] == 8 * (2**28 - 1) - 1
+    assert publisher_configuration(largest, 8)["all_bits"] == 8 * (2**28 - 1)
     for configuration in (subscriber_configuration, publisher_configuration):
         with pytest.raises(InputError, match=r"p/M takes 268435448 bytes, too many for a converter"):
             configuration(layout(ROS1, "uint8[268435448] a\n"), 8)

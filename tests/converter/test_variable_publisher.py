@@ -15,12 +15,12 @@ from fusesoc_firm.converter.variable_publisher import (
 )
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.render import TEMPLATES, render
 from tests.frame.test_layout import layout
 
-ROS1, ROS2 = RosVersion
 HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
 IMAGE = "Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n"
 
@@ -29,8 +29,15 @@ def configured(frame: Frame, width: int = 8) -> Configuration:
     return variable_publisher_configuration(frame, width, "p_m_to_axis")
 
 
-def places(configuration: Configuration) -> list[tuple[str, str]]:
-    return [(area["places"].strip(), area["text"]) for area in configuration["areas"]]
+def places(configuration: Configuration) -> list[tuple[int, int | None, str]]:
+    return [(area["first"], area["last"], area["text"]) for area in configuration["areas"]]
+
+
+def words(configuration: Configuration) -> list[tuple[int, int, str]]:
+    """The highest and the lowest bit of each piece of the words, and its value, as they stand in the text."""
+    text = render(VARIABLE_PUBLISHER_TEMPLATE, configuration)
+    found = re.findall(r"^  all_words\((\d+) downto (\d+)\) *<= (.*);$", text, re.MULTILINE)
+    return [(int(high), int(low), value) for high, low, value in found]
 
 
 def image() -> Frame:
@@ -39,20 +46,19 @@ def image() -> Frame:
 
 def test_the_places_of_an_image() -> None:
     assert places(configured(image())) == [
-        ("0 to 4", "id and the payload's length"),
-        ("5 to 16", "12 bytes: header.seq, header.stamp.sec, header.stamp.nsec"),
-        ("17 to 20", "count of header.frame_id"),
-        ("21", "opens header.frame_id"),
-        ("22", "stream of header.frame_id"),
-        ("23 to 30", "8 bytes: height, width"),
-        ("31 to 34", "count of encoding"),
-        ("35", "opens encoding"),
-        ("36", "stream of encoding"),
-        ("37 to 41", "5 bytes: is_bigendian, step"),
-        ("42 to 45", "count of data"),
-        ("46", "opens data"),
-        ("47", "stream of data"),
-        ("48", "the end"),
+        (0, 4, "id and the payload's length"),
+        (5, 16, "12 bytes: header.seq, header.stamp.sec, header.stamp.nsec"),
+        (17, 20, "count of header.frame_id"),
+        (21, None, "opens header.frame_id"),
+        (22, None, "stream of header.frame_id"),
+        (23, 30, "8 bytes: height, width"),
+        (31, 34, "count of encoding"),
+        (35, None, "opens encoding"),
+        (36, None, "stream of encoding"),
+        (37, 41, "5 bytes: is_bigendian, step"),
+        (42, 45, "count of data"),
+        (46, None, "opens data"),
+        (47, None, "stream of data"),
     ]
 
 
@@ -62,16 +68,13 @@ def test_a_wider_stream_has_fewer_places(width: int, end: int) -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("ros", RosVersion)
-def test_each_bit_of_the_words_is_driven_once(ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_each_bit_of_the_words_is_driven_once(ros: Middleware, width: int) -> None:
     text = "bool a\nstring s\nE[2] e\nfloat64[] b\nF[] f\nuint8[70] big\n"
     frame = layout(ros, text, {"p/E": "uint8 x\nstring t\nuint32 y\n", "p/F": "bool[3] g\nuint64 h\n"})
     configuration = configured(frame, width)
-    driven: list[int] = []
-    for piece in configuration["pieces"]:
-        high, low = piece["target"].strip().removeprefix("all_words(").removesuffix(")").split(" downto ")
-        driven += range(int(low), int(high) + 1)
-    assert driven == list(range(configuration["words_high"] + 1))
+    driven = [bit for high, low, _ in words(configuration) for bit in range(low, high + 1)]
+    assert driven == list(range(configuration["all_bits"]))
 
 
 @pytest.mark.parametrize("width", WIDTHS)
@@ -79,28 +82,25 @@ def test_the_word_of_the_end_is_zeros(width: int) -> None:
     """It is what a frame is filled up with."""
     for size in range(40):
         configuration = configured(layout(ROS1, f"uint8[{size}] block\nstring text\n"), width)
-        last = configuration["pieces"][-1]
-        assert last["value"] == "(others => '0')"
-        high, low = last["target"].strip().removeprefix("all_words(").removesuffix(")").split(" downto ")
-        assert int(high) == configuration["words_high"] == (configuration["end"] + 1) * width - 1
-        assert int(low) <= configuration["end"] * width
+        high, low, value = words(configuration)[-1]
+        assert value == "(others => '0')"
+        assert high + 1 == configuration["all_bits"] == (configuration["end"] + 1) * width
+        assert low <= configuration["end"] * width
 
 
 def test_zeros_in_a_row_are_one_place() -> None:
     frame = select(layout(ROS1, "uint8[100] a\nuint8 b\nuint8[7] c\nstring s\n"), {"b": None, "s": None})
     configuration = configured(frame)
-    assert configuration["repeats"] == [
-        {"place": 5, "last": 99, "bits": 7},
-        {"place": 7, "last": 6, "bits": 7},
-    ]
+    assert configuration["repeats"] == [{"place": 5, "last": 99}, {"place": 7, "last": 6}]
+    assert configuration["repeat_bits"] == 7
     # Words begin with the block: four of them and the rest of the fifth.
     wide = configured(frame, 128)
-    assert wide["repeats"] == [{"place": 1, "last": 5, "bits": 3}]
+    assert (wide["repeats"], wide["repeat_bits"]) == ([{"place": 1, "last": 5}], 3)
 
 
 def test_a_short_row_of_zeros_stays_as_it_is() -> None:
     frame = select(layout(ROS1, "uint8[3] a\nuint8 b\nstring s\n"), {"b": None, "s": None})
-    assert not configured(frame)["has_repeats"]
+    assert not configured(frame)["repeats"]
 
 
 def test_a_counter_is_as_wide_as_its_elements_need() -> None:
@@ -115,10 +115,10 @@ def test_a_counter_is_as_wide_as_its_elements_need() -> None:
 def test_a_block_that_ends_an_element_ends_it_with_its_last_word() -> None:
     """A stream that does needs a place for it."""
     with_block = configured(layout(ROS1, "E[] e\n", {"p/E": "string s\nuint16 x\n"}))
-    assert ("16 to 17", "2 bytes: e.x") in places(with_block)
-    assert with_block["element_readies"] == [{"name": "e_ready", "place": 17}]
+    assert (16, 17, "2 bytes: e.x") in places(with_block)
+    assert with_block["closings"] == [{"name": "e", "place": 17}]
     with_stream = configured(layout(ROS1, "E[] e\n", {"p/E": "string s\n"}))
-    assert places(with_stream)[-2][1] == "closes an element of e"
+    assert places(with_stream)[-1][2] == "closes an element of e"
 
 
 def test_a_message_that_is_too_large_is_an_error() -> None:
@@ -138,8 +138,8 @@ def test_every_name_of_the_text_is_kept_from_fields() -> None:
     assert not ports & {name.lower() for name in declared}
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_lines_are_of_a_readable_length(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_lines_are_of_a_readable_length(ros: Middleware) -> None:
     """Whatever the number of parts; declarations of ports are as long as their names."""
     text = "".join(f"string s{number}\nuint8[] d{number}\n" for number in range(60))
     lines = render(VARIABLE_PUBLISHER_TEMPLATE, configured(layout(ros, text))).splitlines()

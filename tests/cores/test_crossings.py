@@ -218,6 +218,7 @@ def broken(directory: Path, fault: Fault, *, is_sure: bool = False) -> Library:
     return library
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("fault", IN_MESSAGES)
 def test_what_is_broken_is_found(tmp_path: Path, fault: str) -> None:
     library = broken(tmp_path, IN_MESSAGES[fault])

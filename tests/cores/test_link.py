@@ -68,6 +68,7 @@ def test_uart_reads_a_host_whose_clock_is_wrong(library: Library, tmp_path: Path
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("link", LINKS)
 def test_the_netlist_of_a_link_does_the_same(tmp_path: Path, link: str) -> None:
     library = _library(tmp_path)

@@ -82,7 +82,7 @@ def _check(outcome: Outcome, publishers: int, frames: int, width: int) -> int:
     return resumed
 
 
-@pytest.mark.one_in(4)
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("publishers", FRAMES)
 def test_every_frame_is_joined_again(library: Library, tmp_path: Path, publishers: int, width: int) -> None:

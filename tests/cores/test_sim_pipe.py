@@ -275,7 +275,7 @@ def gone(process: int) -> bool:
 
 
 def test_a_long_frame_takes_bounded_time_and_memory(bench: PipeBench) -> None:
-    size = 6_000_000 if bench.tool == "verilator" else 400_000
+    size = 6_000_000 if bench.tool == "verilator" else 200_000
     frame = random.Random(SEED).randbytes(size)
     with bench.start(64) as simulator:
         simulator.request(frame)

@@ -139,7 +139,7 @@ def test_where_there_is_none_the_message_says_what_to_do(tmp_path: Path, bare: P
 def test_the_folder_it_is_called_in_does_not_count(tmp_path: Path, bare: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     other = make_environment(tmp_path / "other", has_package=False)
     here = tmp_path / "here"
-    (here / "fusesoc_firm").mkdir(parents=True)
+    (here / "fusesoc_firm" / "plugin").mkdir(parents=True)
     for name in ("fusesoc_firm/__init__.py", "fusesoc_firm/plugin/gapi.py", "chevron.py", "rosbags.py", "yaml.py"):
         (here / name).write_text("")
     monkeypatch.chdir(here)

@@ -16,9 +16,10 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.node.bursts import BurstJoiner
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.transport.transport import Burst
-from fusesoc_firm.simulation.simulator import TOOLS, BuiltSimulator, CoreSources, build_simulator
+from fusesoc_firm.simulation.simulator import BuiltSimulator, CoreSources, build_simulator
 from fusesoc_firm.system.beside import core_of
 from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools.simulators import fitting
 from tests.house.test_main_job import ROOT, run
 
 SPECS = ROOT / "specs"
@@ -81,7 +82,7 @@ def test_the_same_frames_give_the_same_bytes(recorded: tuple[str, Path], build_r
     system, folder = recorded
     stimuli, received = frames_of(folder / "stimulus.txt"), frames_of(folder / "received.txt")
     ends = []
-    for tool in TOOLS:
+    for tool in fitting(is_live=True):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not installed")
         built = build_simulator(SPECS / system / f"{system}.yaml", tool, build_root=build_root.parent / "simulators")

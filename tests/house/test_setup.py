@@ -120,6 +120,7 @@ def test_make_without_a_target_lists_them() -> None:
         "policies",
         "fuzz-netlist",
         "lint",
+        "licences",
         "setup",
         "clean",
         "distclean",

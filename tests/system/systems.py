@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.derived.analysis import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.written.specification import Specification, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
-LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 
 _SHORT = {"Point": "geometry_msgs/Point", "Vector3": "geometry_msgs/Vector3", "Pose": "geometry_msgs/Pose"}
 
@@ -57,6 +58,30 @@ def read(folder: Path, text: str) -> tuple[Specification, Diagnostics]:
 def derived(folder: Path, text: str) -> DerivedSystem:
     found, faults = read(folder, text)
     return derive(found, folder, LIBRARIES, faults)
+
+
+_INSTANCE = re.compile(
+    r"^  (\w+) : (?:entity|component) [\w.]+\n(.*?)^    port map \(\n(.*?)^    \);", re.DOTALL | re.MULTILINE
+)
+_ASSOCIATION = re.compile(r"^ +(\S+) +=> (.*?),?$", re.MULTILINE)
+
+
+def maps(text: str) -> dict[str, tuple[dict[str, str], dict[str, str]]]:
+    """The generic and the port map of each instance of a top level, by its label."""
+    found = _INSTANCE.findall(text)
+    return {
+        label: (dict(_ASSOCIATION.findall(given)), dict(_ASSOCIATION.findall(ports))) for label, given, ports in found
+    }
+
+
+def signals(text: str) -> list[str]:
+    """The signals that a top level declares."""
+    return re.findall(r"^  signal (\w+) ", text, re.MULTILINE)
+
+
+def targets(text: str) -> list[str]:
+    """The targets of the assignments of a top level."""
+    return re.findall(r"^  (\S+) +<= ", text, re.MULTILINE)
 
 
 def connections(system: DerivedSystem) -> list[str]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,7 +13,16 @@ from fusesoc_firm.system import system_core
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.render import render
-from tests.system.systems import accelerator, converter, derived, instance, specification
+from tests.system.systems import (
+    accelerator,
+    converter,
+    derived,
+    instance,
+    maps,
+    signals,
+    specification,
+    targets,
+)
 
 BLOCKS = (
     converter("s", "subscriber", "Point", "p", "acc")
@@ -37,86 +46,68 @@ AWKWARD = (
 TYPES = accelerator("mix", "Point Vector3", "Point Vector3") + accelerator("same", "Point", "Point")
 
 
-def configuration(folder: Path, blocks: str) -> dict[str, Any]:
-    return system_configuration(derived(folder, specification(blocks, TYPES)))
-
-
-def signals(found: dict[str, Any]) -> list[str]:
-    declared = [item["name"].strip() for group in found["signals"] for item in group["declarations"]]
-    between = [*(fork for item in found["connections"] for fork in item["forks"])]
-    between += [item["buffer"] for item in found["publishers"] if item["buffer"]]
-    return declared + [signal["name"].strip() for item in between for signal in item["signals"]]
-
-
-def mapped(block: dict[str, Any]) -> dict[str, str]:
-    return {item["formal"].strip(): item["actual"] for item in block["ports"]}
+def top_level(folder: Path, blocks: str) -> str:
+    return render(SYSTEM_TEMPLATE, system_configuration(derived(folder, specification(blocks, TYPES))))
 
 
 @pytest.mark.parametrize("blocks", [BLOCKS, AWKWARD])
 def test_names_are_distinct(tmp_path: Path, blocks: str) -> None:
-    found = configuration(tmp_path, blocks)
-    labels = [block["label"] for key in ("subscribers", "publishers", "accelerators") for block in found[key]]
-    labels += [fork["label"] for item in found["connections"] for fork in item["forks"]]
-    labels += [item["length"]["label"] for item in found["connections"] if item["length"]]
-    labels += [item["buffer"]["label"] for item in found["publishers"] if item["buffer"]]
-    own = ["u_manager", "u_scheduler", "clk", "rst_n", "s_axis_tdata", "sub_axis_tdata", found["entity"]]
-    names = Counter(name.lower() for name in [*labels, *signals(found), *own])
+    text = top_level(tmp_path, blocks)
+    names = Counter(
+        name.lower() for name in [*maps(text), *signals(text), "clk", "rst_n", "s_axis_tdata", "robot_system"]
+    )
+    assert {"u_manager", "u_scheduler", "sub_axis_tdata"} < set(names)
     assert [name for name, count in names.items() if count > 1] == []
 
 
 @pytest.mark.parametrize("blocks", [BLOCKS, AWKWARD])
 def test_every_signal_is_driven_once_and_ends_somewhere(tmp_path: Path, blocks: str) -> None:
-    found = configuration(tmp_path, blocks)
-    targets = Counter(item["target"].strip() for group in found["connections"] for item in group["assignments"])
-    assert set(targets.values()) == {1}
-    instances = [block for key in ("subscribers", "publishers", "accelerators") for block in found[key]]
-    instances += [fork for item in found["connections"] for fork in item["forks"]]
-    instances += [item["length"] for item in found["connections"] if item["length"]]
-    instances += [item["buffer"] for item in found["publishers"] if item["buffer"]]
-    actuals = [actual for instance in instances for actual in mapped(instance).values()]
-    used = {name.partition("(")[0] for name in [*targets, *actuals]}
-    assert set(signals(found)) <= used
+    text = top_level(tmp_path, blocks)
+    assert set(Counter(targets(text)).values()) == {1}
+    actuals = [actual for _, ports in maps(text).values() for actual in ports.values()]
+    used = {name.partition("(")[0] for name in [*targets(text), *actuals]}
+    assert set(signals(text)) <= used
 
 
 def test_port_maps(tmp_path: Path) -> None:
-    found = configuration(tmp_path, BLOCKS)
-    subscriber = mapped(found["subscribers"][1])
+    found = maps(top_level(tmp_path, BLOCKS))
+    _, subscriber = found["u_s_2"]
     assert subscriber["s_axis_tvalid"] == "sub_axis_tvalid(1)"
     assert subscriber["frame_error_code"] == "frame_error_code(7 downto 4)"
     assert subscriber["x"] == "s_2_x"
-    publisher = mapped(found["publishers"][2])
+    generics, publisher = found["u_r"]
     assert publisher["m_axis_tdata"] == "pub_axis_tdata(23 downto 16)"
     assert publisher["m_axis_tkeep"] == "pub_axis_tkeep(2 downto 2)"
-    assert found["publishers"][2]["id"] == 2
-    block = mapped(found["accelerators"][0])
+    assert generics == {"ID": "2"}
+    _, block = found["u_acc"]
     assert list(block)[:3] == ["clk", "rst_n", "in0_x"]
     assert block["in1_msg_ready"] == "acc_in1_msg_ready"
     assert {name for name in block if "msg_valid" in name} == {"in0_msg_valid", "in1_msg_valid"}
 
 
 def test_a_fork_stands_between_one_source_and_its_sinks(tmp_path: Path) -> None:
-    found = configuration(tmp_path, BLOCKS)
-    first, *others = found["connections"]
-    assert (first["source"], first["sinks"]) == ("s", "p, acc")
-    (fork,) = first["forks"]
-    assert fork["label"] == "u_s_fork"
-    assert [item["name"] for item in fork["signals"]] == ["s_fork_valid", "s_fork_ready"]
-    assert mapped(fork) == {
-        "clk": "clk",
-        "rst_n": "rst_n",
-        "source_valid": "s_segment_valid(0)",
-        "source_ready": "s_msg_ready",
-        "sink_valid": "s_fork_valid",
-        "sink_ready": "s_fork_ready",
-    }
-    pairs = {item["target"].strip(): item["source"] for item in first["assignments"]}
-    assert pairs["acc_in0_msg_valid"] == "s_fork_valid(1)"
-    assert pairs["s_fork_ready(0)"] == "p_msg_ready"
-    assert all(item["forks"] == [] for item in others)
+    text = top_level(tmp_path, BLOCKS)
+    assert "  -- geometry_msgs/Point from s to p, acc\n" in text
+    found = maps(text)
+    assert [label for label in found if label.endswith("_fork")] == ["u_s_fork"]
+    assert {"s_fork_valid", "s_fork_ready"} < set(signals(text))
+    assert found["u_s_fork"] == (
+        {"SINKS": "2"},
+        {
+            "clk": "clk",
+            "rst_n": "rst_n",
+            "source_valid": "s_segment_valid(0)",
+            "source_ready": "s_msg_ready",
+            "sink_valid": "s_fork_valid",
+            "sink_ready": "s_fork_ready",
+        },
+    )
+    assert re.search(r"^  acc_in0_msg_valid +<= s_fork_valid\(1\);$", text, re.MULTILINE)
+    assert re.search(r"^  s_fork_ready\(0\) +<= p_msg_ready;$", text, re.MULTILINE)
 
 
 def test_the_text_is_the_same_every_time(tmp_path: Path) -> None:
-    first, second = (render(SYSTEM_TEMPLATE, configuration(tmp_path, AWKWARD)) for _ in range(2))
+    first, second = (top_level(tmp_path, AWKWARD) for _ in range(2))
     assert first == second
 
 

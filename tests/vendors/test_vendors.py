@@ -119,7 +119,7 @@ class Project:
         return done.stderr
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("board", ZYNQ)
 @pytest.mark.parametrize("core", CORES)
 def test_every_system_beside_a_processor(tmp_path: Path, core: str, board: str) -> None:
@@ -133,6 +133,7 @@ def test_every_system_beside_a_processor(tmp_path: Path, core: str, board: str) 
     )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("core", ["quat2euler", "multi_type_verilog"])
 def test_a_project_of_quartus(tmp_path: Path, core: str) -> None:
     lines = Project(tmp_path / "build", core, "quartus").lines()
@@ -149,6 +150,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("board", "clock", "pin"), [("zynq7000", "clk_fpga_", "FCLK_CLK"), ("zcu104", "clk_pl_", "pl_clk")]
 )

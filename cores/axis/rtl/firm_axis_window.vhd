@@ -228,8 +228,9 @@ begin
 
     taken   <= unsigned(take) when take_valid = '1' else (others => '0');
     move    <= '1' when filled_r = '0' or dropping = '1' or (take_valid = '1' and taken >= left_r) else '0';
-    uses_up <= '1' when filled_r = '1' and dropping = '0' and ends_next = '1' and take_valid = '1' and taken = joined
-               else '0';
+    uses_up <= '1' when filled_r = '1' and dropping = '0' and ends_next = '1' and take_valid = '1'
+                        and taken = joined else
+               '0';
 
     move_beat : process (clk)
     begin

@@ -17,8 +17,8 @@ entity firm_axis_length_buffer_tb is
     SINK_STALL_PERCENT : integer := 0;
     -- So many errors of a publisher, early on.
     PUBLISHER_ERRORS : integer := 0;
-    WATCHDOG : integer := 2000;
-    QUIET    : integer := 200
+    WATCHDOG         : integer := 2000;
+    QUIET            : integer := 200
   );
 end entity firm_axis_length_buffer_tb;
 

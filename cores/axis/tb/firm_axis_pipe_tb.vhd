@@ -18,7 +18,7 @@ entity firm_axis_pipe_tb is
     STALL_PERCENT      : integer := 0;
     SINK_STALL_PERCENT : integer := 0;
     -- The sink takes nothing until the part is full, which must hold so many beats; 0: not tested.
-    CAPACITY : integer := 0;
+    CAPACITY      : integer := 0;
     WATCHDOG      : integer := 1000;
     QUIET         : integer := 100
   );

@@ -134,7 +134,8 @@ begin
 
   s_ready   <= request_r(0) and done and not withdrawn_r;
   s_settled <= '1' when request_r(0) = '1' and withdrawn_r = '0' and done = '0'
-                        and shown(SEGMENTS-1 downto 0) = s_segment_valid else '0';
+                        and shown(SEGMENTS-1 downto 0) = s_segment_valid else
+               '0';
   s_idle    <= '1' when request_r(0) = '0' and shown = NONE and done = '0' else '0';
 
   -- The sink's domain

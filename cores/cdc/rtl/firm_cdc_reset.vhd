@@ -3,7 +3,8 @@
 -- edge, three or more of them after both `rst_n` and `release` are high. So a reset is never too short to be seen, and
 -- when it ends, what came through synchronisers before it is gone from them.
 --
--- Constraint: the paths to the registers' clear and into the first register are asynchronous (docs/how-to/use-several-clocks.md).
+-- Constraint: the paths to the registers' clear and into the first register are asynchronous
+-- (docs/how-to/use-several-clocks.md).
 library ieee;
 use ieee.std_logic_1164.all;
 

@@ -147,7 +147,8 @@ begin
 
   -- A pointer is DEPTH ahead of another if its two highest bits in Gray code are the other's, inverted.
   is_full     <= '1' when write_gray_r = (not read_seen(POINTER_BITS-1 downto POINTER_BITS-2))
-                                         & read_seen(POINTER_BITS-3 downto 0) else '0';
+                          & read_seen(POINTER_BITS-3 downto 0) else
+                 '0';
   is_drained  <= '1' when write_gray_r = read_seen else '0';
   write       <= wide_tvalid and not is_full and not last_r;
   wide_tready <= is_drained when last_r = '1' else not is_full and not wide_tlast;

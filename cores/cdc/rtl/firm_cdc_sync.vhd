@@ -29,9 +29,9 @@ architecture rtl of firm_cdc_sync is
   attribute shreg_extract : string;
   attribute preserve      : boolean;
   attribute altera_attribute : string;
-  attribute async_reg of stages_r     : signal is "true";
-  attribute shreg_extract of stages_r : signal is "no";
-  attribute preserve of stages_r      : signal is true;
+  attribute async_reg of stages_r        : signal is "true";
+  attribute shreg_extract of stages_r    : signal is "no";
+  attribute preserve of stages_r         : signal is true;
   attribute altera_attribute of stages_r : signal is
     "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS";
 

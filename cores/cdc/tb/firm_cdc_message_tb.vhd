@@ -433,8 +433,8 @@ begin
         wait until rising_edge(s_clk);
       else
         given <= given + 1;
-        let_go;
         -- With the next message at once, the bits of the first segment stay.
+        let_go;
       end if;
     end loop;
     for cycle in 1 to 100 loop

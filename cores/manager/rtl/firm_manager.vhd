@@ -2,7 +2,8 @@
 -- Stands between the host's two streams and the converters. Host to subscribers: takes the id off a frame and routes
 -- it. Publishers to host: sends the frames of the publisher that the scheduler in the slot grants. Register slices on
 -- the host's sides cut every path between the host and the converters.
--- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host gets bursts (docs/reference/manager.md).
+-- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host gets bursts
+-- (docs/reference/manager.md).
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

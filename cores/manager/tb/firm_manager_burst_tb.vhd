@@ -24,10 +24,10 @@ entity firm_manager_burst_tb is
     FRAMES     : positive := 10;
     LONGEST    : natural  := 100;
     -- Publisher 0 stops for ever behind its first beat.
-    STOPPED    : boolean  := false;
-    TRACE_FILE : string   := "bursts.txt";
+    STOPPED       : boolean  := false;
+    TRACE_FILE    : string   := "bursts.txt";
     EXPECTED_FILE : string   := "";
-    SEED       : positive := 1;
+    SEED          : positive := 1;
     -- The chance in a cycle that the grant moves; that it moves to any publisher, whether it has a beat or not; that a
     -- publisher pauses behind a beat; that the host takes none.
     MOVE_PERCENT  : natural := 30;

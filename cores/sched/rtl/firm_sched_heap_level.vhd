@@ -134,7 +134,7 @@ begin
 
   pairs : if LEVEL > 1 generate
     constant ADDRESS_BITS : positive := LEVEL - 1;
-    signal address : std_logic_vector(ADDRESS_BITS-1 downto 0);
+    signal address        : std_logic_vector(ADDRESS_BITS-1 downto 0);
   begin
     address <= id_r(ID_BITS-1 downto LOW_BITS+1);
 

@@ -32,9 +32,9 @@ architecture rtl of firm_sched_lowest is
 
   -- The word of a number, found from its highest bit on.
   function word_at(words, number : std_logic_vector) return std_logic_vector is
-    constant HALF : positive := words'length / 2;
-    alias numbered : std_logic_vector(2*HALF-1 downto 0) is words;
-    alias bits     : std_logic_vector(number'length-1 downto 0) is number;
+    constant HALF         : positive := words'length / 2;
+    alias numbered        : std_logic_vector(2*HALF-1 downto 0) is words;
+    alias bits            : std_logic_vector(number'length-1 downto 0) is number;
     variable half_of_word : std_logic_vector(HALF-1 downto 0);
   begin
     if bits(bits'high) = '1' then

@@ -33,7 +33,7 @@ architecture rtl of firm_sched_lst is
 
   constant FEW : positive := 8;
 
-  constant FAULT : string := fault_of_deadlines(REQUESTERS, PERIODS, DEADLINES, TIME_BITS, SHORTEST_RUN);
+  constant FAULT          : string := fault_of_deadlines(REQUESTERS, PERIODS, DEADLINES, TIME_BITS, SHORTEST_RUN);
   constant TRANSFER_FAULT : string := fault_of_transfer(TRANSFER_TIMES, REQUESTERS, TIME_BITS);
 
   -- A task's slack: what remains to its deadline if it is sent at once.

@@ -142,7 +142,8 @@ begin
   begin
     beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
     kept  <= any_of(request and current(REQUESTERS-1 downto 0)) and not finished
-             when beats > 0 and beats < SHORTEST_RUN else '0';
+             when beats > 0 and beats < SHORTEST_RUN else
+             '0';
 
     count_beats : process (clk)
     begin

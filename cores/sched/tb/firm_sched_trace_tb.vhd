@@ -34,8 +34,8 @@ entity firm_sched_trace_tb is
     STRETCH : integer := 0;
     -- At the beginning of a stretch nobody takes a beat for as many cycles at most.
     LONGEST_STALL : integer := 0;
-    TRACE     : string  := "trace.txt";
-    EXPECTED  : string  := ""
+    TRACE         : string  := "trace.txt";
+    EXPECTED      : string  := ""
   );
 end entity firm_sched_trace_tb;
 

@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host beside the hardware, for simulation: makes clock and reset, sends the frames of a stimulus file, compares
--- what comes back with an expected file, and reports. docs/reference/simulation-host.md says what the files and the report look like.
+-- what comes back with an expected file, and reports. docs/reference/simulation-host.md says what the files and the
+-- report look like.
 --
 -- One process does all of it once a cycle: it reads the inputs as they are before the rising edge, and what it
 -- drives changes HOLD after the edge, so no order of delta cycles matters. Where a stream carries nothing, the host
@@ -135,7 +136,7 @@ begin
     variable held_tlast : std_logic;
 
     -- The file of what came: its line of the frame that comes in.
-    file received         : text;
+    file received          : text;
     variable received_line : line;
 
     variable id_errors    : natural := 0;

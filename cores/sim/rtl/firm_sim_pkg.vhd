@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The frame files of the simulation host (docs/reference/simulation-host.md): read, checked and kept in memory, a character a byte.
--- Simulation only. A fault of form ends the simulation with `file:line: what`.
+-- The frame files of the simulation host (docs/reference/simulation-host.md): read, checked and kept in memory, a
+-- character a byte. Simulation only. A fault of form ends the simulation with `file:line: what`.
 library ieee;
 use ieee.std_logic_1164.all;
 use std.textio.all;
@@ -65,7 +65,7 @@ end package firm_sim_pkg;
 
 package body firm_sim_pkg is
 
-  constant HEX_DIGITS : string(1 to 16) := "0123456789abcdef";
+  constant HEX_DIGITS   : string(1 to 16) := "0123456789abcdef";
   constant HEADER_BYTES : positive := 5;
 
   type byte_table_t is array (character) of byte_t;

@@ -61,7 +61,7 @@ begin
   end process watch_frames;
 
   spoil : process (s_axis_tdata, s_axis_tkeep, s_axis_tvalid, s_axis_tlast, m_axis_tready,
-    first_r, id_r, beats_r, idle_r, held_r)
+                   first_r, id_r, beats_r, idle_r, held_r)
     variable is_third  : boolean;
     variable is_fourth : boolean;
   begin

@@ -58,7 +58,6 @@ def block_design_configuration(system: DerivedSystem, board: Board, clock: Fract
                 "ip": ip,
                 "meaning": meaning,
                 "given": [{"name": name, "cell": cell} for name, _ in properties if name in _FOUND_OUT],
-                "has_properties": bool(properties),
                 "properties": _properties(properties),
             }
             for cell, ip, meaning, properties in _cells(system, processor)
@@ -161,7 +160,7 @@ def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, li
 def _pins(system: DerivedSystem) -> list[Configuration]:
     """The pins of accelerators as ports of the design."""
     return [
-        {"name": port["formal"], "direction": "I" if port["direction"].strip() == "in" else "O", "range": port["range"]}
+        {"name": port["name"], "direction": "I" if port["direction"] == "in" else "O", "bits": port["bits"]}
         for group in pin_groups(Names(system), system)
         for port in group["ports"]
     ]

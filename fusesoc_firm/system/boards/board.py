@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.boards.processor import MOST_CLOCKS, PROCESSORS
 from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
 from fusesoc_firm.system.hardware.configuration import top_level_pins
@@ -115,7 +115,7 @@ def board_path(name: str, folder: Path) -> Path:
     return folder / name if name.endswith((".yaml", ".yml")) else FOLDER / f"{name}.yaml"
 
 
-def read_board(name: str, folder: Path) -> Board:
+def read_board(name: str, folder: Path = Path()) -> Board:
     """The board that `board_path` says. Raises `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
@@ -219,18 +219,18 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
     ports = {pin.port.lower() for pin in board.pins}
     pins = _accelerator_pins(system)
     link = [(name, direction) for name, direction, _ in LINK_PINS[system.link.kind] if name in ports]
-    own = [(name, "out" if name.startswith("led") else "in ") for name in ("led", "led_n", "reset", "reset_n")]
-    declared = [(_CLOCK, "in "), *link, *((name, direction) for name, direction in own if name in ports)]
+    own = [(name, "out" if name.startswith("led") else "in") for name in ("led", "led_n", "reset", "reset_n")]
+    declared = [(_CLOCK, "in"), *link, *((name, direction) for name, direction in own if name in ports)]
     typed = [(name, direction, "std_logic") for name, direction in declared]
-    typed += [(pin.name, pin.direction.ljust(3), vhdl_type(pin.width)) for pin in pins]
+    typed += [(pin.name, pin.direction, vhdl_type(pin.width)) for pin in pins]
     return {
         "entity": board_entity(system, board),
         "system": system.entity,
         "description": str(board.description),
         "clock_hz": clock_hz,
-        "error_high": len(system.error_blocks) - 1,
-        "ports": _columns(typed),
-        "handed_on": [{"name": name} for name in (*(name for name, _ in link), *(pin.name for pin in pins))],
+        "error_count": len(system.error_blocks),
+        "ports": [{"name": name, "direction": direction, "type": type_} for name, direction, type_ in typed],
+        "handed_on": [*(name for name, _ in link), *(pin.name for pin in pins)],
         **{name: name in ports for name, _ in own},
         "is_uart": system.link.kind is LinkKind.UART,
         "clock_mhz": f"{clock_hz / 10**6:g}",
@@ -264,17 +264,4 @@ def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
         )
         for block in system.accelerators
         for pin in block.type.accelerator.pins
-    ]
-
-
-def _columns(ports: Sequence[tuple[str, str, str]]) -> list[dict[str, str]]:
-    column = max(len(name) for name, *_ in ports)
-    return [
-        {
-            "name": name.ljust(column),
-            "direction": direction,
-            "type": type_,
-            "semicolon": ";" if number < len(ports) - 1 else "",
-        }
-        for number, (name, direction, type_) in enumerate(ports)
     ]

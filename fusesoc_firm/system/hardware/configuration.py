@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.derived.sides import SidePort
 from fusesoc_firm.system.hardware.instances import (
@@ -24,7 +24,6 @@ from fusesoc_firm.system.hardware.maps import port_map
 from fusesoc_firm.system.hardware.names import RELEASED, Names, blocks, reset_label, seen_reset
 from fusesoc_firm.system.hardware.scheduler import scheduler_configuration
 from fusesoc_firm.system.hardware.wires import connections
-from fusesoc_firm.system.written.specification import DIRECTIONS
 
 Configuration = dict[str, Any]
 
@@ -78,7 +77,7 @@ def test_bench_configuration(
         "clk",
         "rst_n",
         *(clock.port for clock in system.clocks),
-        *(str(port["formal"]) for group in pins for port in group["ports"]),
+        *(str(port["name"]) for group in pins for port in group["ports"]),
     ]
     # A link carries bytes.
     host_width = 8 if system.link else system.width
@@ -97,8 +96,7 @@ def test_bench_configuration(
         **dimensions(system),
         **interconnect_configuration(system),
         "host_width": host_width,
-        "host_data_high": host_width - 1,
-        "host_keep_high": host_width // 8 - 1,
+        "host_lanes": host_width // 8,
         "seed": seed,
         "stall_percent": stall_percent,
         "has_join": has_join,
@@ -108,10 +106,8 @@ def test_bench_configuration(
 
 def _clocks(system: DerivedSystem) -> list[Configuration]:
     """Every further clock as a port of the top level."""
-    column = max([len("frame_error_code"), *(len(clock.port) for clock in system.clocks)])
     return [
         {
-            "name": clock.port.ljust(column),
             "port": clock.port,
             "megahertz": f"{float(clock.frequency / 10**6):g}",
             "blocks": ", ".join(block.block for block in system.accelerators if block.clock == clock.name),
@@ -124,23 +120,19 @@ def _resets(system: DerivedSystem) -> Configuration | None:
     """The resets of further clocks: each domain sees it, one after the other, and clk's; then all let go."""
     if not system.clocks:
         return None
-    before: list[tuple[str, str]] = []
+    before = ""
     instances = []
     for clock in system.clocks:
         instances.append(_reset(clock.port, before, seen_reset(clock)))
-        before = [("release", seen_reset(clock))]
+        before = seen_reset(clock)
     instances.append(_reset("clk", before, RELEASED))
-    instances += [_reset(clock.port, [("release", RELEASED)], clock.reset) for clock in system.clocks]
+    instances += [_reset(clock.port, RELEASED, clock.reset) for clock in system.clocks]
     signals = [RELEASED, *(name for clock in system.clocks for name in (seen_reset(clock), clock.reset))]
-    column = max(map(len, signals))
-    return {"signals": [{"name": name.ljust(column)} for name in signals], "instances": instances}
+    return {"signals": signals, "instances": instances}
 
 
-def _reset(clock: str, release: list[tuple[str, str]], reset: str) -> Configuration:
-    return {
-        "label": reset_label(reset),
-        "ports": port_map([("clk", clock), ("rst_n", "rst_n"), *release, ("synced_rst_n", reset)]),
-    }
+def _reset(clock: str, release: str, reset: str) -> Configuration:
+    return {"label": reset_label(reset), "clock": clock, "release": release, "reset": reset}
 
 
 def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
@@ -155,25 +147,22 @@ def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
 
 def pin_groups(names: Names, system: DerivedSystem) -> list[Configuration]:
     """The pins of each block that has some, as ports of the top level."""
-    groups = []
-    for block in system.accelerators:
-        pins = block.type.accelerator.pins
-        formals = [names.port(block.block, pin.name) for pin in pins]
-        column = max(map(len, formals), default=0)
-        ports = [
-            {
-                "formal": formal,
-                "name": formal.ljust(column),
-                "direction": str(pin.direction).ljust(max(map(len, DIRECTIONS))),
-                "type": vhdl_type(pin.bits),
-                "range": "" if pin.bits is None else f" -from {pin.bits - 1} -to 0",
-                "low": "'0'" if pin.bits is None else "(others => '0')",
-            }
-            for pin, formal in zip(pins, formals, strict=True)
-        ]
-        if ports:
-            groups.append({"block": block.block, "ports": ports})
-    return groups
+    return [
+        {
+            "block": block.block,
+            "ports": [
+                {
+                    "name": names.port(block.block, pin.name),
+                    "direction": str(pin.direction),
+                    "type": vhdl_type(pin.bits),
+                    "bits": pin.bits,
+                }
+                for pin in block.type.accelerator.pins
+            ],
+        }
+        for block in system.accelerators
+        if block.type.accelerator.pins
+    ]
 
 
 def dimensions(system: DerivedSystem) -> Configuration:
@@ -182,25 +171,21 @@ def dimensions(system: DerivedSystem) -> Configuration:
     return {
         "entity": system.entity,
         "width": system.width,
-        "data_high": system.width - 1,
-        "keep_high": system.width // 8 - 1,
+        "lanes": system.width // 8,
         "subscriber_count": len(system.subscribers),
         "publisher_count": publishers,
-        "subscriber_high": len(system.subscribers) - 1,
-        "publisher_high": publishers - 1,
-        "pub_data_high": publishers * system.width - 1,
-        "pub_keep_high": publishers * system.width // 8 - 1,
-        "select_high": max(1, (publishers - 1).bit_length()) - 1,
+        "pub_data_bits": publishers * system.width,
+        "pub_keep_bits": publishers * system.width // 8,
+        "select_bits": max(1, (publishers - 1).bit_length()),
         "error_count": len(system.error_blocks),
-        "error_high": len(system.error_blocks) - 1,
-        "error_code_high": ERROR_CODE_BITS * len(system.error_blocks) - 1,
+        "error_code_bits": ERROR_CODE_BITS * len(system.error_blocks),
     }
 
 
 def _signals(names: Names, block: str, ports: list[tuple[str, SidePort]]) -> Configuration:
-    declared = [(names.port(block, f"{prefix}{port.name}"), vhdl_type(port.width)) for prefix, port in ports]
-    column = max(len(name) for name, _ in declared)
     return {
         "block": block,
-        "declarations": [{"name": name.ljust(column), "type": type_} for name, type_ in declared],
+        "declarations": [
+            {"name": names.port(block, f"{prefix}{port.name}"), "type": vhdl_type(port.width)} for prefix, port in ports
+        ],
     }

@@ -6,13 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
-from fusesoc_firm.system.derived.model import Clock
+from fusesoc_firm.converter.vhdl import bits, vhdl_type
 from fusesoc_firm.system.hardware.crossings import Crossing, Scope, parts_of, port_of, word
-from fusesoc_firm.system.hardware.maps import port_map
 from fusesoc_firm.system.hardware.names import AXIS, RELEASED, Names
-
-Pairs = list[tuple[str, str]]
 
 
 @dataclass(frozen=True)
@@ -30,13 +26,12 @@ class SourceSide:
 def crossing_configuration(names: Names, crossing: Crossing, source: SourceSide) -> dict[str, Any]:
     """The comment, signals and instances of a crossing."""
     ends = f"{crossing.source.block} to {crossing.sink.block}"
-    declared = [(names.crossing(crossing, name), vhdl_type(bits)) for name, bits in crossing.signals()]
-    column = max((len(name) for name, _ in declared), default=0)
     return {
         "ends": ends,
         "difference": ", ".join(filter(None, (crossing.clocks, crossing.widths))),
-        "has_signals": bool(declared),
-        "signals": [{"name": name.ljust(column), "type": type_} for name, type_ in declared],
+        "signals": [
+            {"name": names.crossing(crossing, name), "type": vhdl_type(width)} for name, width in crossing.signals()
+        ],
         "notes": _notes(crossing),
         "instances": list(_instances(names, crossing, source)),
     }
@@ -48,13 +43,15 @@ def field_pairs(names: Names, crossing: Crossing, source: SourceSide) -> Iterato
         given, taken = (names.crossing(crossing, word(scope.handshake.part, name)) for name in ("given", "taken"))
         low = 0
         for port, width in scope.fields:
-            bits = f"({low})" if width is None else f"({low + width - 1} downto {low})"
+            for_port = [
+                f"{name}({low})" if width is None else bits(name, low + width - 1, low) for name in (given, taken)
+            ]
             low += width or 1
-            yield f"{given}{bits}", source.ports[port]
-            yield names.at(crossing.sink, port), f"{taken}{bits}"
+            yield for_port[0], source.ports[port]
+            yield names.at(crossing.sink, port), for_port[1]
 
 
-def _notes(crossing: Crossing) -> list[dict[str, str]]:
+def _notes(crossing: Crossing) -> list[str]:
     """Which paths an implementation must know of."""
     if not crossing.is_clocked:
         return []
@@ -66,112 +63,109 @@ def _notes(crossing: Crossing) -> list[dict[str, str]]:
     if any(scope.streams for scope in crossing.scopes):
         lines[0] += ", and the streams' write_gray_r, memory"
         lines[1] += ", and the streams' read_gray_r"
-    return [{"line": line} for line in lines]
+    return lines
 
 
 def _instances(names: Names, crossing: Crossing, source: SourceSide) -> Iterator[dict[str, Any]]:
+    """Each is a message's crossing, or a stream's, from clock to clock or from width to width."""
+    kinds = ("message", "stream", "resize")
     for scope in crossing.scopes:
-        if crossing.is_clocked:
-            yield _message(names, crossing, scope, source)
+        found = [("message", _message(names, crossing, scope, source))] if crossing.is_clocked else []
         if crossing.is_clocked or crossing.widths:
-            yield from (_stream(names, crossing, scope, stream, source) for stream in scope.streams)
+            kind = "stream" if crossing.is_clocked else "resize"
+            found += [(kind, _stream(names, crossing, scope, stream, source)) for stream in scope.streams]
+        yield from ({**dict.fromkeys(kinds), kind: instance} for kind, instance in found)
 
 
 def _message(names: Names, crossing: Crossing, scope: Scope, source: SourceSide) -> dict[str, Any]:
     """The handshake and the fields of a scope."""
-    if crossing.frame.is_fixed_size:
-        generics: Pairs = []
-        s_side, m_side = _fixed_ports(names, crossing, source)
-    else:
-        generics = [("FIELD_BITS", str(scope.bits))]
-        s_side, m_side = _variable_ports(names, crossing, scope, source)
-    if scope.handshake.segments > 1:
-        generics.insert(0, ("SEGMENTS", str(scope.handshake.segments)))
-    if len(parts_of(scope, crossing.scopes)) > 1:
-        generics.append(("PARTS", str(len(parts_of(scope, crossing.scopes)))))
+    inner = parts_of(scope, crossing.scopes)
+    generics = [] if scope.handshake.segments < 2 else [("SEGMENTS", scope.handshake.segments)]
+    generics += [] if crossing.frame.is_fixed_size else [("FIELD_BITS", scope.bits)]
+    generics += [] if len(inner) < 2 else [("PARTS", len(inner))]
+    sides = _fixed_sides if crossing.frame.is_fixed_size else _variable_sides
     return {
         "label": names.crossing_label(crossing, word(scope.handshake.part, "crossing")),
-        "entity": "firm_cdc_message",
-        "generics": {"lines": port_map(generics)} if generics else None,
-        "ports": port_map([*_domain("s", crossing.source_clock), *s_side, *_domain("m", crossing.sink_clock), *m_side]),
+        "generics": [{"formal": formal, "actual": actual} for formal, actual in generics],
+        "domains": _domains(crossing),
+        **sides(names, crossing, scope, source),
+        "parts": [{"place": place, "idle": names.crossing(crossing, name)} for place, name in enumerate(inner)],
     }
 
 
-def _fixed_ports(names: Names, crossing: Crossing, source: SourceSide) -> tuple[Pairs, Pairs]:
+def _fixed_sides(names: Names, crossing: Crossing, _: Scope, source: SourceSide) -> dict[str, Any]:
     """Of a message of fixed size: its fields hold at the source, and it comes as a whole."""
     valid = source.ports["segment_valid"]
-    s_side = [
-        ("s_segment_valid(0)", valid),
-        ("s_valid", valid),
-        ("s_ready", source.ports["msg_ready"]),
-        ("s_settled", "open"),
-        ("s_idle", "open"),
-    ]
-    m_side = [
-        ("m_fields", "open"),
-        ("m_segment_valid", "open"),
-        *((f"m_{name}", names.crossing(crossing, name)) for name in ("valid", "ready")),
-    ]
-    return s_side, m_side
+    return {
+        "is_one_segment": True,
+        "s": {
+            "enable": "",
+            "fields": "",
+            "segment_valid": valid,
+            "valid": valid,
+            "ready": source.ports["msg_ready"],
+            "settled": "open",
+            "idle": "open",
+        },
+        "m": {
+            "enable": "",
+            "fields": "open",
+            "segment_valid": "open",
+            **{name: names.crossing(crossing, name) for name in ("valid", "ready")},
+        },
+    }
 
 
-def _variable_ports(names: Names, crossing: Crossing, scope: Scope, source: SourceSide) -> tuple[Pairs, Pairs]:
-    handshake, part, sink = scope.handshake, scope.handshake.part, crossing.sink
-    inner = parts_of(scope, crossing.scopes)
-    s_side: Pairs = []
-    m_side: Pairs = []
-    if scope.parent:
-        s_side.append(("s_enable", names.crossing(crossing, word(scope.parent.part, "settled"))))
-        m_side.append(("m_enable", f"{names.at(sink, scope.parent.segment_valid or '')}(0)"))
-    s_side.append(("s_fields", names.crossing(crossing, word(part, "given"))))
-    m_side.append(("m_fields", names.crossing(crossing, word(part, "taken"))))
-    if handshake.segment_valid:
-        s_side.append(("s_segment_valid", source.ports[handshake.segment_valid]))
-        m_side.append(("m_segment_valid", names.at(sink, handshake.segment_valid)))
-    else:
-        s_side.append(("s_segment_valid(0)", source.ports[handshake.valid]))
-        m_side.append(("m_segment_valid", "open"))
-    s_side += [
-        ("s_valid", source.ports[handshake.valid]),
-        ("s_ready", source.ports[handshake.ready]),
-        ("s_settled", names.crossing(crossing, word(part, "settled")) if inner else "open"),
-        ("s_idle", names.crossing(crossing, word(part, "idle")) if scope.parent else "open"),
-        *((f"s_part_idle({place})", names.crossing(crossing, name)) for place, name in enumerate(inner)),
-    ]
-    m_side += [("m_valid", names.at(sink, handshake.valid)), ("m_ready", names.at(sink, handshake.ready))]
-    return s_side, m_side
+def _variable_sides(names: Names, crossing: Crossing, scope: Scope, source: SourceSide) -> dict[str, Any]:
+    """Of a message of variable size, or of an element in it: fields are held, and what is within waits for them."""
+    handshake, parent, sink = scope.handshake, scope.parent, crossing.sink
+    has_inner = bool(parts_of(scope, crossing.scopes))
+    own = {name: names.crossing(crossing, word(handshake.part, name)) for name in ("given", "taken")}
+    segment_valid = handshake.segment_valid
+    return {
+        "is_one_segment": not segment_valid,
+        "s": {
+            "enable": names.crossing(crossing, word(parent.part, "settled")) if parent else "",
+            "fields": own["given"],
+            "segment_valid": source.ports[segment_valid or handshake.valid],
+            "valid": source.ports[handshake.valid],
+            "ready": source.ports[handshake.ready],
+            "settled": names.crossing(crossing, word(handshake.part, "settled")) if has_inner else "open",
+            "idle": names.crossing(crossing, word(handshake.part, "idle")) if parent else "open",
+        },
+        "m": {
+            "enable": f"{names.at(sink, parent.segment_valid or '')}(0)" if parent else "",
+            "fields": own["taken"],
+            "segment_valid": names.at(sink, segment_valid) if segment_valid else "open",
+            "valid": names.at(sink, handshake.valid),
+            "ready": names.at(sink, handshake.ready),
+        },
+    }
 
 
 def _stream(names: Names, crossing: Crossing, scope: Scope, stream: str, source: SourceSide) -> dict[str, Any]:
-    """A stream of a scope, from clock to clock or from width to width."""
+    """A stream of a scope."""
     part, sink = scope.handshake.part, crossing.sink
-    s_axis = [(f"s_axis_{name}", source.ports[f"{stream}_axis_{name}"]) for name in AXIS]
-    m_axis = [(f"m_axis_{name}", names.at(sink, f"{stream}_axis_{name}")) for name in AXIS]
-    begun = source.begun[part]
-    if crossing.is_clocked:
-        ports = [
-            *_domain("s", crossing.source_clock),
-            ("s_open", begun),
-            ("s_enable", names.crossing(crossing, word(part, "settled"))),
-            ("s_idle", names.crossing(crossing, word(f"{stream}_axis", "idle"))),
-            *s_axis,
-            *_domain("m", crossing.sink_clock),
-            ("m_open", f"{names.at(sink, scope.handshake.segment_valid or '')}(0)"),
-            *m_axis,
-        ]
-    else:
-        clock = crossing.source_clock
-        reset = clock.reset if clock else "rst_n"
-        ports = [("clk", port_of(clock)), ("rst_n", reset), ("is_open", begun), *s_axis, *m_axis]
-    generics = [("S_WIDTH", str(crossing.source_width)), ("M_WIDTH", str(crossing.sink_width))]
-    return {
+    found = {
         "label": names.crossing_label(crossing, word(f"{stream}_axis", "crossing")),
-        "entity": "firm_cdc_stream" if crossing.is_clocked else "firm_axis_resize",
-        "generics": {"lines": port_map(generics)},
-        "ports": port_map(ports),
+        "s_width": crossing.source_width,
+        "m_width": crossing.sink_width,
+        "domains": _domains(crossing),
+        "begun": source.begun[part],
+        "s_axis": {name: source.ports[f"{stream}_axis_{name}"] for name in AXIS},
+        "m_axis": {name: names.at(sink, f"{stream}_axis_{name}") for name in AXIS},
     }
+    if crossing.is_clocked:
+        found["enable"] = names.crossing(crossing, word(part, "settled"))
+        found["idle"] = names.crossing(crossing, word(f"{stream}_axis", "idle"))
+        found["m_open"] = f"{names.at(sink, scope.handshake.segment_valid or '')}(0)"
+    return found
 
 
-def _domain(side: str, clock: Clock | None) -> Pairs:
-    """Clock and reset of a side; what is of the system's clock waits until all domains have been reset."""
-    return [(f"{side}_clk", port_of(clock)), (f"{side}_rst_n", clock.reset if clock else RELEASED)]
+def _domains(crossing: Crossing) -> dict[str, str]:
+    """Clock and reset of each side; what is of the system's clock waits until all domains have been reset."""
+    found = {}
+    for side, clock in (("s", crossing.source_clock), ("m", crossing.sink_clock)):
+        found[f"{side}_clock"] = port_of(clock)
+        found[f"{side}_reset"] = clock.reset if clock else RELEASED if crossing.is_clocked else "rst_n"
+    return found

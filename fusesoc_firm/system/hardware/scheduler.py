@@ -37,12 +37,10 @@ def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
 
 def _times(name: str, cycles: Sequence[int | None], system: DerivedSystem) -> dict[str, Any]:
     """A constant with one time a publisher."""
-    last = len(cycles) - 1
     return {
         "name": name,
-        "high": last,
         "values": [
-            {"id": number, "cycles": value, "comma": "" if number == last else ",", "block": publisher.block}
+            {"id": number, "cycles": value, "block": publisher.block}
             for number, (value, publisher) in enumerate(zip(cycles, system.publishers, strict=True))
         ],
     }

@@ -40,7 +40,7 @@ def _open_pins(system: DerivedSystem) -> list[Configuration]:
     """The pins where nothing is at them: inputs are low."""
     names = top_level_pins(system)
     return [
-        {"formal": names[block.block, pin.name], "actual": f"{pin.bits or 1}'b0" if pin.direction == "in" else ""}
+        {"name": names[block.block, pin.name], "is_input": pin.direction == "in", "bits": pin.bits or 1}
         for block in system.accelerators
         for pin in block.type.accelerator.pins
     ]

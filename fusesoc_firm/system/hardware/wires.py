@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fusesoc_firm.converter.payload_length import length_entity, length_ports
-from fusesoc_firm.converter.ports import field_ports, vhdl_type
+from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.system.derived.model import Connection, DerivedSystem, End, LengthSource, PayloadLength
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, Handshake, handshakes, side_ports
 from fusesoc_firm.system.hardware.crossing_wires import SourceSide, crossing_configuration, field_pairs
@@ -45,7 +45,6 @@ def _connection(
     else:
         for number, crossing in enumerate(crossings(system, connection)):
             pairs += _pairs(names, connection, number, system, crossing)
-    column = max(len(target) for target, _ in pairs)
     return {
         "message": str(connection.frame.message),
         "source": connection.source.block,
@@ -59,7 +58,7 @@ def _connection(
             for number, crossing in enumerate(crossings(system, connection))
             if crossing
         ],
-        "assignments": [{"target": target.ljust(column), "source": value} for target, value in pairs],
+        "assignments": [{"target": target, "source": value} for target, value in pairs],
     }
 
 
@@ -151,30 +150,24 @@ def _length(names: Names, connection: Connection) -> dict[str, Any]:
 def _fork(names: Names, connection: Connection, fork: Handshake, system: DerivedSystem) -> dict[str, Any]:
     source, count = connection.source, len(connection.sinks)
     clock = system.clock_of(source.block)
-    valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
     source_valid = names.at(source, fork.valid)
-    signals = [(valid, count), (ready, count)]
-    generics = [("SINKS", str(count))]
-    ports = [
-        ("clk", port_of(clock)),
-        ("rst_n", clock.reset if clock else "rst_n"),
-        ("source_valid", f"{source_valid}(0)" if connection.frame.is_fixed_size else source_valid),
-        ("source_ready", names.at(source, fork.ready)),
-        ("sink_valid", valid),
-        ("sink_ready", ready),
-    ]
-    if fork.segment_valid is not None:
-        segment_valid = names.forked(source, fork, "segment_valid")
-        signals.append((segment_valid, count * fork.segments))
-        generics.append(("SEGMENTS", str(fork.segments)))
-        ports.insert(4, ("source_segment_valid", names.at(source, fork.segment_valid)))
-        ports.append(("sink_segment_valid", segment_valid))
-    column = max(len(name) for name, _ in signals)
     return {
         "label": names.fork(source, fork),
-        "signals": [{"name": name.ljust(column), "type": vhdl_type(bits)} for name, bits in signals],
-        "generics": port_map(generics),
-        "ports": port_map(ports),
+        "sinks": count,
+        "clock": port_of(clock),
+        "reset": clock.reset if clock else "rst_n",
+        "source_valid": f"{source_valid}(0)" if connection.frame.is_fixed_size else source_valid,
+        "source_ready": names.at(source, fork.ready),
+        "sink_valid": names.forked(source, fork, "valid"),
+        "sink_ready": names.forked(source, fork, "ready"),
+        "segments": {
+            "count": fork.segments,
+            "bits": count * fork.segments,
+            "source_segment_valid": names.at(source, fork.segment_valid),
+            "sink_segment_valid": names.forked(source, fork, "segment_valid"),
+        }
+        if fork.segment_valid is not None
+        else None,
     }
 
 

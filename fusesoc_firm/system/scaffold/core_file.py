@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.request.core_reader import read_core
-from fusesoc_firm.system.boards.board import FOLDER, QUARTUS, VIVADO, board_entity, boards, read_board
+from fusesoc_firm.system.boards.board import QUARTUS, VIVADO, board_entity, boards, read_board
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.verilog_bench import translated_unit
 from fusesoc_firm.system.system_core import LoadedSystem
@@ -21,17 +21,18 @@ from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
 from fusesoc_firm.text.render import render
+from fusesoc_firm.tools.simulators import Simulator, default_simulator, fitting
 
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
 
-# Families of FPGAs as Yosys calls them, and the options of its synth command.
-_FAMILIES = (
+# Families of FPGAs as Yosys calls them, and the options of its synth command: a target synth_<name> for each.
+FAMILIES = [
     {"name": "xilinx", "description": "Xilinx UltraScale+", "options": "[-family, xcup, -flatten, -abc9]"},
     {"name": "ecp5", "description": "Lattice ECP5", "options": "[-abc9]"},
     {"name": "ice40", "description": "Lattice iCE40 UltraPlus", "options": "[-abc9, -device, u, -dsp]"},
     {"name": "gowin", "description": "Gowin", "options": "[]"},
-)
+]
 # The instances of the generator that targets ask for.
 _SYSTEM, _SIMULATION = "system", "simulation"
 # The core with the generator `far`, and the one that had it before version 0.2.0.
@@ -115,29 +116,72 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
 
 def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool) -> str:
     has_kernels = bool(system.kernels)
+    unit = translated_unit(system, has_environment=has_environment)
     return render(
         TARGETS_TEMPLATE,
         {
             "entity": system.entity,
-            "translated": translated_unit(system, has_environment=has_environment),
-            "is_simulated": is_simulated,
-            "is_vhdl": not any(item.is_component for item in system.accelerator_types),
-            "is_system_verilog": any(
-                source.lower().endswith((".sv", ".svh"))
-                for item in system.accelerator_types
-                for source in item.accelerator.sources
-            ),
+            "simulations": [
+                target
+                for is_live in ((False, True) if is_simulated else ())
+                for target in _simulations(system, unit, is_live=is_live)
+            ],
             # Only an HLS tool makes them, so there is no netlist of the whole.
             "has_kernels": has_kernels,
-            "families": [] if has_kernels else list(_FAMILIES),
+            "families": [] if has_kernels else FAMILIES,
             "boards": [target for name in boards() if (target := _board(system, name, has_kernels=has_kernels))],
         },
     )
 
 
+def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator[dict[str, object]]:
+    """The targets of simulations, or of live ones: the first simulator has the plain name.
+
+    Those that read no VHDL translate the design unit `unit` with all below it.
+    """
+    has_verilog = any(item.is_component for item in system.accelerator_types)
+    sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
+    is_system_verilog = any(source.endswith((".sv", ".svh")) for source in sources)
+    kind, bench, suffix = ("live", "verilog_pipe", "live") if is_live else ("sim", "verilog_host", "tb")
+    known = fitting(has_verilog=has_verilog, is_live=is_live)
+    for name, item in known.items():
+        is_first, is_default = item is next(iter(known.values())), name == default_simulator()
+        parameters = ["product: live"] * is_live + [f"simulator: {name}"] * (not is_default)
+        # A system that the default one cannot simulate has the first target by both names.
+        anchor = (kind if is_live else name) if is_first and not is_default else ""
+        yield {
+            "target": kind if is_first else f"{kind}_{name}",
+            "alias": {"name": f"{kind}_{name}", "anchor": anchor} if anchor else None,
+            "anchored": f" &{anchor}" if anchor else "",
+            "description": _description(item, is_first=is_first, is_live=is_live),
+            "parameters": f": {{{', '.join(parameters)}}}" if parameters else "",
+            "further_flag": "" if item.reads_vhdl else f", {bench}: true",
+            "simulator": name,
+            "before": _options(item.system_verilog if is_system_verilog else {}),
+            "translated": None if item.reads_vhdl else {"unit": unit},
+            "options": _options(item.options),
+            "toplevel": f"{system.entity}_{suffix}",
+        }
+
+
+def _description(simulator: Simulator, *, is_first: bool, is_live: bool) -> str:
+    if is_live and is_first:
+        return f"Build a simulator in {simulator.title} that another program starts and sends frames to"
+    if is_live:
+        return f"The same in {simulator.title}"
+    if is_first:
+        netlist = "" if simulator.reads_vhdl else "; GHDL makes a netlist of the VHDL"
+        return f"Simulate with {simulator.title}, compare every byte with the model{netlist}"
+    return f"The same with {simulator.title}{simulator.remark}"
+
+
+def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
+    return [{"name": name, "value": value} for name, value in options.items()]
+
+
 def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
     """A board's target; None if it takes no kernels and the system has some."""
-    board = read_board(name, FOLDER)
+    board = read_board(name)
     if has_kernels and board.flow != VIVADO:
         return None
     options: dict[str, str | Sequence[str] | None] = {

@@ -35,13 +35,12 @@ def python_skeleton(type_: AcceleratorType) -> Configuration:
 
 
 def _described(name: str, frame: Frame) -> Configuration:
-    """A message and its used fields with their types, in columns."""
+    """A message and its used fields with their types."""
     fields = dict(_fields(frame.nodes, "", 0))
-    column = max(map(len, fields), default=0)
     return {
         "name": name,
         "message": str(frame.message),
-        "fields": [{"field": field.ljust(column), "type": type_} for field, type_ in fields.items()],
+        "fields": [{"field": field, "type": type_} for field, type_ in fields.items()],
     }
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.message_ports import message_side
-from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.converter.program import has_bytes
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.length import sent_length_of
 from fusesoc_firm.frame.model import Loop, Node
 from fusesoc_firm.system.derived.kernel import arguments, function_name, prototype
@@ -32,19 +32,11 @@ _SIGNALS = ("is_there", "is_sent", "sent_r", "done")
 
 @dataclass(frozen=True)
 class _Language:
-    """How a language of hardware says what a first version is made of.
-
-    `zero` is a value of so many bits, `word` a number of 32 bits. `offered` says that a message is there and that this
-    output of it has not been sent, by the names of the two signals and the output's number.
-    """
+    """How a language of hardware declares ports."""
 
     template: str
     directions: tuple[str, str]
     type: Callable[[int | None], str]
-    zero: Callable[[int | None], str]
-    word: Callable[[int], str]
-    offered: Callable[[str, str, int], str]
-    conjunction: str
     separator: str
     comment: str
     has_types_first: bool = False
@@ -55,10 +47,6 @@ _LANGUAGES = {
         template="vhdl/skeleton.vhd",
         directions=("in ", "out"),
         type=vhdl_type,
-        zero=lambda bits: "'0'" if bits is None else "(others => '0')",
-        word=lambda value: f'x"{value:08x}"',
-        offered=lambda is_there, sent, number: f"{is_there} and not {sent}({number})",
-        conjunction=" and ",
         separator=";",
         comment="--",
     ),
@@ -66,10 +54,6 @@ _LANGUAGES = {
         template="verilog/skeleton.v",
         directions=("input  wire", "output wire"),
         type=lambda bits: "" if bits is None else f"[{bits - 1}:0] ",
-        zero=lambda bits: f"{bits or 1}'b0",
-        word=lambda value: f"32'd{value}",
-        offered=lambda is_there, sent, number: f"{is_there} && !{sent}[{number}]",
-        conjunction=" && ",
         separator=",",
         comment="//",
         has_types_first=True,
@@ -125,21 +109,17 @@ def _entity(type_: AcceleratorType, language: _Language) -> Configuration:
     pins = type_.accelerator.pins
     names = distinct_identifiers(((name,) for name in _SIGNALS), [str(pin.name) for pin in pins])
     own = dict(zip(_SIGNALS, names, strict=True))
-    gives = [_given(number, side, of_side[side.prefix], own, language) for number, side in enumerate(type_.outputs)]
+    gives = [_given(number, side, of_side[side.prefix]) for number, side in enumerate(type_.outputs)]
     return {
         **own,
         "entity": identifier(type_.accelerator.name),
         "sides": _declarations(type_, of_side, pins, language),
-        # Without a message that it takes, nothing says when to send one.
-        "all_valid": language.conjunction.join(f"{side.prefix}msg_valid" for side in type_.inputs)
-        or language.zero(None),
-        "takes_none": not type_.inputs,
-        "output_high": max(1, len(type_.outputs)) - 1,
-        "takes": [{"port": f"{side.prefix}msg_ready", "done": own["done"]} for side in type_.inputs],
+        "takes": [side.prefix for side in type_.inputs],
+        "output_count": max(1, len(type_.outputs)),
         "gives": gives,
         "counts": [count for given in gives for count in given["counts"]],
         "discards": _discards(type_.inputs, of_side),
-        "pins": _driven_pins(pins, language),
+        "pins": [{"port": str(pin.name), "bits": pin.bits} for pin in pins if pin.direction == "out"],
     }
 
 
@@ -178,12 +158,9 @@ def _declarations(
     ]
 
 
-def _given(
-    number: int, side: MessageSide, ports: Sequence[SidePort], own: Mapping[str, str], language: _Language
-) -> Configuration:
+def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Configuration:
     """What an output does: its handshake with the message, the length of a message of zeros, zeros for the rest."""
-    offered = language.offered(own["is_there"], own["sent_r"], number)
-    counts = _counts(side, offered)
+    counts = _counts(side, number)
     by_name = {f"{side.prefix}{port.name}": port for port in ports}
     length = f"{side.prefix}{PAYLOAD_LENGTH}"
     segments = [f"{side.prefix}segment_valid", *(count["segment_valid"] for count in counts)]
@@ -192,17 +169,11 @@ def _given(
     return {
         "number": number,
         "ready": f"{side.prefix}msg_ready",
-        "is_sent": own["is_sent"],
-        "sent_r": own["sent_r"],
-        "segments": [
-            {"port": name, "bits": by_name[name].width or 1, "offered": offered} for name in segments if name in by_name
-        ],
-        "valid": [{"port": name, "offered": offered} for name in valid if name in by_name],
-        "length": {"port": length, "value": language.word(sent_length_of(side.frame).minimum)}
-        if length in by_name
-        else None,
+        "segments": [{"port": name, "bits": by_name[name].width or 1} for name in segments if name in by_name],
+        "valid": [name for name in valid if name in by_name],
+        "length": _length(length, side) if length in by_name else None,
         "zeros": [
-            {"port": name, "zero": language.zero(port.width)}
+            {"port": name, "bits": port.width}
             for name, port in by_name.items()
             if port.is_output and name not in driven
         ],
@@ -210,8 +181,14 @@ def _given(
     }
 
 
-def _counts(side: MessageSide, offered: str) -> list[Configuration]:
-    """The arrays of fixed size that are sent element by element, whose elements are counted: the last one is marked."""
+def _length(port: str, side: MessageSide) -> Configuration:
+    """The length of a message of zeros."""
+    value = sent_length_of(side.frame).minimum
+    return {"port": port, "value": value, "digits": f"{value:08x}"}
+
+
+def _counts(side: MessageSide, number: int) -> list[Configuration]:
+    """The arrays of fixed size that output `number` sends; their elements are counted, as the last one is marked."""
     if side.frame.is_fixed_size:
         return []
     ports = message_side(side.frame)
@@ -223,7 +200,7 @@ def _counts(side: MessageSide, offered: str) -> list[Configuration]:
                 "port": f"{side.prefix}{element.name}",
                 "count_r": f"{side.prefix}{element.name}_r",
                 "high": (loop.count or 1) - 1,
-                "offered": offered,
+                "number": number,
                 "segment_valid": f"{side.prefix}{element.segment_valid}",
                 "valid": f"{side.prefix}{element.valid}",
                 "ready": f"{side.prefix}{element.ready}",
@@ -241,17 +218,11 @@ def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
             yield from _fixed_loops(node.body)
 
 
-def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> Configuration | None:
+def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> list[str]:
     """The streams and elements of inputs, which must be taken to their ends."""
-    ready = [
+    return [
         f"{side.prefix}{port.name}"
         for side in inputs
         for port in of_side[side.prefix]
         if port.is_output and port.name != "msg_ready"
     ]
-    return {"ports": ready} if ready else None
-
-
-def _driven_pins(pins: Sequence[Pin], language: _Language) -> Configuration | None:
-    driven = [{"port": str(pin.name), "zero": language.zero(pin.bits)} for pin in pins if pin.direction == "out"]
-    return {"ports": driven} if driven else None

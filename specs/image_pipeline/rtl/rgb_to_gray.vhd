@@ -211,7 +211,7 @@ begin
       result_ready                    => result_ready
     );
 
-  joined      <= X"0000" & group_data & previous_r;
+  joined      <= x"0000" & group_data & previous_r;
   advance     <= result_ready or not valid_r(3);
   group_ready <= advance;
 

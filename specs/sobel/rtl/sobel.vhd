@@ -107,7 +107,7 @@ architecture rtl of sobel is
     first : std_logic;
     last  : std_logic;
     count : unsigned(COUNT_BITS-1 downto 0);
-  end record;
+  end record group_t;
 
   -- The column at a lane.
   function smoothed(a, b, c : std_logic_vector(7 downto 0)) return smooth_t is
@@ -154,7 +154,7 @@ architecture rtl of sobel is
   signal rows_r       : natural range 0 to 2;                   -- rows that came, as far as it matters
 
   -- The two rows before, the later one low.
-  signal memory : rows_t;
+  signal memory  : rows_t;
   signal earlier : std_logic_vector(2*WIDTH-1 downto 0);
 
   -- A group of the row that comes.
@@ -270,10 +270,12 @@ begin
   advance <= result_ready or not out_r;
   -- Where a row is one group, the next one may not be read before this one is written.
   settled <= '0' when valid_r = '1' and address_r = index_r else '1';
-  is_last <= group_last when phase_r = ROWS else '1' when index_r = last_index_r else '0';
+  is_last <= group_last when phase_r = ROWS else
+             '1' when index_r = last_index_r else
+             '0';
 
   offered <= group_valid and not group_end when phase_r = ROWS else
-             '1'                           when phase_r = LAST_ROW or phase_r = LAST_GROUP else
+             '1' when phase_r = LAST_ROW or phase_r = LAST_GROUP else
              '0';
 
   take        <= offered and advance and settled;

@@ -18,12 +18,12 @@ from typing import Any
 
 from fusesoc_firm.converter.configuration import subscriber_entity
 from fusesoc_firm.converter.message_ports import message_ports, message_side
-from fusesoc_firm.converter.ports import vhdl_type
 from fusesoc_firm.converter.program import has_bytes
 from fusesoc_firm.converter.variable_subscriber import (
     VARIABLE_SUBSCRIBER_TEMPLATE,
     variable_subscriber_configuration,
 )
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Path, Step
 from fusesoc_firm.text.render import render
 from tests.hdl.ghdl import Generic, Library, core_files
@@ -45,7 +45,7 @@ class SubscriberBench:
     def subscriber(self, frame: Frame, width: int) -> Subscriber:
         """The subscriber with its bench, analysed once."""
         if (frame, width) not in self.made:
-            library = Library(f"ros{int(frame.ros)}_{width}", self.directory)
+            library = Library(f"ros{frame.ros.number}_{width}", self.directory)
             made = Subscriber(library, frame, width)
             made.analyse()
             self.made[frame, width] = made

@@ -247,7 +247,7 @@ def test_elements_go_through(tmp_path: Path, message: str, width: int, other_wid
 # --- an application ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.one_in(2)
+@pytest.mark.check
 @pytest.mark.parametrize(
     ("width", "other_width", "own", "other"), [(8, 64, "100 MHz", "31 MHz"), (64, 16, "50 MHz", "333 MHz")]
 )

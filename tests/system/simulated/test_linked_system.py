@@ -37,7 +37,7 @@ def _built(folder: Path, interconnect: str, width: int) -> GeneratedSystem:
     return build(request, folder / "system")
 
 
-@pytest.mark.one_in(5)
+@pytest.mark.one_in(7)
 @pytest.mark.parametrize("interconnect", ["axi_stream", "uart", "spi"])
 @pytest.mark.parametrize("width", [8, 64])
 def test_a_system_answers_over_any_interconnect(tmp_path: Path, interconnect: str, width: int) -> None:

@@ -230,6 +230,7 @@ def test_images_go_through_hardware_and_software(tmp_path: Path, moved: tuple[st
     check(fed(pipeline(tmp_path, moved, width, ros), [("camera", message) for message in messages]))
 
 
+@pytest.mark.check
 def test_two_words_move_an_accelerator_of_the_application(tmp_path: Path) -> None:
     """The type and the source: nothing else differs but name and comments. The last publisher's frames are the same."""
     folder = SPECS / "image_pipeline"

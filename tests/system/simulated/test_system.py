@@ -352,6 +352,7 @@ def test_quat2euler_makes_no_latch(quat2euler: GeneratedSystem) -> None:
     assert quat2euler.work.latches(quat2euler.entity) == []
 
 
+@pytest.mark.check
 def test_the_netlist_of_quat2euler_does_the_same(quat2euler: GeneratedSystem) -> None:
     assert quat2euler.passes(SEED=8, STALL_PERCENT=40)
     quat2euler.replace_by_netlist()

@@ -99,7 +99,7 @@ architecture rtl of firm_image_header is
     constant LETTERS : string(1 to text'length) := text;
   begin
     if index >= LETTERS'length then
-      return X"00";
+      return x"00";
     end if;
     return std_logic_vector(to_unsigned(character'pos(LETTERS(index + 1)), 8));
   end function letter_of;
@@ -126,7 +126,7 @@ architecture rtl of firm_image_header is
     left      : unsigned(SIZE_BITS-1 downto 0);  -- the bits to come
     quotient  : unsigned(SIZE_BITS-1 downto 0);
     remainder : unsigned(SIZE_BITS downto 0);
-  end record;
+  end record scaled_t;
 
   procedure scale(signal value : inout scaled_t; constant numerator, denominator : in positive) is
     variable sum   : unsigned(SIZE_BITS+1 downto 0);
@@ -386,7 +386,7 @@ begin
   show_encoding : for lane in 0 to LANES-1 generate
     show_lane : process (beat_r)
     begin
-      out_encoding_axis_tdata(8*lane+7 downto 8*lane) <= X"00";
+      out_encoding_axis_tdata(8*lane+7 downto 8*lane) <= x"00";
       out_encoding_axis_tkeep(lane)                   <= '0';
       for beat in 0 to OUT_BEATS-1 loop
         if beat_r = beat and LANES*beat + lane < OUT_ENCODING'length then
