@@ -17,19 +17,10 @@ from tests.errors.test_spec_errors import SPECIFICATIONS, derive_file
 
 PACKAGE = Path(sys.modules["fusesoc_firm"].__path__[0])
 # What a specification is read and judged by.
-SOURCES = (
-    *sorted((PACKAGE / "system").rglob("*.py")),
-    *(
-        PACKAGE / name
-        for name in (
-            "text/yaml_text.py",
-            "text/yaml_sections.py",
-            "frame/select.py",
-            "converter/limits.py",
-            "message/library.py",
-        )
-    ),
-)
+BESIDE = """
+    text/yaml_text.py text/yaml_sections.py frame/select.py converter/limits.py message/library.py
+""".split()
+SOURCES = (*sorted((PACKAGE / "system").rglob("*.py")), *(PACKAGE / name for name in BESIDE))
 # What notes a fault, and functions whose faults are of something else than the specification's text.
 NOTING_METHODS, NOTING_FUNCTIONS = ("error", "_error", "take"), ("fail", "InputError")
 OTHER_FAULTS = {
