@@ -38,6 +38,7 @@ def _clocked(body: str, declarations: str = "") -> str:
 
 _WORDS = "type words is array (0 to 3) of std_logic_vector(7 downto 0);"
 _PLACE, _OTHER = "to_integer(unsigned(x(17 downto 16)))", "to_integer(unsigned(x(19 downto 18)))"
+_INTEGER = "to_integer(unsigned(x(46 downto 16)))"
 _RESULT = 'signal r : std_logic_vector(7 downto 0) := X"A5";'
 
 FAULTS = [
@@ -52,9 +53,30 @@ FAULTS = [
     _design("negative", 80, "signed(x(79 downto 0)) - (-3)"),
     _design("subtracted", 16, "100 - s"),
     _design("subtracted_within", 16, '5 - shift_left("-"(100, s) - (3 - (7 - s)), 1)'),
+    _design(
+        # Its value is all that a slice takes, so that GHDL's netlist has the slice's place for the subtraction.
+        "subtracted_for_a_function",
+        16,
+        "whole(5 - s)",
+        "function whole(p : signed(15 downto 0)) return signed is begin return p(15 downto 0); end;",
+    ),
+    _design("subtracted_by_full_name", 16, 'ieee.numeric_std."-"(5, s)'),
     _design("rotated", 16, "rotate_left(u, to_integer(unsigned(x(22 downto 16))))"),
     _design("rotated_right", 7, "rotate_right(u(6 downto 0), to_integer(unsigned(x(22 downto 16))))"),
     _design("narrowed", 5, "resize(s, 5)"),
+    _design("narrowed_to_a_bit", 1, "ieee.numeric_std.resize(s, 1)"),
+    _design(
+        "narrowed_in_a_variable",
+        5,
+        "r",
+        "signal r : signed(4 downto 0);",
+        "process (s) variable v : signed(4 downto 0); begin v := resize(s, 5); r <= v(4 downto 0); end process;",
+    ),
+    _design("product_with_a_number_that_is_cut", 48, f"unsigned'(unsigned(s(7 downto 0) * 1000) & u * {_INTEGER})"),
+    _design(
+        "divided_by_a_number_that_does_not_fit", 24, f"signed'(s / ({_INTEGER} mod 70000 + 1) & s(7 downto 0) mod 1000)"
+    ),
+    _design("divided_number_that_does_not_fit", 8, f'({_INTEGER} mod 1000) / (u(7 downto 0) or X"01")'),
     _design(
         "compared",
         8,
@@ -72,6 +94,27 @@ FAULTS = [
                     "-70000 > s",
                     "signed(x(63 downto 0)) < -1",
                     "signed(x(79 downto 16)) > -70000",
+                ]
+            )
+        ),
+    ),
+    _design(
+        "compared_with_an_integer",
+        8,
+        "c",
+        "signal c : std_logic_vector(7 downto 0);",
+        "\n  ".join(
+            f"c({bit}) <= '1' when {condition} else '0';"
+            for bit, condition in enumerate(
+                [
+                    f"s < {_INTEGER}",
+                    f"{_INTEGER} <= s",
+                    f"u(4 downto 0) = {_INTEGER}",
+                    f"u /= {_INTEGER}",
+                    "s(5 downto 0) >= to_integer(signed(x(40 downto 10)))",
+                    "s > to_integer(signed(x(41 downto 10)))",
+                    f"unsigned(x(79 downto 16)) > {_INTEGER}",
+                    f"signed(x(79 downto 16)) > {_INTEGER}",
                 ]
             )
         ),
