@@ -68,7 +68,7 @@ _QUOTIENT = """
     if {3}(r, l'length) then
       return l {0} to_{1}(r, l'length);
     end if;
-    return resize(resize(l, 32) {0} to_{1}(r, 32), l'length);
+    return {4};
   end function "{0}";
 
   function "{0}" (l : {2}; r : {1}) return {1} is
@@ -79,6 +79,7 @@ _QUOTIENT = """
     return resize(to_{1}(l, 32) {0} resize(r, 32), r'length);
   end function "{0}";
 """
+_WIDE = "resize(resize(l, 32) {0} to_{1}(r, 32), l'length)"
 _COMPARISON = """
   function "{0}" (l : {1}; r : {2}) return boolean is
   begin
@@ -96,13 +97,15 @@ _COMPARISON = """
     return ieee.numeric_std."{0}"(l, r);
   end function "{0}";
 """
+# A quotient by an integer that does not fit is zero in numeric_std; as a gate, since GHDL computes little of constants.
+_BY_LARGE = {"/": "l and to_{1}(0, l'length)", "mod": _WIDE, "rem": _WIDE}
 _OPERATORS = {_PRODUCT: ["*"], _QUOTIENT: ["/", "mod", "rem"], _COMPARISON: ["=", "/=", "<", "<=", ">", ">="]}
 _NUMBERS = {"signed": ("integer", "fits"), "unsigned": ("natural", "fits_unsigned")}
 _FUNCTIONS = (
     _RESIZE
     + _SUBTRACTION
     + "".join(
-        text.format(operator, vector, *number)
+        text.format(operator, vector, *number, _BY_LARGE.get(operator, "").format(operator, vector))
         for text, operators in _OPERATORS.items()
         for operator in operators
         for vector, number in _NUMBERS.items()

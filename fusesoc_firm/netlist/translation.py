@@ -150,10 +150,10 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     components = _components(modules, ghdl.translation.verilog)
     # The dump has all but these.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
-    lost_constants.check(modules, chain.from_iterable(ghdl.translation.libraries.values()))
+    doubt = ghdl.check_constants(lost_constants.widths(modules))
     correct(modules)
     return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(
-        filter(None, [_other_warnings(warnings), *doubts(modules)])
+        filter(None, [_other_warnings(warnings), doubt, *doubts(modules)])
     )
 
 
@@ -181,6 +181,45 @@ class _Ghdl:
             error = _errors(self.copies.original(printed + said))
             raise LostMemoryError(error) if _OF_MEMORIES in error else NetlistError(error)
         return self.copies.original(printed), self.copies.original(said)
+
+    def check_constants(self, widths: set[int]) -> str:
+        """A warning if GHDL cannot be asked for constants.
+
+        Raises `NetlistError` if it makes zero of one of these widths, in bits.
+        """
+        if not widths:
+            return ""
+        folder = self.folder / "probes"
+        folder.mkdir(exist_ok=True)
+        copies = lost_constants.Copies(chain.from_iterable(self.translation.libraries.values()), folder)
+        messages = doubt = ""
+        if copies.has_probes:
+            ghdl = replace(self, folder=folder)
+            package = folder / "probes.vhd"
+            package.write_text(lost_constants.PACKAGE, encoding="latin-1")
+            ghdl.run("-a", f"--work={lost_constants.LIBRARY}", str(package))
+            try:
+                messages = ghdl.probed(copies)
+            except NetlistError as error:
+                doubt = lost_constants.doubt(widths, str(error))
+        lost_constants.refuse(list(copies.lost(messages, widths)))
+        return doubt
+
+    def probed(self, copies: lost_constants.Copies) -> str:
+        """What GHDL says of copies, without the probes that it does not understand. Raises `NetlistError`."""
+        while True:
+            written = copies.write()
+            for library, files in self.translation.libraries.items():
+                for index in self.folder.glob(f"{library}-obj*.cf"):
+                    index.unlink()
+                if files:
+                    self.run("-i", f"--work={library}", *(written[file] for file in files))
+            try:
+                self.run("-m", f"--work={self.translation.library}", self.translation.unit)
+                return self.synthesise("none")[1]
+            except NetlistError as error:
+                if not copies.drop(str(error)):
+                    raise
 
     def synthesise(self, language: str) -> tuple[str, str]:
         """The netlist, and what GHDL says about it."""

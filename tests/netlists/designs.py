@@ -265,8 +265,7 @@ class Expressions:
         if self.chance(0.3):
             # The quotient of a number would have the divisor's width.
             dividend = self.operand(scope, kind, width, depth, is_resized=True)
-            # Left out: a signed bit by an integer, which numeric_std finds to be 0.
-            divisor = self._divisor(scope, kind, depth) if kind == "unsigned" or width > 1 else divisor
+            divisor = self._divisor(scope, kind, depth)
         elif self.chance(0.2):
             # Left out: other numbers that do not fit, at which numeric_std warns, or ends a simulation.
             is_any = kind == "unsigned" and operator == "/"

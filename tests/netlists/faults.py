@@ -76,7 +76,7 @@ FAULTS = [
     _design(
         "divided_by_a_number_that_does_not_fit", 24, f"signed'(s / ({_INTEGER} mod 70000 + 1) & s(7 downto 0) mod 1000)"
     ),
-    _design("divided_number_that_does_not_fit", 8, f'({_INTEGER} mod 1000) / (u(7 downto 0) or X"01")'),
+    _design("divided_number_that_does_not_fit", 8, f'({_INTEGER} mod 1000) / (u(7 downto 0) or X"04")'),
     _design(
         "compared",
         8,
@@ -205,6 +205,75 @@ LOST = [
         _clocked("if rst = '1' then r <= (63 downto 62 => '1', others => '0'); else r <= x(63 downto 0); end if;"),
     ),
 ]
+
+_TABLE = "type words is array (0 to 7) of std_logic_vector(7 downto 0);"
+_OF_TABLE = '(0 => X"01", 3 => X"80", others => X"00")'
+# Those whose values GHDL computes.
+COMPUTED = [
+    _design("shifted_constant", 64, "unsigned(x(63 downto 0)) xor shift_left(to_unsigned(1, 64), 40)"),
+    _design(
+        "named_and_computed",
+        64,
+        "unsigned(x(63 downto 0)) xor K",
+        "constant SHIFT : natural := 40; constant K : unsigned(63 downto 0) := shift_left(to_unsigned(1, 64), SHIFT);",
+    ),
+    _design("joined", 64, "r", "signal r : unsigned(63 downto 0);", 'r <= unsigned\'(X"00000001" & X"00000000");'),
+    _design(
+        "table",
+        8,
+        f"T({_PLACE})",
+        f"{_TABLE} constant T : words := {_OF_TABLE};",
+    ),
+    _design(
+        "reset_of_an_array",
+        8,
+        f"r({_PLACE})",
+        f"{_TABLE} signal r : words;",
+        _clocked(f"if rst = '1' then r <= {_OF_TABLE}; else r({_OTHER}) <= x(27 downto 20); end if;"),
+    ),
+    _design(
+        "reset_of_a_record",
+        64,
+        "r.high & r.low",
+        "type pair is record low, high : std_logic_vector(31 downto 0); end record; signal r : pair;",
+        _clocked(
+            'if rst = \'1\' then r <= (low => X"00000000", high => X"00000001"); else\n'
+            "r <= (low => x(31 downto 0), high => x(63 downto 32)); end if;"
+        ),
+    ),
+    _design(
+        "choice",
+        1,
+        "r",
+        "signal r : std_logic_vector(0 downto 0);",
+        'process (x) begin case x(63 downto 0) is when X"0000000100000000" => r <= "1";\n'
+        'when others => r <= "0"; end case; end process;',
+    ),
+    _design(
+        "without_low_levels",
+        64,
+        "r",
+        "signal r : std_logic_vector(63 downto 0);",
+        _clocked("if rst = '1' then r <= (40 => '1', others => '-'); else r <= x(63 downto 0); end if;"),
+    ),
+]
+
+# One that is lost as a whole, beside a zero of as many bits.
+SLICED = _design(
+    "sliced",
+    64,
+    "r",
+    'constant K : unsigned(63 downto 0) := X"8000000000000000"; signal r : unsigned(63 downto 0);',
+    _clocked(
+        "if rst = '1' then r <= (others => '0'); else\n"
+        "r <= unsigned'(unsigned(x(63 downto 32)) xor K(63 downto 32)) & K(31 downto 0); end if;"
+    ),
+)
+
+# An integer without bits.
+CRASH = _design(
+    "crash", 8, "to_unsigned(j, 8)", "signal j : integer range 0 to 0 := 0;", "j <= to_integer(u(7 downto 0)) mod 1;"
+)
 
 # A register whose reset value GHDL's netlist has wrong.
 MIXED = _design(

@@ -100,7 +100,18 @@ def _icarus(folder: Path, file: str) -> str:
 def verilator(folder: Path) -> str:
     """The netlist in Verilator: all of it is one file for a compiler that does not optimise, which is fastest."""
     made = folder / "verilator"
-    options = ["--cc", "--main", "--timing", "-Wno-fatal", "-Wno-lint", "-O3", "--x-assign", "0", "--Mdir", made]
+    options: list[str | Path] = [
+        "--cc",
+        "--main",
+        "--timing",
+        "-Wno-fatal",
+        "-Wno-lint",
+        "-O3",
+        "--x-assign",
+        "0",
+        "--Mdir",
+        made,
+    ]
     run(["verilator", *options, "--top-module", "bench", "bench.v", "netlist.v"], folder)
     sources = sorted(file.name for file in made.glob("*.cpp"))
     (made / "all.cpp").write_text("".join(f'#include "{name}"\n' for name in sources))

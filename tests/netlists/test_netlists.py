@@ -11,7 +11,7 @@ from fusesoc_firm.netlist.translation import Translation, translate
 from tests.netlists import comparison, simulators
 from tests.netlists.comparison import differences
 from tests.netlists.designs import Design
-from tests.netlists.faults import FAULTS, LOST, MIXED, WITHOUT_MEMORIES
+from tests.netlists.faults import COMPUTED, CRASH, FAULTS, LOST, MIXED, SLICED, WITHOUT_MEMORIES
 
 SEED = 20260214
 DESIGNS, BATCH = 200, 40
@@ -41,6 +41,17 @@ def test_a_register_that_ghdl_takes_for_a_memory_is_not_lost(
     assert not differences([WITHOUT_MEMORIES], ["icarus"])
 
 
+def test_a_crash_of_ghdl_is_a_sentence() -> None:
+    (found,) = differences([CRASH], ["icarus"])
+    assert found.kind == comparison.CRASH
+    assert found.message.startswith("error: GHDL crashed and does not say at which line of the VHDL: ADA.ASSERTIONS")
+    assert "an integer whose range has one number" in found.message
+
+
+def test_a_memory_at_which_ghdl_crashes_is_registers() -> None:
+    assert not differences(comparison.designs(SEED, 13, 1), ["icarus"])
+
+
 def test_a_subtraction_is_found_beside_a_package_that_other_files_need(tmp_path: Path) -> None:
     """GHDL refuses to analyse such a file alone; columns and lines are those of the file, behind tabs too."""
     file, other, output = tmp_path / "first.vhd", tmp_path / "other.vhd", tmp_path / "first.v"
@@ -60,11 +71,17 @@ def test_a_subtraction_is_found_beside_a_package_that_other_files_need(tmp_path:
     assert len(re.findall(r"= 8'h[53] - \w+;", output.read_text())) == 2
 
 
-def test_a_constant_that_ghdl_loses_is_refused() -> None:
-    found = {item.design.name: item.message for item in differences(LOST, ["icarus"])}
-    assert found.keys() == {item.name for item in LOST}
-    for message in found.values():
-        assert re.match(r"\S+\.vhd:\d+:\d+: error: GHDL makes zero of a constant of (64|96) bits", message)
+@pytest.mark.parametrize("designs", [LOST, COMPUTED], ids=["literal", "computed"])
+def test_a_constant_that_ghdl_loses_is_refused(designs: list[Design]) -> None:
+    """Each of them alone, with its place, as one that is found would hide others."""
+    for design in designs:
+        (found,) = differences([design], ["icarus"])
+        assert re.match(r"\S+\.vhd:\d+:\d+: error: GHDL makes zero of a constant of (64|96) bits", found.message)
+        assert found.kind == comparison.REFUSAL
+
+
+def test_a_constant_that_is_lost_only_as_a_whole_is_not_refused_for_its_slices() -> None:
+    assert not differences([SLICED], ["icarus"])
 
 
 def test_a_constant_beside_parts_of_its_signal_is_warned_of(tmp_path: Path) -> None:
