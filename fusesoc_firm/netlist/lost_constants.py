@@ -127,11 +127,16 @@ _PORT = re.compile(rf"{_NAMES}\s*(?:out|inout|buffer)\s+(\w+(?:\s*\((?:[^()]|\([
 _DYNAMIC = re.compile(rf"\b(?:signal|variable)\s+{_NAMES}", re.IGNORECASE)
 _INTERFACE = re.compile(r"\b(generic|port|function|procedure)\b[^()]*\(", re.IGNORECASE)
 _COMMA = r"\s*,\s*"
-_NO_SLICE = r"(?!\s*(?:'|\(\s*\d+(?:\s+(?:downto|to)\s+\d+)?\s*\)))"
+# What is behind a constant that is used as a whole, or of which an element is used.
+_NO_SLICE = r"(?P<index>)(?!\s*(?:'|\(\s*\d+(?:\s+(?:downto|to)\s+\d+)?\s*\)))"
+_OF_ELEMENT = r"\s*\((?P<index>[^();]*)\)"
 _SCALAR = re.compile(
     r"\s*(?:integer|natural|positive|boolean|std_u?logic|bit|time|real|string|character)\b", re.IGNORECASE
 )
-_ASSIGNMENT = re.compile(r"(?<=[;\s])(\w+)\s*(?:<=|:=)([^;]*);")
+_ASSIGNMENT = re.compile(
+    r"(?:;|=>|\b(?:begin|then|else|loop|generate)\b|\w\s*:)\s*(\w+)\s*(?:<=|:=)([^;]*)(?=;)",
+    re.IGNORECASE,
+)
 # What is between two values of a conditional assignment, or after the last one.
 _CONDITION = re.compile(r"\bwhen\b.*?\belse\b|\bwhen\b.*|\bafter\b.*", re.IGNORECASE | re.DOTALL)
 _CALL = re.compile(
@@ -147,12 +152,12 @@ _REPORT = re.compile(r"firm lost (\d+) (\d+)")
 
 @dataclass(frozen=True)
 class _Probe:
-    """Text to put in place of some of a file's; `what` is the constant's place in it, if the text looks at one."""
+    """Text to put in place of some of a file's; `constant` is where the expression is that it looks at, if it does."""
 
     start: int
     end: int
     text: str
-    what: int | None = None
+    constant: tuple[int, int] | None = None
 
 
 class Source:
@@ -236,8 +241,9 @@ class Source:
         }
         yield from filter(None, map(self._first_value, declarations))
         spans = [found.span() for found in declarations]
-        yield from self._assigned(declared, spans)
-        yield from self._calls(spans)
+        assigned = list(self._assigned(declared, spans))
+        yield from assigned
+        yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in assigned)]))
 
     def _first_value(self, found: re.Match[str]) -> _Probe | None:
         is_vector = found[3].strip().lower().startswith(_VECTORS)
@@ -250,22 +256,24 @@ class Source:
     ) -> Iterator[_Probe]:
         """Probes of what is assigned: beside the declaration of its target, or of ports where they are assigned."""
         for found in _ASSIGNMENT.finditer(self.code):
-            if _is_within(found.start(), spans):
+            if not self.unit(found.start(1)) or _is_within(found.start(1), spans):
                 continue
-            target = declared.get((self._index(found.start()), found[1].lower()))
+            target = declared.get((self._index(found.start(1)), found[1].lower()))
             for start, end in _values(found[2], found.start(2)):
                 if self._is_constant(start, end):
-                    probe = self._value(target, start, end) if target else self._seen(start, end)
-                    yield from [probe] if probe else []
+                    yield from filter(None, [self._value(target, start, end) if target else self._joined(start, end)])
+
+    def _joined(self, start: int, end: int) -> _Probe | None:
+        """A probe of vectors that are joined; a function is seen by itself."""
+        return self._seen(start, end) if "&" in self.code[start:end] else None
 
     def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
         """Probes of what functions make of constants within expressions."""
         last = 0
         for found in _CALL.finditer(self.code):
             start, end = found.start(), _closed(self.code, found.end())
-            is_declared = _is_within(start, spans)
-            is_range = _RANGE.search(self.code, found.end(), end)
-            if start >= last and not is_declared and not is_range and self._is_constant(found.end(), end):
+            is_apart = start >= last and not _is_within(start, spans)
+            if is_apart and not _RANGE.search(self.code, found.end(), end) and self._is_constant(found.end(), end):
                 last = end
                 yield from filter(None, [self._seen(start, end)])
 
@@ -273,7 +281,7 @@ class Source:
         value = self.text[start:end]
         if _OF_ZEROS.fullmatch(value) or self.unit(start) == "entity":
             return None
-        return _Probe(start, end, f"firm_seen({_escaped(value)}, {{0}})", start)
+        return _Probe(start, end, f"firm_seen({_escaped(value)}, {{0}})", (start, end))
 
     def _value(self, target: re.Match[str], start: int, end: int) -> _Probe | None:
         value, type_ = self.text[start:end], self.text[slice(*target.span(3))]
@@ -283,7 +291,7 @@ class Source:
             f"\nconstant firm_v{{0}} :{_escaped(type_)} :={_escaped(value)};"
             "\nconstant firm_n{0} : boolean := firm_is_lost(firm_bits(firm_v{0}), {0});\n"
         )
-        return _Probe(target.end(), target.end(), text, start)
+        return _Probe(target.end(), target.end(), text, (start, end))
 
     def _is_constant(self, start: int, end: int) -> bool:
         return self.dynamic.isdisjoint(word.lower() for word in _NAME.findall(self.code[start:end]))
@@ -345,7 +353,7 @@ class Copies:
     @property
     def has_probes(self) -> bool:
         """Whether there is a constant expression to look at."""
-        return any(probe.what is not None for probes in self.probes.values() for probe in probes)
+        return any(probe.constant for probes in self.probes.values() for probe in probes)
 
     def write(self) -> dict[str, str]:
         """The copies' names by those of the files."""
@@ -359,10 +367,10 @@ class Copies:
         for probe in sorted(self.probes[source.name], key=lambda probe: (probe.start, probe.end)):
             text += source.text[last : probe.start]
             line = text.count("\n") + 1
-            if probe.what is not None:
-                self._seen.append((source.name, probe.what))
-            text += probe.text.format(len(self._seen) - 1) if probe.what is not None else probe.text
-            for number in range(line, text.count("\n") + 2):
+            if probe.constant:
+                self._seen.append((source.name, probe.constant[0]))
+            text += probe.text.format(len(self._seen) - 1) if probe.constant else probe.text
+            for number in range(line, text.count("\n") + 2) if probe.text != _USE else ():
                 lines[number].add(probe)
             last = probe.end
         Path(copy).write_bytes((text + source.text[last:]).encode("latin-1"))
@@ -372,11 +380,14 @@ class Copies:
     def drop(self, messages: str) -> bool:
         """Drop the probes that GHDL does not understand; False if there are none."""
         dropped = False
-        for index, (name, probes) in enumerate(self.probes.items()):
-            copy = str(self.folder / f"{index}.vhd")
+        for number, (name, probes) in enumerate(self.probes.items()):
+            copy = str(self.folder / f"{number}.vhd")
             wrong: set[_Probe] = set()
-            for line in re.findall(rf"{re.escape(copy)}:(\d+):", messages):
-                wrong |= {probe for probe in self._lines[copy].get(int(line), set()) if probe.text != _USE}
+            lines = sorted(self._lines[copy])
+            for line in map(int, re.findall(rf"{re.escape(copy)}:(\d+):", messages)):
+                # GHDL may see an error of syntax in a line behind.
+                index = bisect_right(lines, line)
+                wrong |= self._lines[copy][lines[index - 1]] if index else set()
             dropped = dropped or bool(wrong)
             self.probes[name] = [probe for probe in probes if probe not in wrong]
         return dropped
@@ -384,19 +395,30 @@ class Copies:
     def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:
         """The places of constants that GHDL reports, and their widths, if these are among some."""
         reported = ((*self._seen[int(number)], int(width)) for number, width in _REPORT.findall(messages))
-        literals = ((name, *found) for name, source in self.sources.items() for found in source.literals())
+        literals = ((name, *found) for name in self.sources for found in self._literals(name))
         for name, position, width in chain(reported, literals):
-            if width in among and self._is_whole(self.sources[name], position):
+            declaration = self.sources[name].constant(position)
+            if width in among and (not declaration or self._is_used(declaration, _NO_SLICE)):
                 yield self.sources[name].place(position), width
 
-    def _is_whole(self, source: Source, position: int) -> bool:
-        """Whether a constant is used but for slices of it, of which GHDL loses nothing."""
-        declaration = source.constant(position)
-        if not declaration:
-            return True
-        uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{_NO_SLICE}", re.IGNORECASE)
-        in_all = sum(len(uses.findall(other.code)) for other in self.sources.values())
-        return in_all > len(uses.findall(declaration[0]))
+    def _literals(self, name: str) -> Iterator[tuple[int, int]]:
+        """Literals that GHDL loses, without those within what a probe looks at, unless it is taken apart."""
+        source = self.sources[name]
+        seen = sorted(probe.constant for probe in self.probes[name] if probe.constant)
+        for position, width in source.literals():
+            declaration = source.constant(position)
+            if not _is_within(position, seen) or (declaration and self._is_used(declaration, _OF_ELEMENT)):
+                yield position, width
+
+    def _is_used(self, declaration: re.Match[str], how: str) -> bool:
+        """Whether a constant is used in a way but in its own declaration."""
+        uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
+        found = (
+            not source.dynamic & set(_NAME.findall((use["index"] or "").lower()))
+            for source in self.sources.values()
+            for use in uses.finditer(source.code)
+        )
+        return sum(found) > len(uses.findall(declaration[0]))
 
 
 def refuse(lost: Sequence[tuple[str, int]]) -> None:

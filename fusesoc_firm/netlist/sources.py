@@ -147,6 +147,8 @@ def _padded(text: str) -> str:
 
 _CONTEXT = _padded(f"library ieee, {LIBRARY};")
 _ALIASES = _padded("".join(_aliases()))
+# A line with what was added, and one with a caret.
+_ADDED = re.compile(rf"^(.*{re.escape(_ALIASES)}.*)\n( *\^)$", re.MULTILINE)
 
 
 @dataclass
@@ -182,7 +184,8 @@ class Copies:
     def original(self, text: str) -> str:
         """A text of GHDL with the files' names, and their columns, in place of the copies'."""
         place = re.compile(rf"{re.escape(str(self.folder))}/(\d+)\.vhd(?::(\d+):(\d+))?")
-        return place.sub(self._place, text).replace(f"{self.folder}/", "")
+        text = _ADDED.sub(lambda line: _without_added(*line.groups()), place.sub(self._place, text))
+        return text.replace(f"{self.folder}/", "")
 
     def _place(self, found: re.Match[str]) -> str:
         file = self.files[int(found[1])]
@@ -194,6 +197,12 @@ class Copies:
         for start, length in reversed(before):
             column = max(start, column - length)
         return f"{file}:{line}:{column}"
+
+
+def _without_added(line: str, mark: str) -> str:
+    """A line that GHDL shows, and the one below, which points to a column."""
+    shorter = line.replace(_CONTEXT, "").replace(_ALIASES, "")
+    return f"{shorter}\n{mark[len(line) - len(shorter) :]}"
 
 
 def use_numbers(files: Iterable[str]) -> bool:

@@ -209,12 +209,12 @@ class _Ghdl:
         """What GHDL says of copies, without the probes that it does not understand. Raises `NetlistError`."""
         while True:
             written = copies.write()
-            for library, files in self.translation.libraries.items():
-                for index in self.folder.glob(f"{library}-obj*.cf"):
-                    index.unlink()
-                if files:
-                    self.run("-i", f"--work={library}", *(written[file] for file in files))
             try:
+                for library, files in self.translation.libraries.items():
+                    for index in self.folder.glob(f"{library}-obj*.cf"):
+                        index.unlink()
+                    if files:
+                        self.run("-i", f"--work={library}", *(written[file] for file in files))
                 self.run("-m", f"--work={self.translation.library}", self.translation.unit)
                 return self.synthesise("none")[1]
             except NetlistError as error:

@@ -258,17 +258,37 @@ COMPUTED = [
     ),
 ]
 
-# One that is lost as a whole, beside a zero of as many bits.
-SLICED = _design(
-    "sliced",
-    64,
-    "r",
-    'constant K : unsigned(63 downto 0) := X"8000000000000000"; signal r : unsigned(63 downto 0);',
-    _clocked(
-        "if rst = '1' then r <= (others => '0'); else\n"
-        "r <= unsigned'(unsigned(x(63 downto 32)) xor K(63 downto 32)) & K(31 downto 0); end if;"
-    ),
+_LONG_TABLE = (
+    "type longs is array (0 to 3) of std_logic_vector(63 downto 0);\n"
+    'constant T : longs := (0 => X"0000000000000001", 1 => X"8000000000000000", others => X"0000000000000001");\n'
+    "signal r : std_logic_vector(63 downto 0);"
 )
+# One of a table's constants.
+COMPUTED.append(
+    _design(
+        "element", 64, "r", _LONG_TABLE, _clocked("if rst = '1' then r <= (others => '0'); else r <= T(1); end if;")
+    )
+)
+# Those that would be lost as a whole or alone, beside a zero of as many bits.
+KEPT = [
+    _design(
+        "sliced",
+        64,
+        "r",
+        'constant K : unsigned(63 downto 0) := X"8000000000000000"; signal r : unsigned(63 downto 0);',
+        _clocked(
+            "if rst = '1' then r <= (others => '0'); else\n"
+            "r <= unsigned'(unsigned(x(63 downto 32)) xor K(63 downto 32)) & K(31 downto 0); end if;"
+        ),
+    ),
+    _design(
+        "indexed",
+        64,
+        "r",
+        _LONG_TABLE,
+        _clocked(f"if rst = '1' then r <= (others => '0'); else r <= T({_PLACE}); end if;"),
+    ),
+]
 
 # An integer without bits.
 CRASH = _design(

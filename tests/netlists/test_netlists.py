@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.netlist.model import NetlistError
 from fusesoc_firm.netlist.translation import Translation, translate
 from tests.netlists import comparison, simulators
 from tests.netlists.comparison import differences
 from tests.netlists.designs import Design
-from tests.netlists.faults import COMPUTED, CRASH, FAULTS, LOST, MIXED, SLICED, WITHOUT_MEMORIES
+from tests.netlists.faults import COMPUTED, CRASH, FAULTS, KEPT, LOST, MIXED, WITHOUT_MEMORIES
 
 SEED = 20260214
 DESIGNS, BATCH = 200, 40
@@ -52,23 +53,31 @@ def test_a_memory_at_which_ghdl_crashes_is_registers() -> None:
     assert not differences(comparison.designs(SEED, 13, 1), ["icarus"])
 
 
-def test_a_subtraction_is_found_beside_a_package_that_other_files_need(tmp_path: Path) -> None:
-    """GHDL refuses to analyse such a file alone; columns and lines are those of the file, behind tabs too."""
-    file, other, output = tmp_path / "first.vhd", tmp_path / "other.vhd", tmp_path / "first.v"
-    use = "library ieee; use ieee.numeric_std.all; use work.types.all;"
-    file.write_text(
-        "-- Some words on it.\nlibrary ieee; use ieee.numeric_std.all;\n"
-        "package types is subtype word is signed(7 downto 0); end;\n"
-        f"{use} use work.steps.all;\nentity first is port (x : in word; y : out word); end;\n"
-        "architecture rtl of first is begin y\t<= step(5 - (3 - x)); end;\n"
+def test_a_package_brings_signed_numbers_to_a_file_that_does_not_name_them(tmp_path: Path) -> None:
+    types, first, output = tmp_path / "types.vhd", tmp_path / "first.vhd", tmp_path / "first.v"
+    use = "library ieee; use ieee.numeric_std.all;"
+    types.write_text(f"{use}\npackage types is subtype word is signed(7 downto 0); end;\n")
+    first.write_text(
+        f"{use} use work.types.all;\nentity first is port (x : in word; y : out word); end;\n"
+        "architecture rtl of first is begin y <= 5 - (3 - x); end;\n"
     )
-    other.write_text(
-        f"{use}\npackage steps is function step(x : word) return word; end;\n"
-        "package body steps is function step(x : word) return word is begin return x + 1; end; end;\n"
-    )
-    sources = {"work": [str(file), str(other)]}
-    assert not translate(Translation("first", str(output), sources, {}), tmp_path / "ghdl")
+    assert not translate(Translation("first", str(output), {"work": [str(types), str(first)]}, {}), tmp_path / "ghdl")
     assert len(re.findall(r"= 8'h[53] - \w+;", output.read_text())) == 2
+
+
+def test_an_error_has_its_place_in_the_source(tmp_path: Path) -> None:
+    """Behind what a copy of the source has in addition, and behind tabs too."""
+    source = tmp_path / "first.vhd"
+    source.write_text(
+        "-- architecture rtl of other is\nlibrary ieee;\tuse ieee.numeric_std.all;\n"
+        "entity first is port (x : in signed(7 downto 0); y : out signed(7 downto 0)); end;\n"
+        "architecture rtl of first is begin\ty\t<= 5 - nothing; end;\n"
+    )
+    with pytest.raises(NetlistError) as error:
+        translate(Translation("first", str(tmp_path / "first.v"), {"work": [str(source)]}, {}), tmp_path / "ghdl")
+    place, line, mark = str(error.value).split("\n")
+    assert place == f'{source}:4:56: no declaration for "nothing"'
+    assert line[mark.index("^") :] == "nothing; end;"
 
 
 @pytest.mark.parametrize("designs", [LOST, COMPUTED], ids=["literal", "computed"])
@@ -80,8 +89,8 @@ def test_a_constant_that_ghdl_loses_is_refused(designs: list[Design]) -> None:
         assert found.kind == comparison.REFUSAL
 
 
-def test_a_constant_that_is_lost_only_as_a_whole_is_not_refused_for_its_slices() -> None:
-    assert not differences([SLICED], ["icarus"])
+def test_constants_that_ghdl_does_not_lose_are_not_refused() -> None:
+    assert not differences(KEPT, ["icarus"])
 
 
 def test_a_constant_beside_parts_of_its_signal_is_warned_of(tmp_path: Path) -> None:
