@@ -295,6 +295,18 @@ CRASH = _design(
     "crash", 8, "to_unsigned(j, 8)", "signal j : integer range 0 to 0 := 0;", "j <= to_integer(u(7 downto 0)) mod 1;"
 )
 
+
+def growing(more: int) -> Design:
+    """Assignments to bits of signals, so many that a table of GHDL grows in the midst of one or between two."""
+    signals = [f"a{number}" for number in range(10)]
+    declarations = "".join(f"signal {name} : std_logic_vector(127 downto 0);\n" for name in [*signals, "b", "c"])
+    first = "".join(f"b({bit}) <= x({bit});\n" for bit in range(more))
+    bits = "".join(f"{{0}}({bit}) <= not x({bit});\n" for bit in range(1, 127, 2))
+    each = "".join(f"process (x) begin {name} <= x;\n{bits.format(name)}end process;\n" for name in signals)
+    others = f"process (x) begin b <= x;\n{first}end process;\n"
+    return _design(f"growing{more}", 128, " xor ".join([*signals, "b"]), declarations, others + each)
+
+
 # A register whose reset value GHDL's netlist has wrong.
 MIXED = _design(
     "mixed",

@@ -12,7 +12,7 @@ from fusesoc_firm.netlist.translation import Translation, translate
 from tests.netlists import comparison, simulators
 from tests.netlists.comparison import differences
 from tests.netlists.designs import Design
-from tests.netlists.faults import COMPUTED, CRASH, FAULTS, KEPT, LOST, MIXED, WITHOUT_MEMORIES
+from tests.netlists.faults import COMPUTED, CRASH, FAULTS, KEPT, LOST, MIXED, WITHOUT_MEMORIES, growing
 
 SEED = 20260214
 DESIGNS, BATCH = 200, 40
@@ -47,6 +47,15 @@ def test_a_crash_of_ghdl_is_a_sentence() -> None:
     assert found.kind == comparison.CRASH
     assert found.message.startswith("error: GHDL crashed and does not say at which line of the VHDL: ADA.ASSERTIONS")
     assert "an integer whose range has one number" in found.message
+
+
+def test_a_table_that_ghdl_outgrows_is_an_error_and_no_wrong_netlist() -> None:
+    """Whether it is one depends on the number of assignments before."""
+    found = [item for more in (2, 3) for item in differences([growing(more)], ["icarus"])]
+    assert found
+    for item in found:
+        assert item.kind == comparison.CRASH
+        assert "GHDL 2.0 does so where a table of it grows" in item.message
 
 
 def test_a_memory_at_which_ghdl_crashes_is_registers() -> None:
