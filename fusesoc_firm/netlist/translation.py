@@ -49,8 +49,8 @@ _CRASHES = {
     "N = 1? It has no bits, which GHDL does not expect.",
     **dict.fromkeys(
         ("netlists.adb:774", "STORAGE_ERROR"),
-        "\nGHDL 2.0 does so where a table of it grows while some bits of a signal are assigned. That depends on how many "
-        "assignments there are before it: one more or less, or another order of processes, avoids it.",
+        "\nGHDL 2.0 does so where a table of it grows while some bits of a signal are assigned. That depends on how "
+        "many assignments there are before it: one more or less, or another order of processes, avoids it.",
     ),
 }
 _OF_MEMORIES = "netlists-memories.adb"
