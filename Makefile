@@ -31,8 +31,12 @@ CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
 # Parts of the bench, all if empty, such as BENCH='area cycles'; BENCH=--help lists them.
 BENCH ?=
+# Options and pages for make docs, such as DOCS=--update or DOCS=README.md; all pages if none is named.
+DOCS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
+# What tests run beside Python.
+TEST_TOOLS := ccache iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
 # With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core, which are GHDL's.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
@@ -54,7 +58,7 @@ FUZZ_OPTIONS ?=
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
-.PHONY: help sim test ros bitstream bench matrix proofs corpus fuzz-netlist lint setup tools clean distclean
+.PHONY: help sim test check docs ros bitstream bench matrix proofs policies corpus fuzz-netlist lint licences setup tools clean distclean
 
 help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
@@ -68,9 +72,18 @@ sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_ve
 	  $(BIN)/fusesoc run --target=$(TARGET) $(SYSTEM) $(RUN_FLAGS) 2>&1 | \
 	  sed -u "/^\(Entering\|Leaving\) directory '/d"
 
-test: TOOLS = iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
-test: setup ros ## Run all tests; PYTEST_OPTIONS='...'
+test check: TOOLS = $(TEST_TOOLS)
+test: setup ros ## Run the tests, every rule once, in ten minutes; PYTEST_OPTIONS='...'
 	@$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+
+check: setup ros lint ## Run what takes longer: live ROS, proofs, boards, more sizes and seeds; PYTEST_OPTIONS='...'
+	@$(BIN)/python -m pytest -m "check and not thorough" $(PYTEST_OPTIONS)
+
+docs: TOOLS = dot:graphviz
+docs: tools $(VENV)/.extra-docs ## Run the commands of the pages, build their site in build/docs; DOCS=--update writes their output into the pages
+	@$(BIN)/python -m tests.pages $(DOCS)
+	@$(BIN)/zensical build --clean --strict
+	@echo "The site: build/docs/index.html"
 
 # Both are there for some of the tests, which are skipped without them.
 ros: $(VENV)/.ros2
@@ -90,7 +103,7 @@ else
 endif
 
 bench: TOOLS = iverilog verilator
-bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures.md; BENCH='area cycles' for parts, BENCH=--help lists them
+bench: setup ros $(VENV)/.extra-bench ## Measure area, cycles, robustness and times, write docs/figures; BENCH='area cycles' for parts, BENCH=--help lists them
 	@$(BIN)/python -m tests.bench $(BENCH)
 
 # Further options go to the board's target: make bitstream FUSESOC_OPTIONS=--clean
@@ -105,16 +118,26 @@ matrix: TOOLS = verilator
 matrix: tools $(VENV)/.extra-matrix ## Try each supported Python with the oldest and newest packages; PYTHONS='PYTHON ...' names more
 	@$(BIN)/python -m tests.matrix $(PYTHONS)
 
-proofs: setup ## Prove the Manager and the schedulers, write docs/proofs.md
+proofs: setup ## Prove the Manager and the schedulers, write docs/figures/proofs.md
 	@$(BIN)/python -m tests.proofs
+
+policies: $(VENV)/.installed ## Write the lists of schedulers in cores/sched from fusesoc_firm/scheduling/policies.py
+	@$(BIN)/python -m tests.cores.policies
 
 fuzz-netlist: TOOLS = iverilog verilator
 fuzz-netlist: setup ## Compare the netlists of random designs with GHDL's simulation; SEED=N, DESIGNS=10000, FUZZ_OPTIONS='--judges icarus'
-	@$(BIN)/python -m tests.netlists --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
+	@$(BIN)/python -m tests.netlist --designs $(DESIGNS) $(if $(SEED),--seed $(SEED)) $(FUZZ_OPTIONS)
 
-lint: setup ## Check style and types
+lint: setup $(VENV)/.extra-lint ## Check style and types: Python, and VHDL, also a sample of what is generated
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/python .ci/lint_vhdl.py
+
+# All extras, since all are listed.
+licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
+licences: TOOLS = $(TEST_TOOLS)
+licences: tools ros ## List what the project depends on and under which licences, in docs/reference/licences.md
+	@$(BIN)/python .ci/licences.py $(VENV)/ros2/bin/python
 
 setup: tools $(VENV)/.extra-test ## Install what the other targets need: programs by apt, Python packages into .venv
 

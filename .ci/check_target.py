@@ -12,7 +12,7 @@ from collections.abc import Collection
 from typing import Any
 
 from fusesoc_firm.building.plan import make_plan
-from fusesoc_firm.diagnostics import InputError, fail
+from fusesoc_firm.text.diagnostics import InputError, fail
 
 
 def check(core: str, target: str, flows: Collection[str]) -> str:

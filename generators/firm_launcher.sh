@@ -19,4 +19,4 @@ fi
 
 python=$(python3 firm_python.py)
 [ -n "$python" ] || exec "$@"
-FIRM_NOTED=$noted exec "$python" -m fusesoc_firm.launcher "$@"
+FIRM_NOTED=$noted exec "$python" -m fusesoc_firm.tools.launcher "$@"

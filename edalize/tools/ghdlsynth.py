@@ -17,8 +17,8 @@ from edalize.tools.edatool import Edatool
 from edalize.utils import EdaCommands
 
 from fusesoc_firm.netlist.translation import Translation, translator
-from fusesoc_firm.quoting import make_argument, make_prerequisite
-from fusesoc_firm.tools import programs_of
+from fusesoc_firm.text.quoting import make_argument, make_prerequisite
+from fusesoc_firm.tools.programs import programs_of
 
 
 class Ghdlsynth(Edatool):  # type: ignore[misc]

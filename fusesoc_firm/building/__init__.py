@@ -1,1 +1,1 @@
-"""Many builds at once: FuseSoC for several cores and targets, each alone in its place in the build root."""
+"""The adapter to FuseSoC, and many builds at once."""

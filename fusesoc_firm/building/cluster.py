@@ -13,7 +13,7 @@ from secrets import token_hex
 
 from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.pool import SHOWN_LINES, Outcome
-from fusesoc_firm.workers import Workers
+from fusesoc_firm.tools.workers import Workers
 
 # What a worker must be told of the environment; where its programs are, it knows itself.
 _PREFIXES = ("FUSESOC", "EDALIZE", "ROS_", "AMENT_")

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.building.place_lock import PlaceLock
-from fusesoc_firm.diagnostics import Diagnostics, fail
-from fusesoc_firm.generation import GeneratorCall
+from fusesoc_firm.building.cores import calls_of, configuration, solved
+from fusesoc_firm.building.folder_lock import FolderLock
+from fusesoc_firm.request.request import GeneratorCall
+from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 
 @dataclass(frozen=True)
@@ -48,17 +48,17 @@ class Plan:
         """All that is to be generated, once each. Raises `InputError` if something that is depended on is missing."""
         found: dict[tuple[str, str, str], GeneratorCall] = {}
         for build in self.builds:
-            for core, flags in self._solved(build):
-                for call in _calls(core, flags):
+            for core, flags in self._cores(build):
+                for call in calls_of(core, flags):
                     found[call.vlnv, call.files_root, repr(call.parameters)] = call
         return list(found.values())
 
     def fetch(self) -> None:
         """Have FuseSoC download the cores that are kept elsewhere, which it cannot do several times at once."""
         for build in self.builds:
-            for core, _ in self._solved(build):
+            for core, _ in self._cores(build):
                 if core.provider and core.cache_status() != "downloaded":
-                    lock = PlaceLock(Path(f"{core.files_root}.lock"))
+                    lock = FolderLock(Path(f"{core.files_root}.lock"))
                     if owner := lock.acquire():
                         fail(f"{core.name} is being downloaded by {owner}", hint="start again when it is there")
                     try:
@@ -66,18 +66,8 @@ class Plan:
                     finally:
                         lock.release()
 
-    def _solved(self, build: Build) -> list[tuple[Any, Mapping[str, Any]]]:
-        """The cores of a build, each with the flags that hold in it."""
-        from fusesoc.coremanager import DependencyError
-        from fusesoc.vlnv import Vlnv
-
-        top = self.fusesoc.get_core(build.core)
-        flags = {**top.get_flags(build.target), "target": build.target}
-        try:
-            cores = self.fusesoc.cm.get_depends(Vlnv(build.core), {**flags, "is_toplevel": True})
-        except DependencyError as error:
-            fail(f"{build.core} depends on what FuseSoC does not know here: {error.value}")
-        return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
+    def _cores(self, build: Build) -> list[tuple[Any, Mapping[str, Any]]]:
+        return solved(self.fusesoc, self.fusesoc.get_core(build.core), build.target)
 
 
 def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | None = None) -> Plan:
@@ -85,10 +75,9 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
 
     Raises `InputError` with all cores and targets that there are not.
     """
-    from fusesoc.config import Config
     from fusesoc.fusesoc import Fusesoc
 
-    config = Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
+    config = configuration()
     # One folder for all that is built is no place for many builds.
     config.args_work_root = None
     config.args_build_root = str(Path(build_root or config.build_root).absolute())
@@ -137,10 +126,3 @@ def _flags(fusesoc: Any, name: str, target: str, faults: Diagnostics) -> dict[st
         faults.error(f"target '{target}' of {name} cannot be built", hint="it has neither 'flow' nor 'default_tool'")
         return None
     return flags
-
-
-def _calls(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
-    for call in core.get_ttptttg(dict(flags)):
-        name = core.name
-        vlnv = f"{name.vendor}:{name.library}:{name.name}-{call['name']}:{name.version}"
-        yield GeneratorCall(call["generator"], vlnv, str(Path(core.files_root).absolute()), call["config"])

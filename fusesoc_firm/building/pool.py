@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 
-from fusesoc_firm.building.place_lock import BEAT_SECONDS, PlaceLock
+from fusesoc_firm.building.folder_lock import BEAT_SECONDS, FolderLock
 from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.process import build_in_this_process, last_lines
 
@@ -36,7 +36,7 @@ class Outcome:
 @dataclass
 class _Running:
     build: Build
-    lock: PlaceLock
+    lock: FolderLock
     process: BaseProcess
     started: float
     beaten: float
@@ -52,7 +52,7 @@ class Pool:
 
     def run(self, plan: Plan) -> Iterator[Outcome]:
         """Each build's outcome, as they come. Whenever it is left, nothing that it started runs on."""
-        waiting = {build: PlaceLock(build.lock) for build in plan.builds}
+        waiting = {build: FolderLock(build.lock) for build in plan.builds}
         running: list[_Running] = []
         told: set[Build] = set()
         alive = os.pipe()
@@ -72,14 +72,14 @@ class Pool:
             for end in alive:
                 os.close(end)
 
-    def _take(self, build: Build, lock: PlaceLock, told: set[Build]) -> bool:
+    def _take(self, build: Build, lock: FolderLock, told: set[Build]) -> bool:
         owner = lock.acquire()
         if owner and build not in told:
             self.tell(f"{build}: waiting for {owner}, which works in {build.work_root}")
             told.add(build)
         return owner is None
 
-    def _start(self, plan: Plan, build: Build, lock: PlaceLock, alive: tuple[int, int]) -> _Running:
+    def _start(self, plan: Plan, build: Build, lock: FolderLock, alive: tuple[int, int]) -> _Running:
         process = multiprocessing.get_context("fork").Process(
             target=build_in_this_process, args=(plan.fusesoc, build, self.options, alive)
         )

@@ -1,4 +1,4 @@
-"""The door for people: the command `firm`. Each of its commands is a module; what it needs is imported when it runs."""
+"""The command `firm`: one module a command."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from fusesoc_firm.cli.simulator import add_simulator
 from fusesoc_firm.cli.system import add_system
 from fusesoc_firm.cli.tool import add_tool
 from fusesoc_firm.cli.why import add_why
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.host.node.options import remappings
-from fusesoc_firm.interrupts import accept_interrupts
-from fusesoc_firm.library_path import demos_root, docs_root, library_root
+from fusesoc_firm.node.options import remappings
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools.interrupts import accept_interrupts
+from fusesoc_firm.tools.library_path import demos_root, docs_root, library_root
 
 
 def main(argv: Sequence[str] | None = None) -> int:

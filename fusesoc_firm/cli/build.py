@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import argparse
-import os
-import shlex
 import sys
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import command, positive
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.text.diagnostics import fail
 
 if TYPE_CHECKING:
-    from fusesoc_firm.building.plan import Plan
     from fusesoc_firm.building.pool import Outcome
-
-_LAUNCHER = "EDALIZE_LAUNCHER"
 
 
 def add_build(commands: Any) -> None:
@@ -58,17 +53,23 @@ def _build(arguments: argparse.Namespace) -> None:
     from tqdm import tqdm
 
     from fusesoc_firm.building.plan import make_plan
+    from fusesoc_firm.plugin.build import How, build
 
     # Processes are copied here, which goes well as long as there are no threads; this one only watches the bar.
     tqdm.monitor_interval = 0
-    os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
     plan = make_plan(arguments.cores, arguments.targets, arguments.build_root)
-    if arguments.locked:
-        _check_locks(plan)
+    how = How(
+        arguments.clean,
+        arguments.setup,
+        arguments.build_only,
+        arguments.locked,
+        arguments.jobs or 0,
+        arguments.cluster or "",
+    )
     started = time.monotonic()
     outcomes = []
     bar = tqdm(total=len(plan.builds), unit="build", disable=None, file=sys.stderr)
-    with bar, closing(_outcomes(plan, arguments, bar)) as found:
+    with bar, closing(build(plan, how, partial(bar.write, file=sys.stderr), bar.set_postfix_str)) as found:
         for outcome in found:
             outcomes.append(outcome)
             failed = sum(not outcome.is_good for outcome in outcomes)
@@ -77,66 +78,9 @@ def _build(arguments: argparse.Namespace) -> None:
     _report(sorted(outcomes, key=lambda outcome: plan.builds.index(outcome.build)), time.monotonic() - started)
 
 
-def _outcomes(plan: Plan, arguments: argparse.Namespace, bar: Any) -> Generator[Outcome, None, None]:
-    from fusesoc_firm.building.cluster import build_on
-    from fusesoc_firm.building.pool import Pool
-    from fusesoc_firm.building.process import save_time
-    from fusesoc_firm.workers import cluster_workers
-
-    options = ["--setup"] * arguments.setup + ["--clean"] * arguments.clean
-    if arguments.cluster:
-        options += ["--build-only"] * arguments.build_only + ["--build-root", str(plan.build_root)]
-        with cluster_workers(arguments.cluster) as workers:
-            yield from build_on(workers, plan, options)
-        return
-    jobs = arguments.jobs or len(os.sched_getaffinity(0))
-    plan.fetch()
-    # What is locked is checked by each call.
-    if not arguments.locked and _generators_run_here():
-        _generate(plan, jobs, bar)
-        save_time(_answer)
-    options += ["--setup", "--build"] * arguments.build_only
-    yield from Pool(tuple(options), jobs, partial(bar.write, file=sys.stderr)).run(plan)
-
-
-def _generators_run_here() -> bool:
-    """Whether the Python that runs this is the one that generators are to run in."""
-    chosen = os.environ.get("FUSESOC_FIRM_PYTHON")
-    return not chosen or Path(chosen).absolute() == Path(sys.executable).absolute()
-
-
-def _generate(plan: Plan, jobs: int, bar: Any) -> None:
-    """Have everything generated that is not in the store yet."""
-    from fusesoc_firm.batch import prepare
-
-    calls = plan.generator_calls()
-    with closing(prepare(calls, jobs)) as steps:
-        for number, _ in enumerate(steps, start=1):
-            bar.set_postfix_str(f"generated {number} of {len(calls)}")
-
-
-def _answer(line: Sequence[str]) -> bool:
-    """Answer a call of one of our generators, of which this is the command line, from the store."""
-    from fusesoc_firm.gapi import GENERATORS, answer_from_store
-    from fusesoc_firm.library_path import library_root
-
-    *_, script, path = line
-    commands = {library_root() / "generators" / f"{name}_generator.py": name for name in GENERATORS}
-    name = next((name for known, name in commands.items() if known.resolve() == Path(script).resolve()), None)
-    return name is not None and answer_from_store(name, Path(path))
-
-
-def _check_locks(plan: Plan) -> None:
-    """Raise `InputError` with what differs from the lock file of a core."""
-    from fusesoc_firm.cli.project import check_locked
-
-    for core in dict.fromkeys(build.core for build in plan.builds):
-        check_locked(core)
-
-
 def _report(outcomes: Sequence[Outcome], seconds: float) -> None:
     """Print what came of the builds. Raises `InputError` if one failed."""
-    from fusesoc_firm.cli.project import shown
+    from fusesoc_firm.text.outputs import shown
 
     failed = [outcome for outcome in outcomes if not outcome.is_good]
     for outcome in failed:

@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 from fusesoc_firm.cli.common import command
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.text.diagnostics import fail
 
 _UNIT = 1024
 
@@ -43,7 +43,7 @@ def add_cache(commands: Any) -> None:
 
 
 def _size(text: str) -> int:
-    from fusesoc_firm.store import parse_size
+    from fusesoc_firm.store.store import parse_size
 
     if (size := parse_size(text)) is None:
         raise argparse.ArgumentTypeError(f"'{text}' is no size: bytes, or such as 500M or 2G")
@@ -51,8 +51,8 @@ def _size(text: str) -> int:
 
 
 def _show_cache(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.store import default_store
-    from fusesoc_firm.store_files import read_entry
+    from fusesoc_firm.store.layout import read_entry
+    from fusesoc_firm.store.store import default_store
 
     store = default_store()
     entries = store.entries()
@@ -69,7 +69,7 @@ def _show_cache(arguments: argparse.Namespace) -> None:
 
 
 def _clean_cache(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.store import default_store
+    from fusesoc_firm.store.store import default_store
 
     store = default_store()
     try:
@@ -80,7 +80,7 @@ def _clean_cache(arguments: argparse.Namespace) -> None:
 
 
 def _verify_cache(_: argparse.Namespace) -> None:
-    from fusesoc_firm.store import default_store
+    from fusesoc_firm.store.store import default_store
 
     store = default_store()
     try:

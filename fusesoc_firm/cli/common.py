@@ -10,12 +10,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 if TYPE_CHECKING:
-    from fusesoc_firm.diagnostics import SourceRef
     from fusesoc_firm.message.library import MessageLibrary
-    from fusesoc_firm.system.generator import LoadedSystem
+    from fusesoc_firm.system.system_core import LoadedSystem
+    from fusesoc_firm.text.diagnostics import SourceRef
 
 Handler = Callable[[argparse.Namespace], None]
 
@@ -76,9 +74,9 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
     """The messages that the arguments mean."""
     from fusesoc_firm.message.library import MessageLibrary
-    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.message.middleware import middleware_of
 
-    return MessageLibrary(RosVersion(ros), arguments.path, environment=os.environ, store=arguments.distro)
+    return MessageLibrary(middleware_of(ros), arguments.path, environment=os.environ, store=arguments.distro)
 
 
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
@@ -99,7 +97,7 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     """The folders of the messages of cores that FuseSoC knows here. Raises `InputError`."""
     # FuseSoC is imported for those alone.
-    from fusesoc_firm.cli.project import message_folders
+    from fusesoc_firm.plugin.project import message_folders
 
     return message_folders(names) if names else ()
 
@@ -114,8 +112,3 @@ def add_picture(parser: argparse.ArgumentParser) -> None:
         help="where to write it, also as F.png, F.pdf or F.dot (default: print it)",
     )
     parser.add_argument("--format", choices=("svg", "dot"), help="of what is printed (default: svg)")
-
-
-def as_yaml(data: dict[str, Any]) -> str:
-    """Data for people to read: in its own order."""
-    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)

@@ -8,12 +8,12 @@ from typing import Any
 
 from fusesoc_firm.cli.common import add_sources, command, load
 from fusesoc_firm.cli.simulator import add_simulator_options, built_simulator
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.text.diagnostics import fail
 
 
 def add_live(commands: Any) -> None:
     """Declare the commands."""
-    from fusesoc_firm.host.node.options import add_node_options
+    from fusesoc_firm.node.options import add_node_options
 
     live = command(
         commands,
@@ -46,10 +46,10 @@ def add_live(commands: Any) -> None:
 
 
 def _live(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.host.node.description import describe
-    from fusesoc_firm.host.node.run import run_node, run_options
-    from fusesoc_firm.host.node.transports import at_address, of_simulator
-    from fusesoc_firm.outputs import check_output
+    from fusesoc_firm.node.description import describe
+    from fusesoc_firm.node.run import run_node, run_options
+    from fusesoc_firm.node.transports import at_address, of_simulator
+    from fusesoc_firm.text.outputs import check_output
 
     loaded = load(arguments)
     description = describe(loaded)
@@ -65,8 +65,8 @@ def _live(arguments: argparse.Namespace) -> None:
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.host.node.steps import are_steps
-    from fusesoc_firm.host.node.trace_picture import draw_trace
+    from fusesoc_firm.node.steps import are_steps
+    from fusesoc_firm.node.trace_picture import draw_trace
 
     table: Path = arguments.table
     output: Path = arguments.output or table.with_suffix(".svg")
@@ -78,8 +78,8 @@ def _draw_trace(arguments: argparse.Namespace) -> None:
 
 def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
     """The table of ways beside one of steps, which is made."""
-    from fusesoc_firm.host.node.description import describe
-    from fusesoc_firm.host.node.steps import write_ways
+    from fusesoc_firm.node.description import describe
+    from fusesoc_firm.node.steps import write_ways
 
     if not arguments.system:
         fail(f"{steps} is of a node in C++, whose table has no names", hint="--system SPEC says what its ids mean")

@@ -5,15 +5,10 @@ from __future__ import annotations
 import argparse
 import fnmatch
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from fusesoc_firm.cli.common import add_definitions, as_yaml, command, library_of, positive
-
-if TYPE_CHECKING:
-    from fusesoc_firm.message.derived import Interface
-    from fusesoc_firm.message.model import MessageDefinition, MessageName
-
-STAGES = ("tree", "message", "frame", "config", "vhdl")
+from fusesoc_firm.cli.common import add_definitions, command, library_of, positive
+from fusesoc_firm.converter.stages import STAGES, stages_text
 
 
 def add_message(commands: Any) -> None:
@@ -72,18 +67,8 @@ def _list_messages(arguments: argparse.Namespace) -> None:
 
 
 def _show_message(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.message.parser import parse_full_name
-
     library = library_of(arguments, arguments.ros)
-    kind, name = parse_full_name(arguments.type)
-    interface = library.interface(name, kind)
-    names = interface.messages if interface else (name,)
-    definitions = library.joint_closure(names)
-    texts = [_stage(arguments.stage, each, definitions, arguments.width) for each in names]
-    if interface and arguments.stage == "message":
-        texts.insert(0, _title(interface, definitions))
-    separator = "\n---\n" if arguments.stage in ("frame", "config") else "\n\n"
-    print(separator.join(text.rstrip("\n") for text in texts))
+    print(stages_text(arguments.stage, library, arguments.type, arguments.width))
 
 
 def _verify_messages(arguments: argparse.Namespace) -> None:
@@ -100,47 +85,3 @@ def _verify_messages(arguments: argparse.Namespace) -> None:
         Settings(arguments.width, arguments.stimuli, arguments.seed, keeps_files=arguments.keep is not None),
         Places(arguments.jobs, arguments.cluster, arguments.report, arguments.keep, command),
     )
-
-
-def _title(interface: Interface, definitions: dict[MessageName, MessageDefinition]) -> str:
-    """What stands above the messages of a service or an action."""
-    from fusesoc_firm.message.signature import signature
-
-    title = f"# {interface} ({interface.ros.title})"
-    if not interface.has_signature:
-        return title
-    return f"{title}\n# signature: {signature(interface.name, definitions, interface.kind)}"
-
-
-def _stage(stage: str, name: MessageName, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
-    """The text of a message in one of `STAGES`."""
-    from fusesoc_firm.frame import tree
-    from fusesoc_firm.frame.description import description
-    from fusesoc_firm.frame.layout import frame_of
-    from fusesoc_firm.message.printer import to_text
-    from fusesoc_firm.message.signature import signature
-
-    if stage == "message":
-        return to_text(definitions[name], signature(name, definitions))
-    frame = frame_of(name, definitions)
-    if stage == "tree":
-        return tree.text(tree.rows(name, definitions, frame))
-    return as_yaml(description(frame)) if stage == "frame" else _converters(stage, frame, definitions, width)
-
-
-def _converters(stage: str, frame: Any, definitions: dict[MessageName, MessageDefinition], width: int) -> str:
-    """Configuration or VHDL of the message's package and of both converters."""
-    from fusesoc_firm.converter import constants
-    from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
-    from fusesoc_firm.render import render
-
-    package = constants.constants_package(frame.message)
-    configuration = constants.constants_configuration(frame.message, definitions, package)
-    made = (
-        ConverterSource(constants.CONSTANTS_TEMPLATE, configuration),
-        subscriber_source(frame, width),
-        publisher_source(frame, width),
-    )
-    if stage == "config":
-        return "---\n".join(as_yaml(source.configuration) for source in made)
-    return "\n".join(render(source.template, source.configuration) for source in made)

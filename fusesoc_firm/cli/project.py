@@ -3,20 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import suppress
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fusesoc_firm.cli.common import add_picture, command
-from fusesoc_firm.diagnostics import InputError, fail
-
-if TYPE_CHECKING:
-    from fusesoc_firm.gapi import MessageCores
-    from fusesoc_firm.generation import Request
-    from fusesoc_firm.lock import Lock
-    from fusesoc_firm.project import Instance, ProjectCore
-    from fusesoc_firm.reads import Input
 
 
 def add_project(commands: Any) -> None:
@@ -53,149 +42,27 @@ def add_project(commands: Any) -> None:
 
 
 def _draw_cores(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.pictures import check_picture, draw
-    from fusesoc_firm.project import core_graph
-
-    def sources(instance: Instance) -> list[str]:
-        request = _request(instance)
-        # Told from here, files of one name in two cores are two.
-        return [] if request is None else [*map(shown, _input_files(request))]
+    from fusesoc_firm.plugin.project import graph
+    from fusesoc_firm.tools.pictures import check_picture, draw
 
     check_picture(arguments.output, arguments.format)
-    draw(core_graph(arguments.core, arguments.target, sources), arguments.output, arguments.format)
+    draw(graph(arguments.core, arguments.target), arguments.output, arguments.format)
 
 
 def _list_affected(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.project import affected, changed_files, project_cores
+    from fusesoc_firm.plugin.project import affected_since
 
-    changed = dict.fromkeys(path.resolve() for path in changed_files(arguments.since, Path.cwd()))
-    found = affected(project_cores(), _touched(changed))
+    found = affected_since(arguments.since)
     width = max(map(len, found), default=0)
     for name, reason in found.items():
         print(f"{name:{width}}  {reason}")
 
 
-def check_locked(core: str) -> Path:
-    """Raise `InputError` with everything in which a core, by its name, differs from its lock file, which is returned.
-
-    Where that file is missing, there is nothing to hold the core to, which is a fault, too.
-    """
-    from fusesoc_firm.lock import check_lock, lock_path, read_lock
-    from fusesoc_firm.project import dependencies
-
-    found, depends = dependencies(core)
-    path = lock_path(found)
-    locked = read_lock(path)
-    check_lock(locked, _used(found, depends))
-    return path
-
-
 def _lock(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.lock import lock_path, lock_text
-    from fusesoc_firm.outputs import write
-    from fusesoc_firm.project import dependencies
+    from fusesoc_firm.plugin.project import check_locked, write_lock
+    from fusesoc_firm.text.outputs import shown
 
     if arguments.locked:
         print(f"{shown(check_locked(arguments.core))}: nothing differs")
-        return
-    core, depends = dependencies(arguments.core)
-    write(lock_path(core), lock_text(_used(core, depends)))
-    print(shown(lock_path(core)))
-
-
-def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
-    """What a core uses now."""
-    from fusesoc_firm.lock import lock_of
-
-    calls = {core.vlnv: [*_calls(core)]}
-    for item in depends:
-        # Of another one only part may be used here. Where that cannot be made, FuseSoC's run says so.
-        with suppress(InputError):
-            calls[item.vlnv] = [*_calls(item)]
-    return lock_of(core, depends, calls)
-
-
-def _calls(core: ProjectCore) -> Iterator[tuple[Request, Sequence[Input]]]:
-    from fusesoc_firm.gapi import GENERATORS, MESSAGES
-
-    for instance in core.instances:
-        if instance.generator != MESSAGES and (request := _request(instance)):
-            yield request, GENERATORS[request.command].inputs(request)
-
-
-def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
-    """What tells by which of the changed files a core itself is touched."""
-
-    def touched(core: ProjectCore) -> str | None:
-        found = _first(changed, core.files)
-        # What is behind a generated core takes longer to tell.
-        for instance in core.instances if changed and not found else ():
-            found = found or _first(changed, _files_behind(instance, changed))
-        return shown(found) if found else None
-
-    return touched
-
-
-def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
-    return next((path for path in changed if path in files), None)
-
-
-def _files_behind(instance: Instance, changed: Collection[Path]) -> set[Path]:
-    """All that a generated core is made of, our own files too."""
-    from fusesoc_firm.gapi import GENERATORS, used_before
-    from fusesoc_firm.own_code import PACKAGE, digests
-
-    try:
-        request = _request(instance)
-        if request is None:
-            return set()
-        files = set(_input_files(request))
-        used = used_before(request, GENERATORS[request.command])
-    except InputError:
-        # It cannot be made: whatever changed beside it, or in our own files, may be why.
-        roots = (instance.files_root.resolve(), PACKAGE)
-        return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
-    # What was not made before may use any.
-    return files | {PACKAGE / name for name in (digests() if used is None else used)}
-
-
-def _request(instance: Instance) -> Request | None:
-    """The request that FuseSoC would make; None for a generator that is not ours."""
-    from fusesoc_firm.gapi import GENERATORS, Call, make_request
-
-    if instance.generator not in GENERATORS:
-        return None
-    known = GENERATORS[instance.generator]
-    call = Call(instance.vlnv, instance.files_root, instance.parameters)
-    return make_request(instance.generator, call, known, message_folders)
-
-
-def message_folders(names: MessageCores) -> tuple[Path, ...]:
-    """The folders of cores that carry messages, where these lie: there is no run that copies them."""
-    from fusesoc_firm.gapi import MESSAGES
-    from fusesoc_firm.message_core import folders
-    from fusesoc_firm.project import project_cores
-
-    found: list[Path] = []
-    cores = {name: core for core in project_cores() for name in core.names}
-    for name, source in names.items():
-        core = cores.get(":".join(name.split(":")[:3]))
-        requests = [_request(item) for item in core.instances if item.generator == MESSAGES] if core else []
-        if not requests:
-            fail(f"'{name}' is no core with messages that FuseSoC knows here", source)
-        found += [folder for request in requests if request for folder in folders(request)]
-    return tuple(found)
-
-
-def _input_files(request: Request) -> list[Path]:
-    """The files that a request depends on, be it in part."""
-    from fusesoc_firm.gapi import GENERATORS
-
-    found = (item if isinstance(item, Path) else item.path for item in GENERATORS[request.command].inputs(request))
-    return [*dict.fromkeys(path.resolve() for path in found)]
-
-
-def shown(path: Path) -> str:
-    """A path as short as it can be told here."""
-    here = Path.cwd().resolve()
-    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
+    else:
+        print(shown(write_lock(arguments.core)))

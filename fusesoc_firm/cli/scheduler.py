@@ -73,10 +73,10 @@ def add_scheduler(commands: Any) -> None:
 
 
 def _bench_schedulers(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.scheduling.bench import Places, Selection, bench, names_of, numbers_of
-    from fusesoc_firm.scheduling.evaluation import Settings
-    from fusesoc_firm.scheduling.models import POLICIES
-    from fusesoc_firm.scheduling.workloads import DATA_SETS, REQUESTERS, Distribution
+    from fusesoc_firm.scheduling.evaluation.bench import Places, Selection, bench, names_of, numbers_of
+    from fusesoc_firm.scheduling.evaluation.jobs import Settings
+    from fusesoc_firm.scheduling.evaluation.workloads import DATA_SETS, REQUESTERS, Distribution
+    from fusesoc_firm.scheduling.policies import POLICIES
 
     def names(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
         return tuple(legal) if text == "all" else names_of(text, legal, what)
@@ -100,7 +100,7 @@ def _bench_schedulers(arguments: argparse.Namespace) -> None:
 def _choose_scheduler(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.scheduling.analysis import Criterion, choose
     from fusesoc_firm.scheduling.choice import show
-    from fusesoc_firm.system.timing import channel_of, tasks_of
+    from fusesoc_firm.system.derived.timing import channel_of, tasks_of
 
     system = load(arguments).system
     choice = choose(tasks_of(system), Criterion(arguments.criterion), channel_of(system))

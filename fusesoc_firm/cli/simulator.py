@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.cli.common import add_sources, command, core_folders
+from fusesoc_firm.tools.simulators import default_simulator, fitting
 
 
 def add_simulator(commands: Any) -> None:
@@ -15,7 +16,7 @@ def add_simulator(commands: Any) -> None:
     simulator = command(
         commands,
         "simulator",
-        "build the simulator of a system, and print the command that starts it (docs/transport.md)",
+        "build the simulator of a system, and print the command that starts it (docs/reference/transports.md)",
         'robot_node --transport "pipe:$(firm simulator robot.yaml)"',
         _build_simulator,
     )
@@ -25,7 +26,8 @@ def add_simulator(commands: Any) -> None:
 
 def add_simulator_options(parser: argparse.ArgumentParser) -> None:
     """The arguments of commands that simulate a system live; `built_simulator` reads them, with `spec`."""
-    parser.add_argument("--tool", choices=("ghdl", "verilator"), default="ghdl", help="default: %(default)s")
+    tools, default = [*fitting(is_live=True)], default_simulator(is_live=True)
+    parser.add_argument("--tool", choices=tools, default=default, help="default: %(default)s")
     parser.add_argument("--build-root", type=Path, metavar="DIR", help="where to build (default: in the user's cache)")
     parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="of all randomness (default: %(default)s)")
     parser.add_argument(
@@ -52,7 +54,7 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
 
 def built_simulator(arguments: argparse.Namespace) -> Any:
     """The `BuiltSimulator` that the arguments ask for."""
-    from fusesoc_firm.host.simulator import CoreSources, build_simulator
+    from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
 
     sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)
     return build_simulator(arguments.spec, arguments.tool, build_root=arguments.build_root, sources=sources)

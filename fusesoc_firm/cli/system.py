@@ -4,37 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from fusesoc_firm.cli.common import add_picture, add_sources, as_yaml, command, core_folders, load
-
-if TYPE_CHECKING:
-    from fusesoc_firm.message.model import RosVersion
-    from fusesoc_firm.system.generator import LoadedSystem
-
-
-def _cpp_package(loaded: LoadedSystem, ros: RosVersion | None, _: argparse.Namespace) -> Mapping[str, str]:
-    from fusesoc_firm.host.node_package import cpp_package
-
-    return cpp_package(loaded, ros)
-
-
-def _python_node(loaded: LoadedSystem, ros: RosVersion | None, arguments: argparse.Namespace) -> Mapping[str, str]:
-    from fusesoc_firm.host.node.source import python_node
-    from fusesoc_firm.system.beside import sources_of
-
-    # The node runs where FuseSoC may not be.
-    own = core_folders(loaded.specification.message_cores)
-    sources = sources_of(arguments.spec, [*own, *arguments.path], core_folders=core_folders)
-    return python_node(loaded, ros, arguments.spec, arguments.output, sources.paths)
-
-
-_Writer = Callable[["LoadedSystem", "RosVersion | None", argparse.Namespace], Mapping[str, str]]
-# What nodes are written in: the files of one, by path within its folder.
-_NODE_LANGUAGES: Mapping[str, _Writer] = {"cpp": _cpp_package, "python": _python_node}
+from fusesoc_firm.cli.common import add_picture, add_sources, command, core_folders, load
+from fusesoc_firm.node.languages import LANGUAGES, Place
 
 
 def add_system(commands: Any) -> None:
@@ -122,52 +97,43 @@ def _add_core_options(core: argparse.ArgumentParser) -> None:
 def _add_node_options(node: argparse.ArgumentParser) -> None:
     node.add_argument("-o", "--output", type=Path, metavar="DIR", help="the package's folder (default: <system>_node)")
     node.add_argument(
-        "--language", choices=sorted(_NODE_LANGUAGES), default="cpp", help="what it is written in (default: cpp)"
+        "--language", choices=sorted(LANGUAGES), default="cpp", help="what it is written in (default: cpp)"
     )
     node.add_argument("--ros", type=int, choices=(1, 2), help="fail unless the system speaks this version of ROS")
 
 
 def _check_system(arguments: argparse.Namespace) -> None:
+    from fusesoc_firm.system.views.show import counts
+
     system = load(arguments).system
-    counts = [
-        (len(system.subscribers), "subscriber"),
-        (len(system.accelerators), "accelerator"),
-        (len(system.publishers), "publisher"),
-    ]
-    if system.software.blocks:
-        counts.append((len(system.software.blocks), "accelerator"))
-    words = ", ".join(f"{count} {word}{'' if count == 1 else 's'}" for count, word in counts)
-    words += " in software" if system.software.blocks else ""
-    print(f"{arguments.spec}: {system.name} is right: {words}")
+    print(f"{arguments.spec}: {system.name} is right: {counts(system)}")
 
 
 def _show_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.show import derived_description
+    from fusesoc_firm.system.views.show import derived_description
+    from fusesoc_firm.text.yaml_text import yaml_dump
 
-    print(as_yaml(derived_description(load(arguments).system)), end="")
+    print(yaml_dump(derived_description(load(arguments).system)), end="")
 
 
 def _new_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.prompts import asker
-    from fusesoc_firm.system.wizard import extend_specification
+    from fusesoc_firm.system.beside import known_names, sources_of
+    from fusesoc_firm.system.scaffold.wizard import extend_specification
+    from fusesoc_firm.text.prompts import asker
+
+    def names(paths: Sequence[str]) -> list[str]:
+        sources = sources_of(arguments.spec, arguments.path, arguments.distro, core_folders)
+        return known_names(arguments.spec, paths, sources, core_folders)
 
     if arguments.spec.exists():
         _check_system(arguments)
-    extend_specification(arguments.spec, asker(), lambda paths: _message_names(arguments, paths))
+    extend_specification(arguments.spec, asker(), names)
     _check_system(arguments)
 
 
-def _message_names(arguments: argparse.Namespace, own: Sequence[str]) -> list[str]:
-    """The messages that a specification with `own` paths can name."""
-    from fusesoc_firm.system.beside import known_names, sources_of
-
-    sources = sources_of(arguments.spec, arguments.path, arguments.distro, core_folders)
-    return known_names(arguments.spec, own, sources, core_folders)
-
-
 def _write_skeletons(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.outputs import write
-    from fusesoc_firm.system.skeleton import missing_sources
+    from fusesoc_firm.system.scaffold.skeleton import missing_sources
+    from fusesoc_firm.text.outputs import write
 
     loaded = load(arguments, needs_sources=False)
     texts = missing_sources(loaded.system, loaded.folder)
@@ -179,63 +145,54 @@ def _write_skeletons(arguments: argparse.Namespace) -> None:
 
 
 def _write_core(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.outputs import check_output, write
-    from fusesoc_firm.system.core_file import CoreOptions, new_core, updated_core
+    from fusesoc_firm.system.scaffold.core_file import CoreOptions, core_text
+    from fusesoc_firm.text.outputs import check_output, write
 
-    spec: Path = arguments.spec
-    path: Path = arguments.output or spec.with_suffix(".core")
+    path: Path = arguments.output or arguments.spec.with_suffix(".core")
     check_output(path, (".core",))
-    loaded = load(arguments, needs_sources=False)
-    system = loaded.system
-    if path.exists():
-        text = updated_core(system, path)
-    else:
-        folder = path.absolute().parent
-        options = CoreOptions(
-            arguments.name,
-            arguments.description,
-            [*arguments.depend, *loaded.specification.message_cores],
-            arguments.stimuli,
-            arguments.model,
-            arguments.environment,
-            [os.path.relpath(item, folder) for item in arguments.path],
-            arguments.distro or "",
-        )
-        text = new_core(system, os.path.relpath(spec, folder), options)
-    write(path, text)
+    options = CoreOptions(
+        arguments.name,
+        arguments.description,
+        arguments.depend,
+        arguments.stimuli,
+        arguments.model,
+        arguments.environment,
+        arguments.path,
+        arguments.distro or "",
+    )
+    write(path, core_text(load(arguments, needs_sources=False), arguments.spec, path, options))
     print(path)
 
 
 def _write_node(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.message.model import RosVersion
-    from fusesoc_firm.outputs import write
+    from fusesoc_firm.message.middleware import middleware_of
+    from fusesoc_firm.text.outputs import write
 
     loaded = load(arguments, needs_sources=False)
-    ros = RosVersion(arguments.ros) if arguments.ros else None
     folder: Path = arguments.output or Path(f"{loaded.system.name}_node")
-    arguments.output = folder
-    files = _NODE_LANGUAGES[arguments.language](loaded, ros, arguments)
-    for path, text in files.items():
+    place = Place(folder, arguments.spec, arguments.path, core_folders)
+    ros = middleware_of(arguments.ros) if arguments.ros else None
+    for path, text in LANGUAGES[arguments.language](loaded, ros, place).items():
         write(folder / path, text)
     print(folder)
 
 
 def _draw_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.pictures import check_picture, draw
-    from fusesoc_firm.system.diagram import diagram
+    from fusesoc_firm.system.views.diagram import diagram
+    from fusesoc_firm.tools.pictures import check_picture, draw
 
     check_picture(arguments.output, arguments.format)
     draw(diagram(load(arguments).system), arguments.output, arguments.format)
 
 
 def _report_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.report import report
+    from fusesoc_firm.system.views.report import report
 
     print(report(arguments.spec, load(arguments)), end="")
 
 
 def _print_schema(_: argparse.Namespace) -> None:
-    from fusesoc_firm.system.specification import Specification
-    from fusesoc_firm.yaml_schema import json_schema
+    from fusesoc_firm.system.written.specification import Specification
+    from fusesoc_firm.text.yaml_schema import json_schema
 
     print(json.dumps(json_schema(Specification, "System specification of fusesoc_firm"), indent=2))

@@ -23,7 +23,7 @@ def add_tool(commands: Any) -> None:
 
 
 def _run_tool(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.launcher import launch
+    from fusesoc_firm.tools.launcher import launch
 
     if status := launch(arguments.program, arguments.arguments):
         sys.exit(status)

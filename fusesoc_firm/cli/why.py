@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fusesoc_firm.cli.common import command
-from fusesoc_firm.diagnostics import SourceRef, fail
+from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.outputs import shown
 
 if TYPE_CHECKING:
-    from fusesoc_firm.generation import Request
-    from fusesoc_firm.render import TracedLine
-    from fusesoc_firm.why import Names
+    from fusesoc_firm.text.render import TracedLine
 
 
 def add_why(commands: Any) -> None:
@@ -28,35 +27,25 @@ def add_why(commands: Any) -> None:
 
 
 def _tell_why(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.gapi import GENERATORS, read_request
-    from fusesoc_firm.why import call_file, reasons, rendering_of
+    from fusesoc_firm.plugin.why import why
 
     path, number = _split(arguments.place)
     if not path.is_file():
         fail(f"there is no file {path}", hint="after its name stands a line, or nothing: FILE:LINE")
-    call, name = call_file(path)
-    command_ = _generator(call)
-    request = read_request(command_, call, GENERATORS[command_], is_this_run=False)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        fail(f"{path} is no text that can be read: {error}")
-    generator = GENERATORS[command_]
-    rendering = rendering_of(lambda: generator.generate(request), name, text, generator.inputs(request))
-    found = reasons(rendering, _names(request))
+    found = why(path)
     if number is None:
         for count, reason in enumerate(found, start=1):
-            shown = [_shown(place) for place in (*reason.specification, *reason.messages)]
-            print(f"{count}: {', '.join([_template(reason.line), *shown])}")
+            places = [_place(place) for place in (*reason.specification, *reason.messages)]
+            print(f"{count}: {', '.join([_template(reason.line), *places])}")
         return
     if not 1 <= number <= len(found):
         fail(f"{path} has no line {number}, its last one is {len(found)}")
     reason = found[number - 1]
     print(reason.line.text)
     print(f"  template       {_template(reason.line)}")
-    for kind, places in (("specification", reason.specification), ("message", reason.messages)):
-        for place in places:
-            print(f"  {kind:13}  {_shown(place)}: {place.text.strip()}")
+    for kind, sources in (("specification", reason.specification), ("message", reason.messages)):
+        for place in sources:
+            print(f"  {kind:13}  {_place(place)}: {place.text.strip()}")
 
 
 def _split(text: str) -> tuple[Path, int | None]:
@@ -64,36 +53,10 @@ def _split(text: str) -> tuple[Path, int | None]:
     return (Path(file), int(number)) if file and number.isdecimal() else (Path(text), None)
 
 
-def _generator(call: Path) -> str:
-    """The generator that a call is for: FuseSoC does not write it down."""
-    from fusesoc_firm.gapi import MESSAGES
-    from fusesoc_firm.yaml_text import yaml_data
-
-    given = yaml_data(call.read_text(encoding="utf-8")).get("parameters") or {}
-    if "spec" in given:
-        return "far"
-    return "firm" if {"message", "config"} & given.keys() else MESSAGES
-
-
-def _names(request: Request) -> Names:
-    from fusesoc_firm.why import names_of
-
-    if request.command == "far":
-        from fusesoc_firm.system.generator import load_requested
-
-        loaded = load_requested(request)
-        return names_of(loaded.specification, loaded.messages())
-    from fusesoc_firm.converter.generator import order_of_request
-
-    return names_of(None, [(wanted.message, wanted.definitions) for wanted in order_of_request(request).messages])
-
-
 def _template(line: TracedLine) -> str:
     return f"{line.template}:{line.line}{f' for {line.scope}' if line.scope else ''}"
 
 
-def _shown(place: SourceRef) -> str:
-    here = Path.cwd()
+def _place(place: SourceRef) -> str:
     file = Path(place.file)
-    name = file.relative_to(here) if file.is_absolute() and file.is_relative_to(here) else place.file
-    return f"{name}:{place.line}"
+    return f"{shown(file) if file.is_absolute() else file}:{place.line}"

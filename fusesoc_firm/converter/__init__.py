@@ -1,1 +1,1 @@
-"""FIRM: from a Frame to the configuration of a converter's template."""
+"""FIRM: converters between messages and AXI-Stream, from a frame and a stream width."""

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.diagnostics import Diagnostics, fail
-from fusesoc_firm.message.model import MIDDLEWARES
-from fusesoc_firm.naming import PREFIX_RULE, identifier, is_prefix
-from fusesoc_firm.yaml_sections import Section, key, read
-from fusesoc_firm.yaml_text import Text, is_null, read_yaml
+from fusesoc_firm.message.middleware import MIDDLEWARES
+from fusesoc_firm.text.diagnostics import Diagnostics, fail
+from fusesoc_firm.text.naming import PREFIX_RULE, identifier, is_prefix
+from fusesoc_firm.text.yaml_sections import Section, key, read
+from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 from fusesoc_firm.converter.limits import check_fixed_size
-from fusesoc_firm.converter.ports import FieldPort, field_ports
+from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.converter.slices import slices_of, windows_of
-from fusesoc_firm.converter.storing import Counter, joints, store_configuration, store_names
+from fusesoc_firm.converter.storing import is_beat, store_configuration, store_names, stored_slices
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoreMap, Stream, stores_of
-from fusesoc_firm.diagnostics import fail
+from fusesoc_firm.converter.vhdl import bits_of_bool, hexadecimal
 from fusesoc_firm.frame.defaults import default_payload
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
-from fusesoc_firm.naming import entity_name, prefixed
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.naming import entity_name, prefixed
 
 Configuration = dict[str, Any]
 
@@ -29,7 +29,6 @@ PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
 # A position tells 2**3 states that are no beats; while a message waits, the next beat is the first one.
 _STATE_BITS = 3
-_COUNTER = Counter(start="is_first = '1'")
 # Bytes of a literal in a line.
 _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
@@ -54,22 +53,17 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Conf
     windows = windows_of(frame.fields)
     stores = stores_of(stream, windows)
     ends = [stream.payload_start + frame.payload_bytes + more - 1 for more in range(frame.trailing_bytes + 1)]
-    inputs = ["s_axis_tdata"] + ([] if stream.lanes == 1 else ["s_axis_tkeep"])
     return {
         **_common(frame, stream, entity or subscriber_entity(frame), "out"),
-        **store_configuration(stores, _COUNTER),
+        **store_configuration(stores),
         **_states(stream.beat(ends[-1])),
         "is_byte_wide": stream.lanes == 1,
-        "has_void_lane": stream.length_start > 0,
-        "assignments": _subscriber_assignments(frame, stream, stores),
+        "fields": _field_slices(frame, stream, stores),
         "has_trailing": frame.trailing_bytes > 0,
-        "match_high": frame.trailing_bytes,
+        "lengths": frame.trailing_bytes + 1,
         "length_beats": _length_beats(frame, stream),
-        "has_encoding": frame.checked_prefix > 0,
-        "prefix_checks": [_byte_check(stream, *item) for item in _prefix_bytes(frame, stream)],
+        "encoding": [_byte_check(stream, *item) for item in _prefix_bytes(frame, stream)],
         "ends": [_end(stream, byte, number if len(ends) > 1 else None) for number, byte in enumerate(ends)],
-        "compared": ", ".join(["position_r", "is_first", *inputs, *(["match_r"] if frame.trailing_bytes else [])]),
-        "checked": ", ".join(["position_r", "is_first", *inputs, "s_axis_tlast", "match"]),
     }
 
 
@@ -82,7 +76,7 @@ def _states(last_position: int) -> Configuration:
     ones = next(count for count in range(1, bits) if last_position < 2**bits - 2 ** (bits - count))
     high = "1" * ones + "0" * (bits - ones - _STATE_BITS)
     return {
-        "position_high": bits - 1,
+        "position_bits": bits,
         "beyond": "1" * ones,
         "beyond_low": bits - ones,
         "broken": f"{high}000",
@@ -100,16 +94,17 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Confi
     beats = stream.beat(frame.frame_bytes - 1) + 1
     last_lanes = stream.lane(frame.frame_bytes - 1) + 1
     start = _first_position(stream)
-    position_bits = max(1, (start + beats - 1).bit_length())
     return {
         **_common(frame, stream, entity or publisher_entity(frame), "in"),
         "first_position": start,
+        # What is in front of the frame.
+        "start_bits": start * width,
+        "start_zeros": hexadecimal(bytes(start)) if start else "",
         "last_position": start + beats - 1,
-        "frame_high": (start + beats) * width - 1,
-        "position_bits": position_bits,
-        "position_high": position_bits - 1,
-        "has_partial_beat": last_lanes < stream.lanes,
-        "last_keep": "0" * (stream.lanes - last_lanes) + "1" * last_lanes,
+        "all_bits": (start + beats) * width,
+        "position_bits": max(1, (start + beats - 1).bit_length()),
+        "last_keep": ("1" * last_lanes).zfill(stream.lanes),
+        "is_last_full": last_lanes == stream.lanes,
         "pieces": _publisher_pieces(frame, start * stream.lanes, beats * stream.lanes),
     }
 
@@ -137,35 +132,18 @@ def _check_size(frame: Frame) -> None:
 
 
 def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Configuration:
-    ports = field_ports(frame)
     return {
         "entity": entity,
         "message": str(frame.message),
         "middleware": frame.ros.title,
         "payload_bytes": frame.payload_bytes,
         "width": stream.width,
-        "data_high": stream.width - 1,
-        "keep_high": stream.lanes - 1,
-        "has_ports": bool(ports),
-        "ports": _port_declarations(ports, direction),
+        "lanes": stream.lanes,
+        "ports": [
+            {"name": port.name, "direction": direction, "type": port.vhdl_type, "comment": port.comment}
+            for port in field_ports(frame)
+        ],
     }
-
-
-def _port_declarations(ports: Sequence[FieldPort], direction: str) -> list[Configuration]:
-    """The fields as port declarations; names and types are padded so that columns align."""
-    # Where no name is long, the fields align with the fixed ports too, of which frame_error_code is the longest.
-    width = max([len("frame_error_code"), *(len(port.name) for port in ports)])
-    types = max([0, *(len(port.vhdl_type) for port in ports)])
-    return [
-        {
-            "name": port.name.ljust(width),
-            "direction": direction.ljust(3),
-            "type": port.vhdl_type,
-            "padding": " " * (types - len(port.vhdl_type)),
-            "comment": port.comment,
-        }
-        for port in ports
-    ]
 
 
 def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
@@ -179,9 +157,9 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
     return [
         {
             "position": beat,
-            "condition": f"{'if' if beat == beats[0] else 'elsif'} {_COUNTER.is_in(beat, beat)}",
+            "condition": is_beat(beat, beat),
             "candidates": [
-                {"number": more, **_length_candidate(frame.payload_bytes + more, beat, stream)}
+                {"number": more, "checks": _length_checks(frame.payload_bytes + more, beat, stream)}
                 for more in range(frame.trailing_bytes + 1)
             ],
         }
@@ -189,16 +167,13 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
     ]
 
 
-def _length_candidate(length: int, beat: int, stream: Stream) -> Configuration:
-    """The condition under which a beat rules a length out: any of its bytes is there and another one."""
-    data = length.to_bytes(LENGTH_BYTES, "little")
-    checks = [
+def _length_checks(length: int, beat: int, stream: Stream) -> list[Configuration]:
+    """The bytes of a length on a beat; any that is there and another one rules the length out."""
+    return [
         _byte_check(stream, stream.length_start + index, byte)
-        for index, byte in enumerate(data)
+        for index, byte in enumerate(length.to_bytes(LENGTH_BYTES, "little"))
         if stream.beat(stream.length_start + index) == beat
     ]
-    ends = joints(len(checks), " or", "")
-    return {"checks": [{**check, "joint": joint} for check, joint in zip(checks, ends, strict=True)]}
 
 
 def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
@@ -206,13 +181,13 @@ def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
 
 
 def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
-    """That a byte of the stream has a value; `keep` is its lane's bit of tkeep."""
+    """That a byte of the stream has a value; it is there if its lane is kept."""
     lane = stream.lane(byte)
     return {
-        "position": _COUNTER.is_in(stream.beat(byte), stream.beat(byte)),
-        "keep": lane,
-        "is_kept": stream.lanes > 1,
-        "bits": "" if stream.lanes == 1 else f"({stream.data(lane)})",
+        "beat": is_beat(stream.beat(byte), stream.beat(byte)),
+        "lane": lane,
+        "high": 8 * lane + 7,
+        "low": 8 * lane,
         "value": f"{value:02x}",
     }
 
@@ -220,67 +195,46 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
 def _end(stream: Stream, last_byte: int, number: int | None) -> Configuration:
     """Where a frame ends, of which bit `number` of `match` tells the length; None if there is but one length."""
     lane = stream.lane(last_byte)
-    match = "" if number is None else f"match({number}) = '1' and "
     return {
-        "condition": f"{match}{_COUNTER.is_in(stream.beat(last_byte), stream.beat(last_byte))}",
+        "number": number,
+        "beat": is_beat(stream.beat(last_byte), stream.beat(last_byte)),
         "lane": lane,
-        "is_kept": stream.lanes > 1,
-        "has_lane_behind": lane + 1 < stream.lanes,
-        "lane_behind": lane + 1,
+        "is_last_lane": lane + 1 == stream.lanes,
     }
 
 
-def _subscriber_assignments(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Configuration]:
-    """`port <= fields_r(...)` for every piece of a port that lies in one piece in a store."""
-    names = store_names(stores)
-    places = StoreMap(stream, stores)
-    pairs: list[tuple[str, str]] = []
-    for port in field_ports(frame):
-        for piece in slices_of(port):
-            low = piece.low
-            for stored in places.pieces(piece.offset, piece.bytes):
-                bits = f"fields{names[stored.store]}_r({stored.high} downto {stored.low})"
-                if piece.is_bit:
-                    # As roscpp and rospy read a bool: whatever is not zero is true.
-                    pairs.append((piece.target, f"'0' when {bits} = x\"00\" else '1'"))
-                else:
-                    part = replace(piece, low=low, width=8 * stored.count)
-                    pairs.append((part.target, bits))
-                low += 8 * stored.count
-    column = max([0, *(len(target) for target, _ in pairs)])
-    return [{"target": target.ljust(column), "value": value} for target, value in pairs]
+def _field_slices(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Configuration]:
+    """Every piece of a port that lies in one piece in a store."""
+    places, registers = StoreMap(stream, stores), [f"fields{suffix}_r" for suffix in store_names(stores)]
+    slices = (piece for port in field_ports(frame) for piece in slices_of(port))
+    return [stored for piece in slices for stored in stored_slices(piece, places, registers)]
 
 
 def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Configuration]:
-    """`frame(...) <= value` for every part: zeros up to byte `start`, where a frame of `size` bytes begins.
+    """The parts of a frame behind its id, and the value of each: bits are counted from `start` bytes before the frame.
 
-    This is header, constant bytes, fields, and zeros behind its end.
+    These are header, constant bytes, fields, and zeros up to `size` bytes.
     """
     header = ID_BYTES + LENGTH_BYTES
-    pieces = [
-        (0, ID_BYTES, f"std_logic_vector(to_unsigned(ID, {8 * ID_BYTES}))"),
-        (ID_BYTES, LENGTH_BYTES, _literal(frame.payload_bytes.to_bytes(LENGTH_BYTES, "little"))),
-        *((header + offset, len(data), _literal(data)) for offset, data in _constant_bytes(frame)),
-        *(
-            (header + piece.offset, piece.bytes, f'"0000000" & {piece.target}' if piece.is_bit else piece.target)
-            for port in field_ports(frame)
-            for piece in slices_of(port)
-        ),
+    constants = [
+        (ID_BYTES, frame.payload_bytes.to_bytes(LENGTH_BYTES, "little")),
+        *((header + offset, data) for offset, data in _constant_bytes(frame)),
     ]
+    pieces = [(offset, len(data), _literal(data)) for offset, data in constants]
+    for piece in (piece for port in field_ports(frame) for piece in slices_of(port)):
+        value = bits_of_bool(piece.target) if piece.is_bit else piece.target
+        pieces.append((header + piece.offset, piece.bytes, value))
     if size > frame.frame_bytes:
         pieces.append((frame.frame_bytes, size - frame.frame_bytes, _literal(bytes(size - frame.frame_bytes))))
-    if start:
-        pieces.insert(0, (-start, start, _literal(bytes(start))))
-    targets = [f"frame({8 * (start + first + count) - 1} downto {8 * (start + first)})" for first, count, _ in pieces]
-    column = max(map(len, targets))
     return [
-        {"target": target.ljust(column), "value": value} for target, (_, _, value) in zip(targets, pieces, strict=True)
+        {"high": 8 * (start + first + count) - 1, "low": 8 * (start + first), "value": value}
+        for first, count, value in pieces
     ]
 
 
 def _literal(data: bytes) -> str:
     """Bytes as a VHDL literal, the first one lowest; many zeros in short."""
-    return f'x"{data[::-1].hex()}"' if any(data) or len(data) <= _ROW else "(others => '0')"
+    return hexadecimal(data) if any(data) or len(data) <= _ROW else "(others => '0')"
 
 
 def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:

@@ -7,18 +7,18 @@ behind their message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.vhdl import vhdl_type, wrapped
 from fusesoc_firm.frame.model import COUNT_BYTES
-from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import Constant, MessageName, RosVersion, StringType, nested_message
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import Constant, MessageName, StringType, nested_message
 from fusesoc_firm.message.signature import Definitions, signature
-from fusesoc_firm.naming import distinct_constants, entity_name, prefixed
-from fusesoc_firm.wire import CHARACTER, WIDE_CHARACTER
+from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER
+from fusesoc_firm.text.naming import distinct_constants, entity_name, prefixed
 
 CONSTANTS_TEMPLATE = "vhdl/constants.vhd"
 SIGNATURE = "SIGNATURE"
@@ -50,9 +50,9 @@ class _Placed:
         return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
 
 
-def constants_package(name: MessageName, ros: RosVersion | None = None, prefix: str = "") -> str:
+def constants_package(name: MessageName, ros: Middleware | None = None, prefix: str = "") -> str:
     """`<prefix>_<pkg>_<type>_pkg`, or `..._ros<N>_pkg` where packages of both versions lie side by side."""
-    version = [] if ros is None else [f"ros{int(ros)}"]
+    version = [] if ros is None else [f"ros{ros.number}"]
     return prefixed(prefix, "_".join([entity_name(name.package, name.name), *version, "pkg"]))
 
 
@@ -72,9 +72,7 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
         "message": str(name),
         "middleware": ros.title,
         "signature": _declaration(SIGNATURE, f"string(1 to {len(sum_)})", _characters(sum_)),
-        "has_values": bool(numbers),
-        "values": _aligned([_value(item, own, ros) for item, own in zip(numbers, values, strict=True)]),
-        "has_texts": bool(texts),
+        **_numbers([_value(item, own, ros) for item, own in zip(numbers, values, strict=True)]),
         "texts": [
             {"comment": item.comment, "declarations": _text(item, own)}
             for item, *own in zip(texts, heads, lengths, contents, strict=True)
@@ -101,9 +99,9 @@ def _collect(name: MessageName, definitions: Definitions, found: list[MessageNam
             _collect(nested, definitions, found)
 
 
-def _value(item: _Placed, name: str, ros: RosVersion) -> dict[str, Any]:
+def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
     """A number or a bool, as the bits that it has at a port."""
-    wire = middleware_of(ros).rules.scalars[str(item.constant.type)]
+    wire = ros.rules.scalars[str(item.constant.type)]
     digits = struct.pack(f">{wire.code}", item.constant.value).hex()
     is_bit = wire.bits == 1
     return {
@@ -114,23 +112,11 @@ def _value(item: _Placed, name: str, ros: RosVersion) -> dict[str, Any]:
     }
 
 
-def _aligned(values: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The same in columns; where a line would get too long, all comments stand above their constants."""
-    columns = {key: max((len(value[key]) for value in values), default=0) for key in ("name", "type", "value")}
-    longest = max((len(value["comment"]) for value in values), default=0)
-    punctuation = len("  constant  :  := ; -- ")
-    is_above = sum(columns.values()) + longest + punctuation > _LONGEST_LINE
-    return [
-        {
-            "is_above": is_above,
-            "name": value["name"].ljust(columns["name"]),
-            "type": value["type"].ljust(columns["type"]),
-            "value": value["value"],
-            "padding": " " * (columns["value"] - len(value["value"])),
-            "comment": value["comment"],
-        }
-        for value in values
-    ]
+def _numbers(values: list[dict[str, Any]]) -> dict[str, Any]:
+    """The constants in columns; where a line would get too long, all comments stand above their constants."""
+    columns = {key: max((len(item[key]) for item in values), default=0) for key in ("name", "type", "value", "comment")}
+    aligned = [{**item, **{key: item[key].ljust(columns[key]) for key in ("name", "type")}} for item in values]
+    return {"values": aligned, "is_above": sum(columns.values()) + len("  constant  :  := ; -- ") > _LONGEST_LINE}
 
 
 def _text(item: _Placed, names: Sequence[str]) -> list[dict[str, Any]]:
@@ -141,7 +127,7 @@ def _text(item: _Placed, names: Sequence[str]) -> list[dict[str, Any]]:
     head, length, content = (name.ljust(max(map(len, names))) for name in names)
     declarations = [
         _declaration(head, f"string(1 to {len(characters)})", _characters(characters.decode("latin-1"))),
-        _declaration(length, vhdl_type(8 * COUNT_BYTES), [f'x"{count:0{2 * COUNT_BYTES}x}"']),
+        _declaration(length, vhdl_type(8 * COUNT_BYTES), _bytes(count.to_bytes(COUNT_BYTES, "little"))),
     ]
     if data:  # a vector without bits is more than some tools take
         declarations.append(_declaration(content, vhdl_type(8 * len(data)), _bytes(data)))
@@ -163,36 +149,31 @@ def _wire_bytes(item: _Placed) -> bytes:
 
 def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
     """A constant whose value is `pieces` joined with `&`, on its own line or on several."""
-    lines = [pieces[0]]
-    for piece in pieces[1:]:
-        if len(lines[-1]) + len(piece) < _LONGEST_EXPRESSION:
-            lines[-1] += f" & {piece}"
-        else:
-            lines.append(piece)
-    is_one_line = len(lines) == 1 and len(f"  constant {name} : {type_} := {lines[0]};") <= _LONGEST_LINE
-    joints = [" &"] * (len(lines) - 1) + [";"]
+    lines = wrapped(pieces, "&", _LONGEST_EXPRESSION)
+    length = len("  constant  :  := ;") + len(name) + len(type_) + len(lines[0])
     return {
         "name": name,
         "type": type_,
-        "is_one_line": is_one_line,
-        "value": lines[0],
-        "lines": [{"line": line, "joint": joint} for line, joint in zip(lines, joints, strict=True)],
+        "is_one_line": len(lines) == 1 and length <= _LONGEST_LINE,
+        "lines": lines,
     }
 
 
 def _characters(text: str) -> list[str]:
     """Pieces that make up a string of Latin-1: `"printable"` and, for any other character, `character'val(10)`."""
-    pieces = []
-    for is_printable, run in groupby(text, key=lambda character: character.isascii() and character.isprintable()):
-        characters = list(run)
-        if not is_printable:
-            pieces += [f"character'val({ord(character)})" for character in characters]
-            continue
-        for first in range(0, len(characters), _CHARACTERS_A_PIECE):
-            part = "".join(characters[first : first + _CHARACTERS_A_PIECE])
-            pieces.append(f'"{part.replace(_QUOTE, 2 * _QUOTE)}"')
+    runs = groupby(text, key=lambda character: character.isascii() and character.isprintable())
+    pieces = [piece for is_printable, run in runs for piece in (_quoted("".join(run)) if is_printable else _codes(run))]
     # Two characters make a string only with a string in front.
     return pieces if pieces and pieces[0].startswith(_QUOTE) else ['""', *pieces]
+
+
+def _quoted(text: str) -> Iterator[str]:
+    for first in range(0, len(text), _CHARACTERS_A_PIECE):
+        yield f'"{text[first : first + _CHARACTERS_A_PIECE].replace(_QUOTE, 2 * _QUOTE)}"'
+
+
+def _codes(characters: Iterable[str]) -> Iterator[str]:
+    return (f"character'val({ord(character)})" for character in characters)
 
 
 def _bytes(data: bytes) -> list[str]:

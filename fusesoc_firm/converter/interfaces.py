@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from fusesoc_firm.naming import distinct_identifiers
+from fusesoc_firm.text.naming import distinct_identifiers
 
 INTERFACE_TEMPLATE = "vhdl/interface.vhd"
 
@@ -27,11 +27,10 @@ def interface_configuration(name: str, converter: str, vhdl: str, message: str) 
         "converter": converter,
         "message": message,
         "label": label,
-        "has_generics": bool(generics),
-        "generics": generics.removesuffix("\n").split("\n"),
-        "ports": ports.removesuffix("\n").split("\n"),
-        "generic_names": _associations(_NAME.findall(generics)),
-        "port_names": _associations(port_names),
+        "generics": generics.splitlines(),
+        "ports": ports.splitlines(),
+        "generic_names": _NAME.findall(generics),
+        "port_names": port_names,
     }
 
 
@@ -40,13 +39,3 @@ def _declarations(vhdl: str, kind: str) -> str:
     entity = vhdl.partition("\nentity ")[2].partition("\nend entity;")[0] + "\n"
     found = re.search(_LIST.format(kind), entity, re.MULTILINE | re.DOTALL)
     return found[1] if found else ""
-
-
-def _associations(names: list[str]) -> list[dict[str, str]]:
-    """`formal => actual` of each name to itself."""
-    column = max(map(len, names), default=0)
-    commas = [","] * (len(names) - 1) + [""]
-    return [
-        {"formal": name.ljust(column), "actual": name, "comma": comma}
-        for name, comma in zip(names, commas, strict=bool(names))
-    ]

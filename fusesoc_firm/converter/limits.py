@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.frame.model import Data, Frame, Loop, Node
+from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 def check_fixed_size(frame: Frame) -> None:

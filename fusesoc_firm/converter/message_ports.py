@@ -16,12 +16,13 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from fusesoc_firm.converter.ports import FieldPort, field_ports, port_width, ros_path, vhdl_type
+from fusesoc_firm.converter.ports import FieldPort, field_ports, port_width, ros_path
 from fusesoc_firm.converter.program import Program, Scope, has_bytes, subscriber_program
 from fusesoc_firm.converter.reserved import reserved_names
 from fusesoc_firm.converter.steps import SET_NAMES
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Data, Fixed, Frame, FrameField, Loop, Node, Path
-from fusesoc_firm.naming import identifier
+from fusesoc_firm.text.naming import identifier
 
 LENGTH_BITS = 32
 
@@ -153,16 +154,14 @@ def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
 
 
 def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[dict[str, str]]:
-    """The message side as port declarations in columns, in `direction` but for those that are reverse."""
+    """The message side as port declarations, in `direction` but for those that are reverse."""
     opposite = {"in": "out", "out": "in"}[direction]
-    names = max([len("frame_error_code"), *(len(port.name) for port in ports)])
-    types = max(len(port.vhdl_type) for port in ports)
     return [
         {
-            "name": port.name.ljust(names),
-            "direction": (opposite if port.is_reverse else direction).ljust(3),
+            "name": port.name,
+            "direction": opposite if port.is_reverse else direction,
             "type": port.vhdl_type,
-            "comment": f"{' ' * (types - len(port.vhdl_type))} -- {port.comment}" if port.comment else "",
+            "comment": port.comment,
         }
         for port in ports
     ]

@@ -12,15 +12,16 @@ from pathlib import Path
 from fusesoc_firm.converter.config_file import MessageInterfaces, read_config
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import constants_package
-from fusesoc_firm.diagnostics import Diagnostics, InputError, fail
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Paths, select
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
+from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import Definitions, signature
-from fusesoc_firm.reads import Input
+from fusesoc_firm.store.reads import Input
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
 # The directions and the entity of a frame's converter in each.
 ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
@@ -43,7 +44,7 @@ class Wanted:
         return self.frame.message
 
     @property
-    def ros(self) -> RosVersion:
+    def ros(self) -> Middleware:
         """Whose message it is."""
         return self.frame.ros
 
@@ -52,6 +53,7 @@ class Wanted:
 class Order:
     """All that is wanted: each message once, streams of `width` bits, and the `files` that it was read from.
 
+    `libraries` are those that the messages were taken from.
     `prefix` stands before the names of all design units that are not named by the user.
     """
 
@@ -59,6 +61,7 @@ class Order:
     width: int
     messages: tuple[Wanted, ...]
     files: tuple[Input, ...]
+    libraries: Mapping[Middleware, MessageLibrary]
     prefix: str = ""
 
     def entity(self, frame: Frame, direction: str) -> str:
@@ -97,7 +100,7 @@ def order_of_message(
     elif interface.has_signature:
         facts.append(signature(name, library.joint_closure(interface.messages), interface.kind))
     title = f"{interface or name} ({', '.join(facts)})"
-    return Order(title, width, messages, tuple(library.files(definitions)))
+    return Order(title, width, messages, tuple(library.files(definitions)), {library.ros: library})
 
 
 def _check_no_selection(selection: Selection, text: str) -> None:
@@ -105,7 +108,7 @@ def _check_no_selection(selection: Selection, text: str) -> None:
         fail(f"'{text}' is several messages, of which no fields can be selected", source, "name one of them instead")
 
 
-def order_of_config(path: Path, libraries: Mapping[RosVersion, MessageLibrary]) -> Order:
+def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) -> Order:
     """The converters that a configuration file lists. Raises `InputError` with all faults of the file."""
     faults = Diagnostics()
     config = read_config(path, faults)
@@ -115,11 +118,12 @@ def order_of_config(path: Path, libraries: Mapping[RosVersion, MessageLibrary]) 
     faults.raise_if_any()
     messages = _joined(wanted for _, wanted in found)
     files = [file for wanted in messages for file in libraries[wanted.ros].files(wanted.definitions)]
-    return Order(str(config.project.name), config.project.width, messages, (path, *dict.fromkeys(files)), prefix)
+    project, inputs = config.project, (path, *dict.fromkeys(files))
+    return Order(str(project.name), project.width, messages, inputs, libraries, prefix)
 
 
 def _wanted(
-    entry: MessageInterfaces, libraries: Mapping[RosVersion, MessageLibrary], faults: Diagnostics
+    entry: MessageInterfaces, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Wanted | None:
     """The message of an item of the file; None if a fault was noted."""
     if not entry.type or not entry.name:
@@ -139,7 +143,7 @@ def _wanted(
 
 def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
     """Each message once, with all its interfaces."""
-    joined: dict[tuple[RosVersion, MessageName], Wanted] = {}
+    joined: dict[tuple[Middleware, MessageName], Wanted] = {}
     for wanted in messages:
         first = joined.get((wanted.ros, wanted.message))
         interfaces = dict(first.interfaces) if first else {}

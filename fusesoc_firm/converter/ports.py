@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Frame, FrameField, Path
-from fusesoc_firm.naming import distinct_identifiers, identifier
+from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
 # What the templates declare or use by name: a field of that name gets another port name.
 _TAKEN = """
@@ -40,11 +41,6 @@ class FieldPort:
     def comment(self) -> str:
         """The ROS name and type, so that a port can be traced back: `pose.position.x: float64`."""
         return f"{ros_path(self.field.path)}: {self.field.type.name}"
-
-
-def vhdl_type(width: int | None) -> str:
-    """`std_logic` for None, else a vector of `width` bits."""
-    return "std_logic" if width is None else f"std_logic_vector({width - 1} downto 0)"
 
 
 def field_ports(frame: Frame) -> tuple[FieldPort, ...]:

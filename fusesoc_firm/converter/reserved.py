@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from fusesoc_firm.render import template_text
+from fusesoc_firm.text.render import template_text
 
 # What a template uses by the names of others.
 _USED = frozenset(

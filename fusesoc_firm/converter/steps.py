@@ -18,7 +18,6 @@ from fusesoc_firm.converter.program import (
     comment,
     has_bytes,
 )
-from fusesoc_firm.converter.storing import joints
 from fusesoc_firm.frame.model import COUNT_BYTES, LENGTH_BYTES, Data, Loop
 
 Configuration = dict[str, Any]
@@ -121,26 +120,21 @@ def step_sets(steps: Sequence[Step]) -> list[Configuration]:
     for number, (name, about, is_in) in enumerate(_SETS):
         digits = "".join(str(int(is_in(step))) for step in steps)
         if "1" in digits or number < _ALWAYS_THERE:
-            found.append({"name": f"STEP_{name}", "about": about, "rows": _digit_rows(digits)})
+            rows = [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
+            found.append({"name": name, "about": about, "rows": rows})
     return found
 
 
-def _digit_rows(digits: str) -> list[Configuration]:
-    rows = [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
-    return [{"digits": row, "joint": joint} for row, joint in zip(rows, joints(len(rows), " &", ";"), strict=True)]
-
-
-def number_rows(numbers: Sequence[int]) -> list[Configuration]:
+def number_rows(numbers: Sequence[int]) -> list[str]:
     """The rows of a table of numbers by step."""
     rows = [numbers[start : start + _NUMBERS_IN_A_ROW] for start in range(0, len(numbers), _NUMBERS_IN_A_ROW)]
-    texts = [", ".join(map(str, row)) for row in rows]
-    return [{"numbers": text, "joint": joint} for text, joint in zip(texts, joints(len(texts), ",", ""), strict=True)]
+    return [", ".join(map(str, row)) for row in rows]
 
 
-def step_list(steps: Sequence[Step]) -> list[Configuration]:
+def step_list(steps: Sequence[Step]) -> list[str]:
     """The steps for the list in the head of an architecture."""
     column = len(str(len(steps) - 1))
-    return [{"step": f"{number:>{column}}  {_description(step)}"} for number, step in enumerate(steps)]
+    return [f"{number:>{column}}  {_description(step)}" for number, step in enumerate(steps)]
 
 
 def _description(step: Step) -> str:

@@ -1,19 +1,20 @@
 """The configuration of stores, for the partials `store_signals`, `store_enables`, `store_beats` and `store_resets`.
 
-A template that includes them counts the beats as the stores' are counted, in a signal of its own (`Counter.name`), and
-has `store_beats` where a beat is taken. A store is enabled by comparisons with the ends of its windows. Where these are
-many, a table holds the ends instead, and a pointer walks through it.
+A template that includes them counts the beats as the stores' are counted, in `position_r`, tells by `is_first` that
+beat 0 is there whatever the count is, and has `store_beats` where a beat is taken. A store is enabled by comparisons
+with the ends of its windows. Where these are many, a table holds the ends instead, and a pointer walks through it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 
-from fusesoc_firm.converter.ports import vhdl_type
-from fusesoc_firm.converter.stream import Store, ranges
+from fusesoc_firm.converter.slices import Slice
+from fusesoc_firm.converter.stream import Store, StoreMap, ranges
+from fusesoc_firm.converter.vhdl import bits, within
 
 Configuration = dict[str, Any]
 
@@ -24,24 +25,20 @@ _TABLE_BEATS = 1024
 _NUMBERS_IN_A_ROW = 12
 
 
-@dataclass(frozen=True)
-class Counter:
-    """The signal that counts beats, the condition of the last one, and of beat 0 if the signal may be another then."""
-
-    name: str = "position_r"
-    last: str = "s_axis_tlast = '1'"
-    start: str = ""
-
-    def is_in(self, first: int, last: int) -> str:
-        """The condition for the beats from `first` to `last`."""
-        if first == 0 and self.start:
-            return self.start if last == 0 else f"({self.start} or {self.name} <= {last})"
-        if first == last:
-            return f"{self.name} = {first}"
-        return f"({self.name} >= {first} and {self.name} <= {last})"
+def is_beat(first: int, last: int) -> str:
+    """The condition for the beats from `first` to `last`."""
+    if first > 0:
+        return within("position_r", first, last)
+    return "is_first = '1'" if last == 0 else f"(is_first = '1' or position_r <= {last})"
 
 
-def store_configuration(stores: Sequence[Store], counter: Counter) -> Configuration:
+def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
+    """The condition for a beat of a store, one of the `parts` whose windows a table has."""
+    used = f"used_{table} = '1'"
+    return used if len(parts) == 1 else f"{used} and {is_beat(store.beats[0], store.beats[-1])}"
+
+
+def store_configuration(stores: Sequence[Store]) -> Configuration:
     """What the partials need for `stores` as `stores_of` gives them."""
     tables: list[Configuration] = []
     enables: list[list[str]] = []
@@ -49,18 +46,20 @@ def store_configuration(stores: Sequence[Store], counter: Counter) -> Configurat
         parts = list(group)
         windows = ranges([beat for store in parts for beat in store.beats])
         if len(windows) > _MOST_COMPARED and windows[-1][1] >= _TABLE_BEATS:
-            name = f"_{len(tables)}"
-            tables.append(_table(name, windows, counter))
-            inside = [counter.is_in(store.beats[0], store.beats[-1]) for store in parts]
-            is_one = len(parts) == 1
-            enables += [[f"used{name} = '1'" if is_one else f"used{name} = '1' and {place}"] for place in inside]
+            enables += [[_is_used(len(tables), store, parts)] for store in parts]
+            tables.append({"number": len(tables), **_table(windows)})
         else:
-            enables += [[counter.is_in(*window) for window in ranges(store.beats)] for store in parts]
-    names = store_names(stores)
+            enables += [[is_beat(*window) for window in ranges(store.beats)] for store in parts]
     return {
-        "has_fields": bool(stores),
-        "store_signals": _signals(stores),
-        "stores": [_store(*item) for item in zip(stores, names, enables, strict=True)],
+        "stores": [
+            {
+                "suffix": suffix,
+                "bits": store.bits,
+                "windows": windows,
+                "data": store_data(f"fields{suffix}_r", store, "s_axis_tdata"),
+            }
+            for store, suffix, windows in zip(stores, store_names(stores), enables, strict=True)
+        ],
         "tables": tables,
     }
 
@@ -70,66 +69,42 @@ def store_names(stores: Sequence[Store]) -> list[str]:
     return [""] if len(stores) == 1 else [f"_{number}" for number in range(len(stores))]
 
 
-def joints(count: int, between: str, behind: str) -> list[str]:
-    """What follows each of `count` items: `between`, and `behind` the last one."""
-    return [between] * (count - 1) + [behind] if count else []
+def store_data(register: str, store: Store, source: str) -> list[str]:
+    """What a store's register takes with a beat, highest bits first: its lanes of `source`, and what it has."""
+    data = [bits(source, 8 * last + 7, 8 * first) for first, last in reversed(ranges(store.lanes))]
+    return data if len(store.beats) == 1 else [*data, bits(register, store.bits - 1, store.beat_bits)]
 
 
-def _store(store: Store, suffix: str, windows: Sequence[str]) -> Configuration:
-    register = f"fields{suffix}_r"
-    data = [f"s_axis_tdata({8 * last + 7} downto {8 * first})" for first, last in reversed(ranges(store.lanes))]
-    if len(store.beats) > 1:
-        data.append(f"{register}({store.bits - 1} downto {store.beat_bits})")
-    return {
-        "store": f"store{suffix}",
-        "register": register,
-        "data": [
-            {"piece": piece, "joint": joint} for piece, joint in zip(data, joints(len(data), " &", ";"), strict=True)
-        ],
-        "windows": [
-            {"window": window, "joint": joint}
-            for window, joint in zip(windows, joints(len(windows), " or", " else '0';"), strict=True)
-        ],
-    }
+def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> Iterator[Configuration]:
+    """The parts of a port's piece that lie in one piece in a store, for the partial `stored_field`."""
+    low = piece.low
+    for stored in places.pieces(piece.offset, piece.bytes):
+        part = piece if piece.is_bit else replace(piece, low=low, width=8 * stored.count)
+        yield {
+            "port": part.target,
+            # As roscpp and rospy read a bool: whatever is not zero is true.
+            "is_bool": piece.is_bit,
+            "register": registers[stored.store],
+            "high": stored.high,
+            "low": stored.low,
+        }
+        low += 8 * stored.count
 
 
-def _table(suffix: str, windows: Sequence[tuple[int, int]], counter: Counter) -> Configuration:
+def _table(windows: Sequence[tuple[int, int]]) -> Configuration:
     """The table of the beats behind which a window begins or ends, and the pointer to the next of them."""
     turns = [beat for first, last in windows for beat in (first - 1, last)]
     # A window that begins at once is open from the start.
     is_open = turns[0] < 0
     turns = turns[1:] if is_open else turns
-    pointer = f"turn{suffix}_r"
-    reached = f"{counter.name} = TURNS{suffix}(to_integer({pointer}))"
-    if turns[0] == 0 and counter.start:
-        reached = f"({counter.start} and {pointer} = 0) or {reached}"
-    bits = len(turns).bit_length()
+    # Behind the last turn the pointer stays on a beat that is past.
+    numbers = [*turns, turns[-1]]
+    rows = [numbers[start : start + _NUMBERS_IN_A_ROW] for start in range(0, len(numbers), _NUMBERS_IN_A_ROW)]
     return {
-        "type": f"turns{suffix}_t",
-        "table": f"TURNS{suffix}",
-        "pointer": pointer,
-        "pointer_high": bits - 1,
-        "used": f"used{suffix}",
-        "value": f"not {pointer}(0)" if is_open else f"{pointer}(0)",
-        "reached": reached,
-        "last": counter.last,
-        # Behind the last turn the pointer stays on a beat that is past.
-        "high": len(turns),
-        "highest": turns[-1],
-        "rows": list(_rows([*turns, turns[-1]])),
+        "is_open": is_open,
+        "is_early": turns[0] == 0,
+        "last_turn": len(turns),
+        "last_beat": turns[-1],
+        "turn_bits": len(turns).bit_length(),
+        "rows": [", ".join(map(str, row)) for row in rows],
     }
-
-
-def _rows(numbers: Sequence[int]) -> Iterator[Configuration]:
-    for start in range(0, len(numbers), _NUMBERS_IN_A_ROW):
-        row = ", ".join(map(str, numbers[start : start + _NUMBERS_IN_A_ROW]))
-        yield {"row": row, "comma": "," if start + _NUMBERS_IN_A_ROW < len(numbers) else ""}
-
-
-def _signals(stores: Sequence[Store]) -> list[Configuration]:
-    """The declaration of each store and of what makes it take a beat, in columns."""
-    declared = []
-    for store, suffix in zip(stores, store_names(stores), strict=True):
-        declared += [(f"store{suffix}", vhdl_type(None)), (f"fields{suffix}_r", vhdl_type(store.bits))]
-    column = max((len(name) for name, _ in declared), default=0)
-    return [{"name": name.ljust(column), "type": type_} for name, type_ in declared]

@@ -1,7 +1,7 @@
 """Where the bytes of a frame lie on a stream of some width, and which registers keep those of the fields.
 
 A subscriber's stream carries the frame behind its id. At 8 bits it starts with the length; at wider streams the
-id's byte is still there, in the lowest lane of the first beat, and void (docs/architecture.md).
+id's byte is still there, in the lowest lane of the first beat, and void (docs/explanation/design.md).
 """
 
 from __future__ import annotations
@@ -44,10 +44,6 @@ class Stream:
     def lane(self, byte: int) -> int:
         """The lane of a byte."""
         return byte % self.lanes
-
-    def data(self, lane: int, count: int = 1) -> str:
-        """The bits of `count` lanes."""
-        return f"{8 * (lane + count) - 1} downto {8 * lane}"
 
 
 @dataclass(frozen=True)

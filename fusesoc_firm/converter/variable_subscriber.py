@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -15,11 +15,10 @@ from fusesoc_firm.converter.message_ports import (
     message_side,
     port_declarations,
 )
-from fusesoc_firm.converter.ports import vhdl_type
+from fusesoc_firm.converter.ports import FieldPort
 from fusesoc_firm.converter.program import (
     Block,
     Close,
-    End,
     Guard,
     Header,
     Open,
@@ -27,10 +26,8 @@ from fusesoc_firm.converter.program import (
     Program,
     Segment,
     Step,
+    Stream,
     subscriber_program,
-)
-from fusesoc_firm.converter.program import (
-    Stream as StreamStep,
 )
 from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.steps import (
@@ -46,8 +43,10 @@ from fusesoc_firm.converter.steps import (
     step_sets,
     terminator_of,
 )
-from fusesoc_firm.converter.storing import joints
-from fusesoc_firm.converter.stream import Store, StoreMap, Stream, ranges, stores_of
+from fusesoc_firm.converter.storing import store_data, stored_slices
+from fusesoc_firm.converter.stream import Store, StoreMap, ranges, stores_of
+from fusesoc_firm.converter.stream import Stream as Lanes
+from fusesoc_firm.converter.vhdl import hexadecimal, within
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop, Path
 from fusesoc_firm.frame.values import dotted
 
@@ -56,9 +55,10 @@ Configuration = dict[str, Any]
 VARIABLE_SUBSCRIBER_TEMPLATE = "vhdl/variable_subscriber.vhd"
 
 _LARGEST_NATURAL = 2**31 - 1
+_LARGEST_ALIGNMENT = 8
 
 
-class _Window(Stream):
+class _Window(Lanes):
     """The bytes of a block as the window shows them: from the lowest lane up."""
 
     @property
@@ -91,87 +91,166 @@ class _Subscriber:
         return self.program.frame
 
     def configuration(self) -> Configuration:
-        end = len(self.steps) - 1
         return {
             "message": str(self.frame.message),
             "middleware": self.frame.ros.title,
             "width": self.window.width,
             "lanes": self.lanes,
-            "data_high": self.window.width - 1,
-            "keep_high": self.lanes - 1,
-            "count_high": self.lanes.bit_length() - 1,
+            "count_bits": self.lanes.bit_length(),
             "is_byte_wide": self.lanes == 1,
-            "is_narrow": self.lanes < 8,
+            "is_narrow": self.lanes < _LARGEST_ALIGNMENT,
+            # A count or the payload's length comes in one beat.
+            "is_count_whole": self.lanes >= COUNT_BYTES,
             "void_lanes": 0 if self.lanes == 1 else ID_BYTES,
             "ports": port_declarations(message_ports(self.frame, self.window.width), "out"),
-            "segment_high": self.side.segments - 1,
-            "steps": step_list(self.steps),
-            "step_count": len(self.steps),
-            "step_high": end.bit_length() - 1,
-            "end_step": end,
+            "segments": self.side.segments,
+            "end_step": len(self.steps) - 1,
+            "step_bits": (len(self.steps) - 1).bit_length(),
             "trailing_bytes": self.frame.trailing_bytes,
-            "has_encoding": self.frame.checked_prefix > 0,
-            "has_bad_count": bool(self._count_checks()) or any(map(closes_text, self.steps)),
-            "has_padding": self._has(Padding),
-            "has_streams": any(step.part.is_used for step in self.steps if isinstance(step, StreamStep)),
-            "has_data": self._has(StreamStep),
-            "has_opens": any(map(is_counted, self.steps)),
-            "has_text": any(map(is_text, self.steps)),
-            "has_hollow": any(map(is_hollow, self.steps)),
-            "step_sets": step_sets(self.steps),
+            "first_phase": -len(self.frame.prefix) % _LARGEST_ALIGNMENT,
             **self._tables(),
-            **self._lengths(),
-            **self._fields(),
-            **self._flow(),
-            **self._updates(),
+            **self._kinds(),
+            **self._checks(),
+            "parts": [found for part in self.side.parts for found in self._part(part)],
+            "elements": [self._element(ports) for ports in self._elements],
+            "fields": [field for _, block, named in self._stores for field in self._field_slices(block, named)],
+            "streams": self._streams(),
+            "stores": [
+                _store(place, block, *item, self.lanes) for place, block, named in self._stores for item in named
+            ],
+            "opened": [found for place, step in enumerate(self.steps) for found in self._opened(place, step)],
+            "completions": [
+                {"step": place, "bit": bit}
+                for place, step in enumerate(self.steps)
+                if isinstance(step, Header | Block | Open) and (bit := self._segment_bit(step.completes))
+            ],
+            "loops": [self._loop(place) for place, step in enumerate(self.steps) if isinstance(step, Close)],
+            "jumps": [jump for place in range(len(self.steps)) for jump in self._jumps(place)],
         }
 
-    def _has(self, kind: type[Step]) -> bool:
-        return any(isinstance(step, kind) for step in self.steps)
-
-    # --- tables -------------------------------------------------------------------------------------------------
+    # --- steps --------------------------------------------------------------------------------------------------
 
     def _tables(self) -> Configuration:
+        """The steps as lists and tables by their numbers."""
         sizes = [fixed_size(step) for step in self.steps]
         last_beats = [max(0, -(-size // self.lanes) - 1) for size in sizes]
         last_bytes = [size - self.lanes * beat for size, beat in zip(sizes, last_beats, strict=True)]
         return {
+            "steps": step_list(self.steps),
+            "step_sets": step_sets(self.steps),
             "largest_number": max(*last_beats, *last_bytes),
-            "beat_high": max(1, max(last_beats).bit_length()) - 1,
+            "beat_bits": max(1, max(last_beats).bit_length()),
             "last_beats": number_rows(last_beats),
             "last_bytes": number_rows(last_bytes),
         }
 
-    def _lengths(self) -> Configuration:
-        """What a count means: bytes of a stream, and how many elements there is room for."""
-        sizes = [size for size in (2, 4, 8) if any(element_size(step) == size for step in self.steps)]
-        shifts = {2: 1, 4: 2, 8: 3}
-        bytes_ = [
-            f"shift_left(count_value, {shifts[size]}) when STEP_HAS_{size}(step_number) = '1' else" for size in sizes
-        ]
-        masks = {2: "001", 4: "011"}
-        gaps = [(masks[to], f" when STEP_ALIGNS_TO_{to}(step_number) = '1' else") for to in (2, 4) if self._aligned(to)]
-        gaps.append(("111", ";"))
-        width = self.window.width
-        is_whole = width >= 8 * COUNT_BYTES
-        word = "window_bytes(31 downto 0)" if is_whole else "window_bytes"
+    def _kinds(self) -> Configuration:
+        """Which kinds of steps there are, and what of those is to be told apart."""
+        sizes = {element_size(step) for step in self.steps}
+        alignments = {alignment_of(step) for step in self.steps}
         return {
-            "overflow": "".join(
-                f" or (STEP_HAS_{size}(step_number) = '1' and left_r(31 downto {32 - shifts[size]}) /= 0)"
-                for size in sizes
-            ),
-            "sizes": _values([*bytes_, "count_value;"]),
-            "gaps": [{"mask": mask, "joint": joint} for mask, joint in gaps],
-            "header_word": f"unsigned({word})" if is_whole else f"(unsigned({word}) & left_r(31 downto {width}))",
-            "payload_length_word": word + ("" if is_whole else f" & payload_length_r(31 downto {width})"),
-            "count_word": f"unsigned({word})" + ("" if is_whole else f" & left_r(31 downto {width})"),
-            "first_phase": -len(self.frame.prefix) % 8,
+            "has_data": any(isinstance(step, Stream) for step in self.steps),
+            "has_opens": any(map(is_counted, self.steps)),
+            "has_text": any(map(is_text, self.steps)),
+            "has_hollow": any(map(is_hollow, self.steps)),
+            "element_sizes": [
+                {"size": size, "shift": shift, "low": 8 * COUNT_BYTES - shift}
+                for size, shift in ((2, 1), (4, 2), (8, 3))
+                if size in sizes
+            ],
+            "alignments": [
+                {"alignment": alignment, "mask": mask}
+                for alignment, mask in ((2, "001"), (4, "011"))
+                if alignment in alignments
+            ],
+            "paddings": [
+                {"step": place, "bits": step.alignment.bit_length() - 1, "behind": place + 1}
+                for place, step in enumerate(self.steps)
+                if isinstance(step, Padding)
+            ],
         }
 
-    def _aligned(self, alignment: int) -> bool:
-        return any(alignment_of(step) == alignment for step in self.steps)
+    def _checks(self) -> Configuration:
+        """What must be on the wire."""
+        prefix = self.frame.prefix[: self.frame.checked_prefix]
+        beats = [prefix[first : first + self.lanes] for first in range(0, len(prefix), self.lanes)]
+        has_zeros = any(map(closes_text, self.steps))
+        counts: list[Configuration] = [{"bound": None}] if any(map(is_text, self.steps)) else []
+        counts += [
+            {"bound": {"step": place, "most": most}}
+            for place, step in enumerate(self.steps)
+            if isinstance(step, Open)
+            and step.part.bound is not None
+            and (most := step.part.bound + terminator_of(step.part)) < _LARGEST_NATURAL
+        ]
+        return {
+            "encoding": [
+                {"beat": beat, "bits": 8 * len(data), "value": hexadecimal(data)} for beat, data in enumerate(beats)
+            ],
+            "closes_text": has_zeros,
+            "is_checked": bool(beats) or has_zeros,
+            "count_checks": counts,
+            "is_count_checked": bool(counts) or has_zeros,
+        }
 
-    # --- fields -------------------------------------------------------------------------------------------------
+    def _opened(self, place: int, step: Step) -> Iterator[Configuration]:
+        """The registers of a part that is opened: of its length, and of how many elements are left."""
+        if not isinstance(step, Open):
+            return
+        has_length, is_closed = step.part.is_used and is_counted(step), self._is_closed(step.part)
+        if has_length or is_closed:
+            yield {
+                "step": place,
+                "number": self._number(step.part),
+                "has_length": has_length,
+                "is_closed": is_closed,
+                "count": step.part.count if isinstance(step.part, Loop) else None,
+            }
+
+    def _loop(self, place: int) -> Configuration:
+        """An element ends with its last bytes; if a part at its end is empty, or an array, in a cycle of its own."""
+        step = self.steps[place]
+        assert isinstance(step, Close)
+        return {
+            "number": self._number(step.loop),
+            "about": dotted(step.loop.names),
+            "step": place,
+            "is_joined": isinstance(self.steps[place - 1], Block | Stream),
+            "is_used": step.loop.path in self._element_paths,
+        }
+
+    def _jumps(self, place: int) -> Iterator[Configuration]:
+        """Where a step leads elsewhere than to the next one: past a part that is empty, and at an element's end."""
+        match self.steps[place]:
+            case Guard():
+                yield _jump("is_guard", place, self.program.behind_guard(place))
+            case Open() as step if is_counted(step) and self.program.behind(place) != place + 1:
+                yield _jump("is_open", place, self.program.behind(place))
+            case Close(loop=loop):
+                yield _jump("is_last_element", place, place + 1, self._number(loop))
+                yield _jump("is_element", place, self.program.body(place), self._number(loop))
+
+    # --- ports --------------------------------------------------------------------------------------------------
+
+    def _part(self, part: FieldPort | StreamPorts | ElementPorts) -> Iterator[Configuration]:
+        """The lengths and elements at the message side, and the numbers of their registers."""
+        if isinstance(part, StreamPorts):
+            yield {"name": part.name, "number": self._number(part.part), "has_length": True, "element": None}
+        elif isinstance(part, ElementPorts):
+            yield {
+                "name": part.name,
+                "number": self._number(part.loop),
+                "has_length": part.loop.count is None,
+                "element": self._element(part) if self._is_closed(part.loop) else None,
+            }
+
+    def _element(self, ports: ElementPorts) -> Configuration:
+        return {"name": ports.name, "number": self._number(ports.loop), "segments": ports.segments}
+
+    def _streams(self) -> list[Configuration]:
+        """Every stream that somebody takes; the bytes of others are dropped."""
+        streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, Stream)]
+        return [{"name": self.side.stream(part).name, "step": place} for place, part in streams if part.is_used]
 
     @cached_property
     def _stores(self) -> list[tuple[int, Block, list[tuple[str, Store]]]]:
@@ -187,155 +266,14 @@ class _Subscriber:
                 found.append((place, step, named))
         return found
 
-    def _fields(self) -> Configuration:
-        pairs = [("payload_length", "payload_length_r")]
-        for part in self.side.parts:
-            pairs += self._length_pairs(part)
-        for _, block, named in self._stores:
-            pairs += self._field_pairs(block, named)
-        column = max(len(target) for target, _ in pairs)
-        streams = [(place, step) for place, step in enumerate(self.steps) if isinstance(step, StreamStep)]
-        return {
-            "assignments": [{"target": target.ljust(column), "value": value} for target, value in pairs],
-            "streams": [
-                {"name": self.side.stream(step.part).name, "step": place}
-                for place, step in streams
-                if step.part.is_used
-            ],
-            "stores": [
-                store for place, block, named in self._stores for store in self._store_updates(place, block, named)
-            ],
-        }
-
-    def _length_pairs(self, part: object) -> list[tuple[str, str]]:
-        match part:
-            case StreamPorts():
-                return [(part.length, f"std_logic_vector({self._length_register(part.part)})")]
-            case ElementPorts():
-                pairs = []
-                if part.loop.count is None:
-                    pairs.append((part.length, f"std_logic_vector({self._length_register(part.loop)})"))
-                if self._is_closed(part.loop):
-                    pairs.append((part.valid, self._register("valid", part.loop)))
-                    pairs.append((part.last, self._register("last", part.loop)))
-                if part.segments is not None:
-                    pairs.append((part.segment_valid, self._register("segment_valid", part.loop)))
-                return pairs
-        return []
-
-    def _field_pairs(self, block: Block, named: Sequence[tuple[str, Store]]) -> list[tuple[str, str]]:
+    def _field_slices(self, block: Block, named: Sequence[tuple[str, Store]]) -> Iterator[Configuration]:
+        """The bits of ports, and where they are in the stores."""
         places = StoreMap(self.window, [store for _, store in named])
-        pairs: list[tuple[str, str]] = []
+        names = [name for name, _ in named]
         for leaf in block.fields:
             port = replace(self.side.field(leaf), field=leaf)
             for piece in slices_of(port):
-                low = piece.low + leaf.first * leaf.type.bits
-                for stored in places.pieces(piece.offset, piece.bytes):
-                    bits = f"{named[stored.store][0]}({stored.high} downto {stored.low})"
-                    if leaf.type.bits == 1:
-                        # As roscpp and rospy read a bool: whatever is not zero is true.
-                        pairs.append((replace(piece, low=low).target, f"'0' when {bits} = x\"00\" else '1'"))
-                    else:
-                        pairs.append((replace(piece, low=low, width=8 * stored.count).target, bits))
-                    low += 8 * stored.count
-        return pairs
-
-    def _store_updates(self, place: int, block: Block, named: Sequence[tuple[str, Store]]) -> list[Configuration]:
-        return [
-            {
-                "step": place,
-                "register": name,
-                "windows": _window_condition(store, -(-block.size // self.lanes)),
-                "data": _store_data(name, store),
-            }
-            for name, store in named
-        ]
-
-    # --- flow ---------------------------------------------------------------------------------------------------
-
-    def _flow(self) -> Configuration:
-        jumps = self._jumps()
-        elements = [f"({self._register('valid', ports.loop)} and not {ports.ready})" for ports in self._elements]
-        closings = [place for place, step in enumerate(self.steps) if isinstance(step, Close)]
-        return {
-            "stopped": " or ".join(elements) or "'0'",
-            "sinks": _values(self._sinks()),
-            "has_checks": bool(self._checks()),
-            "checks": self._checks(),
-            "count_checks": self._count_checks(),
-            "large_word": "elsif" if self._count_checks() else "if",
-            "closes": [self._close(place) for place in closings],
-            "closing_sensitivity": "".join(
-                f", closing_{self._number(loop)}, {self._register('left', loop)}" for loop in self._closed_loops
-            ),
-            "has_jumps": bool(jumps),
-            "jumps": [
-                {"word": "if" if not number else "elsif", "condition": condition, "target": target}
-                for number, (condition, target) in enumerate(jumps)
-            ],
-            "paddings": [
-                {"step": place, "high": step.alignment.bit_length() - 2, "behind": place + 1}
-                for place, step in enumerate(self.steps)
-                if isinstance(step, Padding)
-            ],
-        }
-
-    def _sinks(self) -> list[str]:
-        """Whether the sink of the step's stream takes a beat; what nobody reads is always taken."""
-        streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, StreamStep)]
-        used = [(place, part) for place, part in streams if part.is_used]
-        found = [f"{self.side.stream(part).axis('tready')} when step_number = {place} else" for place, part in used]
-        return [*found, "'1';"]
-
-    def _checks(self) -> list[Configuration]:
-        found = []
-        if self.frame.checked_prefix:
-            value = self.frame.prefix[: self.frame.checked_prefix]
-            for beat in range(-(-len(value) // self.lanes)):
-                data = value[beat * self.lanes : (beat + 1) * self.lanes]
-                bits = "window_bytes" if self.lanes == 1 else f"window_bytes({8 * len(data) - 1} downto 0)"
-                condition = f'step_number = 1 and beat_r = {beat} and {bits} /= x"{data[::-1].hex()}"'
-                found.append({"condition": condition, "code": "BAD_ENCODING"})
-        if any(map(closes_text, self.steps)):
-            condition = "STEP_CLOSES_TEXT(step_number) = '1' and beat_r = 0 and window_bytes(7 downto 0) /= x\"00\""
-            found.append({"condition": condition, "code": "BAD_COUNT"})
-        return found
-
-    def _count_checks(self) -> list[Configuration]:
-        found = ["STEP_IS_TEXT(step_number) = '1' and left_r = 0"] if any(map(is_text, self.steps)) else []
-        for place, step in enumerate(self.steps):
-            if isinstance(step, Open) and step.part.bound is not None:
-                most = step.part.bound + terminator_of(step.part)
-                if most < _LARGEST_NATURAL:
-                    found.append(f"step_number = {place} and left_r > {most}")
-        return [{"word": "elsif" if number else "if", "condition": condition} for number, condition in enumerate(found)]
-
-    def _close(self, place: int) -> Configuration:
-        """An element ends with its last bytes; if a part at its end is empty, or an array, in a cycle of its own."""
-        step = self.steps[place]
-        assert isinstance(step, Close)
-        is_joined = isinstance(self.steps[place - 1], Block | StreamStep)
-        return {
-            "number": self._number(step.loop),
-            "about": dotted(step.loop.names),
-            "condition": f"step_number = {place}" + (f" or step_number = {place - 1}" if is_joined else ""),
-        }
-
-    def _jumps(self) -> list[tuple[str, int]]:
-        jumps: list[tuple[str, int]] = []
-        for place, step in enumerate(self.steps):
-            match step:
-                case Guard():
-                    jumps.append((f"step_number = {place} and left_r = 0", self.program.behind_guard(place)))
-                case Open() if is_counted(step) and self.program.behind(place) != place + 1:
-                    jumps.append((f"step_number = {place} and count_is_zero = '1'", self.program.behind(place)))
-                case Close(loop=loop):
-                    closing = f"closing_{self._number(loop)} = '1'"
-                    jumps.append((f"{closing} and {self._register('left', loop)} = 1", place + 1))
-                    jumps.append((closing, self.program.body(place)))
-                case End():
-                    jumps.append((f"step_number = {place}", place))
-        return jumps
+                yield from stored_slices(replace(piece, low=piece.low + leaf.first * leaf.type.bits), places, names)
 
     # --- registers ----------------------------------------------------------------------------------------------
 
@@ -349,12 +287,8 @@ class _Subscriber:
         return frozenset(ports.loop.path for ports in self._elements)
 
     @cached_property
-    def _closed_loops(self) -> list[Loop]:
-        return [step.loop for step in self.steps if isinstance(step, Close)]
-
-    @cached_property
     def _closed_paths(self) -> frozenset[Path]:
-        return frozenset(loop.path for loop in self._closed_loops)
+        return frozenset(step.loop.path for step in self.steps if isinstance(step, Close))
 
     def _is_closed(self, part: Data | Loop) -> bool:
         return isinstance(part, Loop) and part.path in self._closed_paths
@@ -368,120 +302,36 @@ class _Subscriber:
     def _number(self, part: Data | Loop) -> int:
         return self._numbers[type(part), part.path]
 
-    def _register(self, what: str, part: Data | Loop) -> str:
-        return f"{what}_{self._number(part)}_r"
-
-    def _length_register(self, part: Data | Loop) -> str:
-        return self._register("length", part)
-
-    def _segment_bit(self, segment: Segment) -> str:
+    def _segment_bit(self, segment: Segment | None) -> str:
+        """The bit that tells that a segment is there; "" if nobody is told."""
+        if segment is None:
+            return ""
         if not segment.scope:
             return f"segment_valid_r({segment.number})"
         loop = segment.scope[-1]
         if self.side.element(loop).segments is None:
             return ""
-        return f"{self._register('segment_valid', loop)}({segment.number})"
-
-    def _updates(self) -> Configuration:
-        zeros, zero = "(others => '0')", "'0'"
-        registers = [
-            ("segment_valid_r", f"{vhdl_type(self.side.segments)} := {zeros}"),
-            ("payload_length_r", vhdl_type(32)),
-        ]
-        resets = [("segment_valid_r", zeros)]
-        for step in self.steps:
-            if isinstance(step, Open) and step.part.is_used and is_counted(step):
-                registers.append((self._length_register(step.part), "unsigned(31 downto 0)"))
-            if isinstance(step, Open) and self._is_closed(step.part):
-                registers.append((self._register("left", step.part), f"unsigned(31 downto 0) := {zeros}"))
-        for ports in self._elements:
-            valid = self._register("valid", ports.loop)
-            registers += [(valid, f"std_logic := {zero}"), (self._register("last", ports.loop), "std_logic")]
-            resets.append((valid, zero))
-            if ports.segments is not None:
-                bits = self._register("segment_valid", ports.loop)
-                registers.append((bits, f"{vhdl_type(ports.segments)} := {zeros}"))
-                resets.append((bits, zeros))
-        registers += [(name, vhdl_type(store.bits)) for _, _, named in self._stores for name, store in named]
-        column = max(len(name) for name, _ in registers)
-        return {
-            "registers": [{"name": name.ljust(column), "type": type_} for name, type_ in registers],
-            "resets": [{"register": name, "value": value} for name, value in resets],
-            "elements": [
-                {"name": ports.name, "valid": self._register("valid", ports.loop)} for ports in self._elements
-            ],
-            "element_segments": [
-                {
-                    "name": ports.name,
-                    "valid": self._register("valid", ports.loop),
-                    "register": self._register("segment_valid", ports.loop),
-                }
-                for ports in self._elements
-                if ports.segments is not None
-            ],
-            "openings": [
-                {"step": place, "statements": [{"statement": text} for text in statements]}
-                for place, step in enumerate(self.steps)
-                if isinstance(step, Open) and (statements := self._opening(step))
-            ],
-            "completions": self._completions(),
-            "closings": [
-                {
-                    "number": self._number(loop),
-                    "statements": [{"statement": text} for text in self._closing(loop)],
-                }
-                for loop in self._closed_loops
-            ],
-        }
-
-    def _opening(self, step: Open) -> list[str]:
-        part = step.part
-        statements = []
-        if part.is_used and is_counted(step):
-            statements.append(f"{self._length_register(part)} <= count_value;")
-        if isinstance(part, Loop) and self._is_closed(part):
-            value = "left_r" if part.count is None else f"to_unsigned({part.count}, 32)"
-            statements.append(f"{self._register('left', part)} <= {value};")
-        return statements
-
-    def _completions(self) -> list[Configuration]:
-        found = []
-        for place, step in enumerate(self.steps):
-            if (
-                isinstance(step, Header | Block | Open)
-                and step.completes
-                and (bit := self._segment_bit(step.completes))
-            ):
-                found.append({"step": place, "bit": bit})
-        return found
-
-    def _closing(self, loop: Loop) -> list[str]:
-        left = self._register("left", loop)
-        statements = [f"{left} <= {left} - 1;"]
-        if loop.path in self._element_paths:
-            last = self._register("last", loop)
-            statements += [f"{self._register('valid', loop)} <= '1';", f"{last} <= '0';"]
-            statements.append(f"if {left} = 1 then {last} <= '1'; end if;")
-        return statements
+        return f"segment_valid_{self._number(loop)}_r({segment.number})"
 
 
-def _values(texts: Iterable[str]) -> list[Configuration]:
-    return [{"value": text, "joint": ""} for text in texts]
+_JUMPS = ("is_guard", "is_open", "is_last_element", "is_element")
 
 
-def _window_condition(store: Store, beats: int) -> str:
-    found = ranges(store.beats)
-    if found == [(0, beats - 1)]:
-        return ""
-    conditions = [
-        f"beat_r = {first}" if first == last else f"(beat_r >= {first} and beat_r <= {last})" for first, last in found
-    ]
-    return f" and {conditions[0]}" if len(conditions) == 1 else f" and ({' or '.join(conditions)})"
+def _jump(kind: str, place: int, target: int, number: int | None = None) -> Configuration:
+    """A jump of one of these kinds; `number` is that of a loop."""
+    return {"step": place, "target": target, "number": number, **{name: name == kind for name in _JUMPS}}
 
 
-def _store_data(register: str, store: Store) -> list[Configuration]:
-    lanes = ranges(store.lanes)
-    data = [f"window_bytes({8 * last + 7} downto {8 * first})" for first, last in reversed(lanes)]
-    if len(store.beats) > 1:
-        data.append(f"{register}({store.bits - 1} downto {store.beat_bits})")
-    return [{"piece": piece, "joint": joint} for piece, joint in zip(data, joints(len(data), " &", ";"), strict=True)]
+def _store(place: int, block: Block, name: str, store: Store, lanes: int) -> Configuration:
+    """A register, and the beats of a block in which it takes lanes of the window."""
+    beats = ranges(store.beats)
+    is_always = beats == [(0, -(-block.size // lanes) - 1)]
+    windows = [] if is_always else [within("beat_r", *window) for window in beats]
+    return {
+        "step": place,
+        "register": name,
+        "bits": store.bits,
+        "windows": windows,
+        "is_parted": len(windows) > 1,
+        "data": store_data(name, store, "window_bytes"),
+    }

@@ -1,1 +1,1 @@
-"""What a message is on the wire: where every byte of a field lies in a frame, and a codec for frames."""
+"""The layout of a message on the wire, and a codec for frames."""

@@ -20,7 +20,7 @@ from fusesoc_firm.frame.values import (
     shown,
     units_of,
 )
-from fusesoc_firm.wire import WireType
+from fusesoc_firm.message.wire import WireType
 
 
 def encode(frame: Frame, message: MessageValue) -> bytes:

@@ -1,7 +1,7 @@
 """The Frame model: the second stage, a message as bytes on the wire.
 
 A frame is `id` (1 byte) | `length` (uint32, little-endian) | payload. The payload is a tree of nodes in wire order;
-docs/frames.md shows it by example:
+docs/explanation/frames.md shows it by example:
 
 * `Fixed`: bytes whose arrangement is known here, padding included.
 * `Pad`: padding that depends on the position, which only the run knows.
@@ -17,9 +17,10 @@ from enum import Enum
 from functools import cached_property
 from math import prod
 
-from fusesoc_firm.diagnostics import SourceRef
-from fusesoc_firm.message.model import DefaultValue, MessageName, RosVersion
-from fusesoc_firm.wire import WireType
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import DefaultValue, MessageName
+from fusesoc_firm.message.wire import WireType
+from fusesoc_firm.text.diagnostics import SourceRef
 
 ID_BYTES = 1
 LENGTH_BYTES = 4
@@ -177,7 +178,7 @@ class Frame:
     """
 
     message: MessageName
-    ros: RosVersion
+    ros: Middleware
     prefix: bytes
     checked_prefix: int
     nodes: tuple[Node, ...]

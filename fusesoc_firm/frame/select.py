@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, nearest
 from fusesoc_firm.frame.model import Fixed, Frame, Loop, NameTree, Node, Pad, all_nodes
 from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, nearest
 
 # Dotted paths, each with the place where the user wrote it.
 Paths = Mapping[str, SourceRef | None]

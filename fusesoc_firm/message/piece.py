@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from fusesoc_firm.diagnostics import SourceRef
+from fusesoc_firm.text.diagnostics import SourceRef
 
 _BYTE_ORDER_MARK = "\ufeff"
 # Not str.splitlines(): a form feed or U+2028 in a comment ends no line in any editor.

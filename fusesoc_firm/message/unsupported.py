@@ -1,6 +1,6 @@
 """What other definition languages have and `.msg` has not: named as such, with what says the same in a `.msg`.
 
-docs/types.md tells where each would stand in a Frame. Nothing here is legal in either version of ROS: a form is one
+docs/explanation/frames.md gives each a place in a Frame. Nothing here is legal in either version of ROS: a form is one
 that both reference parsers refuse, and a word is looked at only where no message can have that name, or none has.
 """
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import struct
 
-from fusesoc_firm.diagnostics import Diagnostics
 from fusesoc_firm.message.dialect import Dialect
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -18,6 +17,7 @@ from fusesoc_firm.message.model import (
     StringType,
 )
 from fusesoc_firm.message.piece import Piece
+from fusesoc_firm.text.diagnostics import Diagnostics
 
 _QUOTES = ('"', "'")
 # An element of an array is quoted, with `\"` for the quote itself, or takes all up to the comma. Possessive, or the

@@ -1,1 +1,1 @@
-"""VHDL to Verilog: GHDL's netlist, put right where GHDL 2.0 writes it wrongly; what Edalize's tool `ghdlsynth` runs."""
+"""VHDL to Verilog: a netlist from GHDL, corrected and checked, for the Edalize tool `ghdlsynth`."""

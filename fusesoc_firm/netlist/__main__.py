@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from fusesoc_firm.manifest import note
 from fusesoc_firm.netlist.model import NetlistError
 from fusesoc_firm.netlist.translation import Translation, translate
+from fusesoc_firm.tools.manifest import note
 
 
 def main(path: Path) -> int:

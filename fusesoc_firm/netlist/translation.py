@@ -21,12 +21,12 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.launcher import starts_everything
 from fusesoc_firm.netlist import dump, lost_constants, verilog
 from fusesoc_firm.netlist.corrections import correct, doubts
 from fusesoc_firm.netlist.model import LostMemoryError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.sources import LIBRARY, Copies, use_numbers
-from fusesoc_firm.tools import explanation, missing
+from fusesoc_firm.tools.launcher import starts_everything
+from fusesoc_firm.tools.programs import explanation, missing
 
 _MODULE = r"^[ \t]*module\s+({name})\b"
 _DEFINITION = re.compile(r"^module (\S+)(.*?)^endmodule", re.MULTILINE | re.DOTALL)

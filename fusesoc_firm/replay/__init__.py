@@ -1,1 +1,1 @@
-"""A recorded bag through a simulated system, and into another bag."""
+"""A recorded bag through a simulated system, into another bag."""

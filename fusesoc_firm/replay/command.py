@@ -12,19 +12,20 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from fusesoc_firm.diagnostics import Diagnostics, InputError, fail, nearest
-from fusesoc_firm.host.bag_writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
-from fusesoc_firm.host.functions import Functions, importable_sources
-from fusesoc_firm.host.routes import Route, renamed, routes_of
-from fusesoc_firm.host.software import stimulated
-from fusesoc_firm.host.transport.simulator import Simulator
-from fusesoc_firm.host.transport.transport import TransportError
+from fusesoc_firm.bags.routes import Route, renamed, routes_of
+from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
 from fusesoc_firm.message.bags import Bag, Form, Recorded, Stream, open_bag
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
+from fusesoc_firm.node.transport.simulator import Simulator
+from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
-from fusesoc_firm.system.derived import Topic, absolute_name
-from fusesoc_firm.system.generator import LoadedSystem
+from fusesoc_firm.simulation.functions import Functions, importable_sources
+from fusesoc_firm.simulation.software import stimulated
+from fusesoc_firm.system.derived.model import Topic, absolute_name
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 
 # Lines about messages that were refused; the rest is counted.
 _SHOWN = 100
@@ -265,6 +266,6 @@ def _routes(
     return routes
 
 
-def _signatures(loaded: LoadedSystem, topics: Sequence[Topic]) -> dict[tuple[RosVersion, MessageName], str]:
+def _signatures(loaded: LoadedSystem, topics: Sequence[Topic]) -> dict[tuple[Middleware, MessageName], str]:
     frames = dict.fromkeys((item.frame.ros, item.frame.message) for item in topics)
     return {(ros, name): signature(name, loaded.libraries[ros].closure(name)) for ros, name in frames}

@@ -12,15 +12,15 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import CodecError, decode, pack_frame
 from fusesoc_firm.frame.defaults import encode_used
-from fusesoc_firm.host.bursts import BurstError, BurstJoiner
-from fusesoc_firm.host.functions import Functions, Message
-from fusesoc_firm.host.software import sent_elsewhere
-from fusesoc_firm.host.transport.simulator import MOST_CYCLES, ErrorPulse, Simulator, Taken
-from fusesoc_firm.host.transport.transport import Burst
-from fusesoc_firm.system.derived import Converter, DerivedSystem, End, Topic
+from fusesoc_firm.node.bursts import BurstError, BurstJoiner
+from fusesoc_firm.node.transport.simulator import MOST_CYCLES, ErrorPulse, Simulator, Taken
+from fusesoc_firm.node.transport.transport import Burst
+from fusesoc_firm.simulation.functions import Functions, Message
+from fusesoc_firm.simulation.software import sent_elsewhere
+from fusesoc_firm.system.derived.model import Converter, DerivedSystem, End, Topic
+from fusesoc_firm.text.diagnostics import InputError
 
 # How long a frame may wait until it counts as stuck, and the system send on its own accord until the next message: so
 # many times the quiet of a system at rest, and so many cycles a byte of the frame.

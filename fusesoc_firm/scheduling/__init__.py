@@ -1,1 +1,1 @@
-"""Schedulers: cycle-exact models of those in hardware."""
+"""Cycle-exact models of the hardware schedulers, and response-time analysis."""

@@ -10,19 +10,9 @@ from math import floor, inf
 from fusesoc_firm.scheduling import area, response
 from fusesoc_firm.scheduling.area import Areas
 from fusesoc_firm.scheduling.dissertation import dissertation
-from fusesoc_firm.scheduling.models.lru import ImmediateLru
-from fusesoc_firm.scheduling.models.parallel import Parallel
-from fusesoc_firm.scheduling.policies import POLICIES
+from fusesoc_firm.scheduling.policies import POLICIES, TABLE_ORDER, Order
 from fusesoc_firm.scheduling.response import Overheads
 from fusesoc_firm.scheduling.tasks import Task
-
-# Policies that take requests in one after the other, and up to how many requesters they take them all at once instead.
-_MOST_AT_ONCE = {
-    "lru": ImmediateLru.MAX_REQUESTERS,
-    "edf_latency": Parallel.MAX_REQUESTERS,
-    "lst": Parallel.MAX_REQUESTERS,
-    "edf_resources": 0,
-}
 
 
 class Criterion(StrEnum):
@@ -109,12 +99,12 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
     takes in a request a cycle; each may lead to three operations of the queue (it goes in, who is interrupted goes in,
     the next comes out), of two cycles each in a heap.
     """
+    row = POLICIES[policy]
     # Who is alone is never interrupted.
-    run, resume = (shortest_run, 1) if POLICIES[policy].is_preemptive and requesters > 1 else (0, 0)
-    if requesters <= _MOST_AT_ONCE.get(policy, requesters):
-        return Overheads(1 if policy not in _MOST_AT_ONCE or policy == "lru" else 2, 0, run, resume)
-    operation = 1 if policy == "edf_latency" else 2
-    return Overheads(2, 3 * operation * requesters + 8, run, resume, shortest_service=4)
+    run, resume = (shortest_run, 1) if row.is_preemptive and requesters > 1 else (0, 0)
+    if requesters <= row.most_at_once:
+        return Overheads(2 if row.has_deadlines else 1, 0, run, resume)
+    return Overheads(2, 3 * row.queue_cycles * requesters + 8, run, resume, shortest_service=4)
 
 
 def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *, is_ordered: bool = False) -> Analysis:
@@ -127,7 +117,7 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
     """
     overheads = overheads_of(policy, len(tasks), channel.shortest_run)
     order: Sequence[Task] = ()
-    if POLICIES[policy].is_fixed:
+    if POLICIES[policy].order is Order.PRIORITY:
         order = tasks if is_ordered else assign_priorities(policy, tasks, overheads)
         by_name = {
             task.name: _fixed(policy, task, order[:place], order[place + 1 :], overheads)
@@ -135,7 +125,7 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
         }
         responses = [by_name[task.name] for task in tasks]
     else:
-        responses = _RESPONSES[policy](tasks, overheads)
+        responses = _RESPONSES[POLICIES[policy].order](tasks, overheads)
     bounds = tuple(
         Bound(task, found, _buffer(task, found, channel)) for task, found in zip(tasks, responses, strict=True)
     )
@@ -238,12 +228,11 @@ def _least(task: Task, lateness: float, counted: int) -> int:
     return counted if lateness == inf else min(task.deadline + floor(lateness), counted)
 
 
-_RESPONSES: Mapping[str, Callable[[Sequence[Task], Overheads], list[int | None]]] = {
-    "lru": _turns,
-    "round_robin": _turns,
-    "edf_resources": _edf,
-    "edf_latency": _edf,
-    "lst": _lst,
+_RESPONSES: Mapping[Order, Callable[[Sequence[Task], Overheads], list[int | None]]] = {
+    Order.TURNS: _turns,
+    Order.DEADLINE: _edf,
+    Order.SLACK: _lst,
+    Order.OTHER: lambda tasks, _: [None] * len(tasks),
 }
 
 
@@ -278,7 +267,7 @@ def choose(
     if len({task.name for task in tasks}) < len(tasks):
         raise ValueError("two tasks have the same name")
     analyses = sorted(
-        (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in POLICIES), key=_RANKS[criterion]
+        (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in TABLE_ORDER), key=_RANKS[criterion]
     )
     load = utilisation(tasks)
     names = tuple(task.name for task in tasks)

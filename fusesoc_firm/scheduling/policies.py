@@ -1,38 +1,132 @@
-"""What the policies are called, here and in the dissertation, and what tells them apart."""
+"""The scheduling policies: each is a row here, a model in `models` and a core in cores/sched.
+
+`make policies` writes the lists that cores hold of them (tests/cores/policies.py). docs/scheduling.md: how to add one.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from types import MappingProxyType
+
+
+class Order(StrEnum):
+    """The order in which tasks are served, from which the analysis takes its bounds."""
+
+    PRIORITY = "fixed priorities"
+    TURNS = "each other task at most once before a task"
+    DEADLINE = "earliest deadline first"
+    SLACK = "least slack first"
+    OTHER = "no known bound"
 
 
 @dataclass(frozen=True)
 class Policy:
-    """A policy; `name` is its key among the models and its core's file name."""
+    """A policy; `name` is its word in specifications, and its model's function and file."""
 
     name: str
     short: str
-    """The dissertation's abbreviation."""
+    """The dissertation's abbreviation, or one like it."""
     title: str
-    """The dissertation's name in its tables."""
-    is_preemptive: bool
-    is_fixed: bool = False
-    """Whether priorities stay as they are."""
+    """The dissertation's name in its tables, or one like it."""
+    order: Order = Order.OTHER
+    is_preemptive: bool = False
+    has_deadlines: bool = False
+    """Whether it compares the times to deadlines, so that its core has them as generics."""
+    has_transfer_times: bool = False
+    """Whether its core has transfer times as a generic, too."""
+    most_at_once: int = 256
+    """Up to how many requesters its core compares in one cycle; the tasks of more wait in a queue."""
+    queue_cycles: int = 2
+    """Cycles of an operation of that queue."""
+    model: str = ""
+    """The model's file, unless it is called like the policy."""
+    core: str = ""
+    """The core in cores/sched, unless it is called like the policy: its entity is firm_sched_<core>."""
+
+    @property
+    def model_file(self) -> str:
+        """The module of `models` with the function `name`."""
+        return self.model or self.name
+
+    @property
+    def core_file(self) -> str:
+        """The name of the core's file, without its ending."""
+        return self.core or self.name
+
+    @property
+    def entity(self) -> str:
+        """The core's entity."""
+        return f"firm_sched_{self.core_file}"
+
+    @property
+    def generics(self) -> tuple[str, ...]:
+        """The generics of the entity beside REQUESTERS."""
+        uses = {
+            "PREEMPTIVE": self.is_preemptive and self.order is Order.PRIORITY,
+            "PERIODS": self.has_deadlines,
+            "DEADLINES": self.has_deadlines,
+            "TRANSFER_TIMES": self.has_transfer_times,
+            "TIME_BITS": self.has_deadlines or self.has_transfer_times,
+            "SHORTEST_RUN": self.is_preemptive,
+        }
+        return tuple(generic for generic, is_used in uses.items() if is_used)
 
 
-_ALL = (
-    Policy("lru", "LRU", "LRU", is_preemptive=False),
-    Policy("fixed_priority", "NPFP", "Non-Preemptive FP", is_preemptive=False, is_fixed=True),
-    Policy("fixed_priority_preemptive", "PFP", "Preemptive FP", is_preemptive=True, is_fixed=True),
-    Policy("edf_resources", "ROEDF", "Resources-Optimized EDF", is_preemptive=True),
-    Policy("edf_latency", "LOEDF", "Latency-Optimized EDF", is_preemptive=True),
-    Policy("lst", "LST", "LST", is_preemptive=True),
-    Policy("round_robin", "RR", "Round robin", is_preemptive=False),
+_ROWS = (
+    Policy("fixed_priority", "NPFP", "Non-Preemptive FP", Order.PRIORITY),
+    Policy(
+        "fixed_priority_preemptive",
+        "PFP",
+        "Preemptive FP",
+        Order.PRIORITY,
+        is_preemptive=True,
+        model="fixed_priority",
+        core="fixed_priority",
+    ),
+    Policy("round_robin", "RR", "Round robin", Order.TURNS),
+    Policy("lru", "LRU", "LRU", Order.TURNS, most_at_once=16),
+    Policy(
+        "edf_resources",
+        "ROEDF",
+        "Resources-Optimized EDF",
+        Order.DEADLINE,
+        is_preemptive=True,
+        has_deadlines=True,
+        most_at_once=0,
+        model="edf",
+    ),
+    Policy(
+        "edf_latency",
+        "LOEDF",
+        "Latency-Optimized EDF",
+        Order.DEADLINE,
+        is_preemptive=True,
+        has_deadlines=True,
+        most_at_once=8,
+        queue_cycles=1,
+        model="edf",
+    ),
+    Policy(
+        "lst",
+        "LST",
+        "LST",
+        Order.SLACK,
+        is_preemptive=True,
+        has_deadlines=True,
+        has_transfer_times=True,
+        most_at_once=8,
+    ),
 )
 
-POLICIES: Mapping[str, Policy] = MappingProxyType({policy.name: policy for policy in _ALL})
-"""All policies, in the order of the dissertation's tables; round robin, which it has not, stands last."""
+POLICIES: Mapping[str, Policy] = MappingProxyType({policy.name: policy for policy in _ROWS})
+"""All policies, in the order in which specifications, VHDL and pages list them."""
 
-EVALUATED = tuple(name for name in POLICIES if name != "round_robin")
-"""The six of the dissertation."""
+DEFAULT = "fixed_priority"
+
+EVALUATED = ("lru", "fixed_priority", "fixed_priority_preemptive", "edf_resources", "edf_latency", "lst")
+"""The six of the dissertation, in the order of its tables."""
+
+TABLE_ORDER = (*EVALUATED, *(name for name in POLICIES if name not in EVALUATED))
+"""All policies, those of the dissertation's tables first."""

@@ -11,14 +11,15 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import yaml
-
-from fusesoc_firm.diagnostics import Diagnostics, InputError
 from fusesoc_firm.message.library import libraries
-from fusesoc_firm.system.generator import CoreFolders, LoadedSystem, load_system, no_core_folders, with_paths
-from fusesoc_firm.yaml_text import yaml_data
+from fusesoc_firm.request.core_reader import CoreFile, read_core
+from fusesoc_firm.request.request import CoreFolders, no_core_folders
+from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+
+# The instance of the generator that makes the system.
+_INSTANCE = "system"
 
 
 @dataclass(frozen=True)
@@ -29,20 +30,18 @@ class MessageSources:
     distro: str | None = None
 
 
-def core_of(spec: Path) -> Path | None:
+def core_of(spec: Path) -> CoreFile | None:
     """The core beside a specification that makes a system of it and can simulate it; None if there is none."""
     # Path.resolve() raises an error of its own for a link that leads in a circle.
     spec = Path(os.path.realpath(spec))
-    return next((path for path in sorted(spec.parent.glob("*.core")) if _makes(path, spec)), None)
-
-
-def core_content(core: Path) -> Any:
-    """A core's description; empty if it does not make a system."""
-    try:
-        content = yaml_data(core.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
-        return content if isinstance(content["generate"]["system"]["parameters"], dict) else {}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError):
-        return {}
+    for path in sorted(spec.parent.glob("*.core")):
+        # What is wrong with a core that is not this one's is FuseSoC's to say.
+        with suppress(InputError):
+            core = read_core(path)
+            made = core.parameters(_INSTANCE).get("spec")
+            if made and os.path.realpath(path.parent / str(made)) == str(spec):
+                return core
+    return None
 
 
 def sources_of(
@@ -53,7 +52,7 @@ def sources_of(
     A core with messages that FuseSoC does not know here is left to the build.
     """
     core = core_of(spec)
-    parameters = core_content(core)["generate"]["system"]["parameters"] if core else {}
+    parameters = core.parameters(_INSTANCE) if core else {}
     found = [*paths, *(spec.parent / item for item in _words(parameters.get("paths")))]
     with suppress(InputError):
         found += core_folders(dict.fromkeys(_words(parameters.get("messages"))))
@@ -80,12 +79,6 @@ def known_names(spec: Path, own: Sequence[str], sources: MessageSources, core_fo
     known = libraries(sources.paths, os.environ, sources.distro)
     found = with_paths(known, dict.fromkeys(own), spec.parent, core_folders, Diagnostics())
     return sorted({str(name) for library in found.values() for name in library.names()})
-
-
-def _makes(core: Path, spec: Path) -> bool:
-    """Whether a core makes a system of the specification."""
-    parameters = core_content(core).get("generate", {}).get("system", {}).get("parameters", {})
-    return bool(parameters.get("spec")) and os.path.realpath(core.parent / str(parameters["spec"])) == str(spec)
 
 
 def _words(value: object) -> list[str]:

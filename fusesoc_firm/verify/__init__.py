@@ -1,1 +1,1 @@
-"""Messages in simulation: both converters in a loop behind the Manager, judged by serialisers that are not ours."""
+"""Converters verified in simulation against independent serialisers."""

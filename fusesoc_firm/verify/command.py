@@ -14,14 +14,14 @@ from pathlib import Path
 from tqdm import tqdm
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.diagnostics import fail
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.outputs import check_output, make_folder
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.outputs import check_output, make_folder
+from fusesoc_firm.tools.workers import Workers, cluster_workers, local_workers
 from fusesoc_firm.verify.campaign import Entry, Settings, run, select
 from fusesoc_firm.verify.report import Report, make_report, write_report
 from fusesoc_firm.verify.simulation import ghdl
 from fusesoc_firm.verify.task import Verdict
-from fusesoc_firm.workers import Workers, cluster_workers, local_workers
 
 _SHOWN = 20
 
@@ -80,7 +80,7 @@ def _keep(entry: Entry, folder: Path | None) -> None:
     """Write the work folder of a message that failed."""
     if folder is None or not entry.result.files:
         return
-    below = folder / f"ros{int(entry.ros)}_{entry.name.package}_{entry.name.name}"
+    below = folder / f"ros{entry.ros.number}_{entry.name.package}_{entry.name.name}"
     below.mkdir(parents=True, exist_ok=True)
     for name, text in entry.result.files.items():
         (below / name).write_text(text, encoding="utf-8")

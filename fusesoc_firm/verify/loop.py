@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.message_ports import MessagePort, message_ports, segment_count
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 
 ENTITY = "firm_verify_loop"
 SUBSCRIBER_ID = 1
@@ -43,7 +43,6 @@ def loop_text(frame: Frame, width: int) -> str:
     apart = {name for port in ports if port.is_reverse for name in _gated_names(port, names)}
     apart |= {port.name for port in fields}
     streams = [port.name.removesuffix("_axis_tready") for port in ports if _is_stream(port)]
-    column = max([len("frame_error_code"), *(len(port.name) for port in ports)])
     return render(
         _TEMPLATE,
         {
@@ -53,7 +52,7 @@ def loop_text(frame: Frame, width: int) -> str:
             "width": width,
             "subscriber": SUBSCRIBER_ID,
             "publisher": PUBLISHER_ID,
-            "select_high": PUBLISHER_ID.bit_length() - 1,
+            "select_bits": PUBLISHER_ID.bit_length(),
             "watchdog": _WATCHDOG,
             "quiet": _QUIET,
             "subscriber_entity": subscriber_entity(frame),
@@ -61,20 +60,9 @@ def loop_text(frame: Frame, width: int) -> str:
             "has_publisher_errors": not frame.is_fixed_size,
             "gate_count": len(found),
             "gates": [_gate(number, gate) for number, gate in enumerate(found)],
-            "signals": list(_signals(ports, apart, segment_count(frame))),
-            "ports": [
-                {
-                    "port": port.name.ljust(column),
-                    "subscriber_signal": f"sub_{port.name}",
-                    "publisher_signal": f"pub_{port.name}" if port.name in apart else f"sub_{port.name}",
-                }
-                for port in ports
-            ],
-            "has_fields": bool(fields),
-            "fields": [
-                {"name": port.name, "nothing": "'X'" if port.width is None else "(others => 'X')"} for port in fields
-            ],
-            "has_streams": bool(streams),
+            "ports": [{"name": port.name, "type": port.vhdl_type, "is_apart": port.name in apart} for port in ports],
+            "segments": segment_count(frame),
+            "fields": [{"name": port.name, "is_bit": port.width is None} for port in fields],
             "streams": [{"name": name} for name in streams],
         },
     )
@@ -157,15 +145,3 @@ def _gate(number: int, gate: Gate) -> dict[str, object]:
         "ready": gate.ready,
         "assignments": [{"target": target, "value": value} for target, value in gate.assignments],
     }
-
-
-def _signals(ports: Sequence[MessagePort], apart: set[str], segments: int) -> Iterator[dict[str, str]]:
-    vector = f"std_logic_vector({segments - 1} downto 0)"
-    declared = [("sub_segment_valid", vector), ("pub_segment_valid", vector), ("sub_msg_valid", "std_logic")]
-    declared += [("pub_msg_valid", "std_logic"), ("msg_ready", "std_logic")]
-    for port in ports:
-        declared.append((f"sub_{port.name}", port.vhdl_type))
-        if port.name in apart:
-            declared.append((f"pub_{port.name}", port.vhdl_type))
-    column = max(len(name) for name, _ in declared)
-    return ({"name": name.ljust(column), "type": type_} for name, type_ in declared)

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import yaml
-
-from fusesoc_firm.diagnostics import fail
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.request.core_reader import read_core
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.verify.loop import ENTITY
 
 STIMULUS_FILE, EXPECTED_FILE, OUTPUT_FILE = "stimulus.txt", "expected.txt", "output.txt"
@@ -79,7 +78,7 @@ def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, tim
 
 
 def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes]) -> None:
-    """The host's two files (docs/simulation.md): stimulus k causes answer k, and nothing else comes."""
+    """The host's two files (docs/reference/simulation-host.md): stimulus k causes answer k, and nothing else comes."""
     sent = (f"> stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(stimuli))
     expected = (f"< @{number} answer to stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(answers))
     (folder / STIMULUS_FILE).write_text("".join(sent), encoding="ascii")
@@ -110,7 +109,7 @@ def core_files(root: Path | None = None) -> Iterator[Path]:
     """The sources of the cores that the bench is made of."""
     for core in _CORES:
         description = (root or library_root()) / "cores" / f"{core}.core"
-        for name in yaml.safe_load(description.read_text(encoding="utf-8"))["filesets"]["rtl"]["files"]:
+        for name in read_core(description).section("filesets")["rtl"]["files"]:
             yield description.parent / name
 
 

@@ -22,14 +22,15 @@ entity obstacle is
     -- std_msgs/Bool
     out_data          : out std_logic;
     out_segment_valid : out std_logic_vector(0 downto 0);
-    out_msg_ready     : in  std_logic);
+    out_msg_ready     : in  std_logic
+  );
 end entity obstacle;
 
 architecture rtl of obstacle is
 
   subtype magnitude_t is unsigned(30 downto 0);
-  constant NEAR     : magnitude_t := "011" & x"F000000";  -- 0.5 m
-  constant INFINITE : magnitude_t := "111" & x"F800000";
+  constant NEAR     : magnitude_t := "011" & x"f000000";  -- 0.5 m
+  constant INFINITE : magnitude_t := "111" & x"f800000";
   constant ZERO     : magnitude_t := (others => '0');
 
   signal distance : magnitude_t;
@@ -45,7 +46,8 @@ begin
               unsigned(in_min_range(30 downto 0));
 
   out_data <= '1' when (is_below = '1' and distance = INFINITE)
-                       or (is_below = '0' and distance >= least and distance < NEAR) else '0';
+                       or (is_below = '0' and distance >= least and distance < NEAR) else
+              '0';
 
   out_segment_valid(0) <= in_msg_valid;
   in_msg_ready         <= out_msg_ready;

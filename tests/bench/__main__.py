@@ -1,4 +1,4 @@
-"""`make bench`: measure, print the tables, write docs/figures.md and the areas of Manager and schedulers.
+"""`make bench`: measure, print the tables, write docs/figures and the areas of Manager and schedulers.
 
     python -m tests.bench [PART ...] [--seed N] [--broken N]
 

@@ -20,7 +20,7 @@ import yaml
 from tests.bench.manager import DISSERTATION
 from tests.bench.tables import FAILED, Table, Tell
 from tests.bench.yosys import FAMILIES, XILINX, Cells, Family, SynthesisError, Yosys
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 TITLE = "Systems with accelerators, converters and Manager"
 MANAGER_TITLE = "The Manager within, LUT/FF"

@@ -12,11 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.bench.designs import CORES, PUBLISHER, SUBSCRIBER, Converter, NotConvertedError, generate
 from tests.bench.tables import FAILED, MET, MISSED, NOT_CONVERTED, Table, Tell
 from tests.bench.yosys import Cells, SynthesisError, Yosys
-from tests.sim.ghdl import Generic, GhdlError, Library, core_files
+from tests.hdl.ghdl import Generic, GhdlError, Library, core_files
 
 WIDTHS = (8, 64, 128)
 STREAM_WIDTHS = (8, 16, 32, 64, 128, 256, 512)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fusesoc_firm.scheduling.area import FILE, Area, write
 from tests.bench.tables import Table
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 PATH = REPOSITORY / "fusesoc_firm" / "scheduling" / FILE
 

@@ -1,4 +1,4 @@
-"""docs/figures.md: what the bench measured, a section for each part of it, with the versions of the tools."""
+"""docs/figures: what the bench measured, a page for each subject, with the versions of the tools."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import platform
 import re
 import subprocess
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib import metadata
 
 from tests import yowasp
@@ -29,10 +30,33 @@ from tests.bench import (
     yosys,
 )
 from tests.bench.tables import Table, filled
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
-FIGURES = REPOSITORY / "docs" / "figures.md"
+FOLDER = REPOSITORY / "docs" / "figures"
 
+
+@dataclass(frozen=True)
+class Page:
+    """A page of figures: its file, its title, what a reader finds there, and the parts of the bench on it."""
+
+    name: str
+    title: str
+    subject: str
+    parts: tuple[str, ...]
+
+
+PAGES = (
+    Page("converters", "Figures of converters", "area, cycles and broken frames", ("area", "cycles", "fuzz")),
+    Page(
+        "manager",
+        "Figures of the Manager and the schedulers",
+        "area, clock and channel use",
+        ("manager", "timing", "use"),
+    ),
+    Page("applications", "Figures of whole systems", "area and cycles", ("images", "links", "applications")),
+    Page("builds", "Figures of builds", "times", ("systems", "builds", "simulators", "store")),
+    Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live")),
+)
 _HEADINGS = {
     "area": "Area",
     "manager": "Area of Manager and schedulers",
@@ -64,7 +88,7 @@ _METHODS = {
         Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
     "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
     "links": "Measured as in 'Area'.",
-    "applications": f"""The whole of each system of specs/ ([applications.md](applications.md)), its streams as ports,
+    "applications": f"""The whole of each of the [demo systems](../reference/applications.md), its streams as ports,
         measured as in 'Area', for ECP5 with `{yosys.ECP5.synthesis}` and for iCE40 UltraPlus with
         `{yosys.ICE40.synthesis}`. The targets `synth_*` do the same with the Yosys that is installed.""",
     "systems": "Time that a user waits for a large system.",
@@ -73,12 +97,16 @@ _METHODS = {
         same frames and stalls in every simulator, and the same bytes back.""",
     "store": "What is generated on a second run of FuseSoC, and what that costs.",
     "replay": """Bags through `firm replay`: written with rosbags, and what is recorded is read with rosbags.""",
-    "live": "`firm live` in a running ROS, as docs/live.md has it.",
+    "live": "[`firm live`](../how-to/run-live.md) in a running ROS.",
 }
-_INTRODUCTION = """
-    Written by `make bench`; `make bench BENCH='area'` measures a part anew ({parts}). 'not converted' is a message that
-    no converter is made of yet. 'met' and 'MISSED' tell how a row stands to its bar.
-    """
+_INTRODUCTION = """# {title}
+
+For readers who compare designs, versions or tools.
+After it you can look up {subject}.
+
+Written by `make bench BENCH='{parts}'`.
+[Figures](index.md) explains the words of the tables.
+"""
 
 
 def parts() -> tuple[str, ...]:
@@ -87,7 +115,7 @@ def parts() -> tuple[str, ...]:
 
 
 def keys() -> dict[str, list[tuple[str, ...]]]:
-    """The first cells of every row that docs/figures.md must hold, by the title of the table."""
+    """The first cells of every row that the pages must hold, by the title of the table."""
     modules = (
         area,
         manager,
@@ -116,13 +144,18 @@ def section(part: str, tables: Sequence[Table]) -> str:
 
 def write(sections: Mapping[str, str]) -> None:
     """Put sections in the place of those of the same part; the others stay."""
-    before = FIGURES.read_text(encoding="utf-8") if FIGURES.is_file() else ""
-    known = {part: text for part in parts() if (text := _section_of(before, _HEADINGS[part]))} | dict(sections)
-    ordered = [known[part] for part in parts() if part in known]
-    listed = ", ".join(f"`{part}`" for part in parts())
-    FIGURES.write_text(
-        "\n".join([f"# Figures\n\n{filled(_INTRODUCTION.format(parts=listed))}\n", *ordered]), encoding="utf-8"
-    )
+    for page in PAGES:
+        file = FOLDER / f"{page.name}.md"
+        before = file.read_text(encoding="utf-8") if file.is_file() else ""
+        known = {part: _section_of(before, _HEADINGS[part]) for part in page.parts} | dict(sections)
+        introduction = _INTRODUCTION.format(title=page.title, subject=page.subject, parts=" ".join(page.parts))
+        ordered = (known[part] for part in page.parts)
+        file.write_text("\n".join([introduction, *filter(None, ordered)]), encoding="utf-8")
+
+
+def written() -> str:
+    """The text of all pages."""
+    return "\n".join((FOLDER / f"{page.name}.md").read_text(encoding="utf-8") for page in PAGES)
 
 
 def _section_of(text: str, heading: str) -> str:

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from tests.applications.images import SPECS, filtered, load_model
 from tests.bench.model import ModelError
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.bench.yosys import SynthesisError, Yosys
-from tests.sim.ghdl import GhdlError, Library, core_files
-from tests.sim.images import SPECS, filtered, load_model
+from tests.hdl.ghdl import GhdlError, Library, core_files
 
 TITLE = "Accelerators for images, 1920 x 1080"
 WIDTHS = (8, 64, 128)

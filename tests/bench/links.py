@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from tests.bench.area import WIDTHS, Row, of_core, tables_of
 from tests.bench.tables import Table, Tell
 from tests.bench.yosys import Yosys
-from tests.sim.ghdl import Generic
+from tests.hdl.ghdl import Generic
 
 LINKS_TITLE, CROSSINGS_TITLE = "Links between a host and a system", "Crossings between two clocks"
 

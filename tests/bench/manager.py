@@ -6,14 +6,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from fusesoc_firm.scheduling.area import MANAGER, MANAGER_PREEMPTIVE
-from fusesoc_firm.scheduling.combinations import COMBINATIONS, COMBINED_REQUESTERS
 from fusesoc_firm.scheduling.dissertation import dissertation
-from fusesoc_firm.scheduling.workloads import REQUESTERS
+from fusesoc_firm.scheduling.evaluation.combinations import COMBINATIONS, COMBINED_REQUESTERS
+from fusesoc_firm.scheduling.evaluation.workloads import REQUESTERS
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.bench import schedulers
 from tests.bench.area import WIDTHS, Bar, Row, Subject, of_core, tables_of
 from tests.bench.tables import Table, Tell
 from tests.bench.yosys import Yosys
-from tests.sim.ghdl import Generic
+from tests.hdl.ghdl import Generic
 
 # The sum of table 3.3, LUT/FF.
 DISSERTATION = {
@@ -92,7 +93,7 @@ def _managers() -> Iterator[Row]:
 
 
 def _schedulers() -> Iterator[Row]:
-    for policy in schedulers.POLICIES:
+    for policy in POLICIES:
         known = {number: _lut_ff(area) for number, area in dissertation().area.get(policy, {}).items()}
         for channels in REQUESTERS:
             bar = _SCHEDULER_BARS.get((policy, channels))

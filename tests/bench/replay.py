@@ -10,16 +10,16 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from fusesoc_firm.diagnostics import InputError
-from fusesoc_firm.host.simulator import CoreSources, build_simulator
-from fusesoc_firm.host.transport.simulator import Simulator
 from fusesoc_firm.message.library import libraries
+from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
+from fusesoc_firm.system.system_core import load_system
+from fusesoc_firm.text.diagnostics import InputError
+from tests.applications.applications import SPECS
+from tests.applications.quaternions import quaternion_bag, worst_error
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.sim.applications import SPECS
-from tests.sim.pass_through import QUIET, received, systems_of_all
-from tests.sim.quaternions import quaternion_bag, worst_error
+from tests.converter.simulated.pass_through import QUIET, received, systems_of_all
 
 TITLE = "Bags replayed"
 QUATERNIONS = 10_000

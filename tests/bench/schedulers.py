@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from fusesoc_firm.scheduling.combinations import TOP
-from fusesoc_firm.system.specification import SCHEDULERS
-from fusesoc_firm.system.timing import WITH_TRANSFER_TIMES
-from tests.sim.ghdl import Library, core_files
-from tests.sim.schedulers import ENTITIES, POLICY_CORES, wrapper
+from fusesoc_firm.scheduling.evaluation.combinations import TOP
+from fusesoc_firm.scheduling.policies import POLICIES
+from tests.cores.schedulers import POLICY_CORES, preset_generics, wrapper
+from tests.hdl.ghdl import Library, core_files
 
-POLICIES = SCHEDULERS
 TIME_BITS = 16
 SHORTEST_TIME, LONGEST_TIME = 50, 150
 
@@ -20,7 +18,7 @@ _ENTITY = "measured_scheduler"
 
 def analysed(folder: Path, policy: str, requesters: int) -> tuple[Library, str]:
     """A policy's entity for so many requesters in a library of its own, and what it is called there."""
-    return _wrapped(folder, ENTITIES[policy].entity, requesters, _generics(policy, requesters))
+    return _wrapped(folder, POLICIES[policy].entity, requesters, _generics(policy, requesters))
 
 
 def combined(folder: Path, policies: Sequence[str], requesters: int) -> tuple[Library, str]:
@@ -46,10 +44,10 @@ def _wrapped(folder: Path, entity: str, requesters: int, generics: Mapping[str, 
 
 
 def _generics(policy: str, requesters: int) -> dict[str, str]:
-    entity = ENTITIES[policy]
-    generics = {"REQUESTERS": str(requesters), **{name: str(value).lower() for name, value in entity.generics.items()}}
-    times = _times(requesters) if entity.has_times else {}
-    if policy not in WITH_TRANSFER_TIMES:
+    preset = {name: str(value).lower() for name, value in preset_generics(policy).items()}
+    generics = {"REQUESTERS": str(requesters), **preset}
+    times = _times(requesters) if POLICIES[policy].has_deadlines else {}
+    if not POLICIES[policy].has_transfer_times:
         times.pop("TRANSFER_TIMES", None)
     return generics | times
 

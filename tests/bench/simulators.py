@@ -16,11 +16,11 @@ from pathlib import Path
 
 import yaml
 
-from fusesoc_firm.generation import Request
+from fusesoc_firm.request.request import Request
+from tests.applications.applications import SPECS
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
-from tests.sim import systems
-from tests.sim.applications import SPECS
-from tests.sim.verilog import compile_verilog, translated
+from tests.hdl.verilog import compile_verilog, translated
+from tests.system.simulated import systems
 
 TITLE = "Cycles a second, quat2euler at 8 bits"
 # Each with how often the specification's hundred messages are sent in the long run.

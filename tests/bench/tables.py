@@ -1,4 +1,4 @@
-"""Tables of figures, as Markdown that is aligned: the same text for the terminal and for docs/figures.md."""
+"""Tables of figures, as Markdown that is aligned: the same text for the terminal and for docs/figures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fusesoc_firm.scheduling.tables import grid
 NOT_CONVERTED = "not converted"
 MET, MISSED, FAILED = "met", "MISSED", "FAILED"
 
-_LINE_LENGTH = 120
+_LINE_LENGTH = 100
 
 # Called with a line for whoever waits.
 Tell = Callable[[str], None]

@@ -1,4 +1,4 @@
-"""The bench itself: what it counts, how it judges payloads, and that docs/figures.md holds all that it measures."""
+"""The bench itself: what it counts, how it judges payloads, and that docs/figures holds all that it measures."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ import pytest
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.values import CodecError
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.system.system_core import load_system
 from tests import yowasp
 from tests.bench import figures, fuzz, store, systems
 from tests.bench.cycles import cycles_of
@@ -24,7 +25,7 @@ from tests.bench.model import FrameError, Message, publisher_model, subscriber_m
 from tests.bench.payloads import BrokenPayloadError, Payloads
 from tests.bench.tables import FAILED, Table
 from tests.bench.yosys import ECP5, ICE40, Cells, SynthesisError, Yosys, count_cells
-from tests.sim.ghdl import Library
+from tests.hdl.ghdl import Library
 
 SEED = 20240611
 QUATERNION = "geometry_msgs/Quaternion"
@@ -54,8 +55,12 @@ end architecture;
 """
 
 
+def test_every_part_has_one_page() -> None:
+    assert sorted(part for page in figures.PAGES for part in page.parts) == sorted(figures.parts())
+
+
 def test_every_row_is_in_the_document() -> None:
-    lines = figures.FIGURES.read_text(encoding="utf-8").splitlines()
+    lines = figures.written().splitlines()
     for title, keys in figures.keys().items():
         start = lines.index(f"### {title}")
         end = next((n for n in range(start + 1, len(lines)) if lines[n].startswith("#")), len(lines))
@@ -68,6 +73,7 @@ def test_every_row_is_in_the_document() -> None:
             )
 
 
+@pytest.mark.check
 @needs_yosys
 def test_luts_and_flip_flops_of_a_tiny_entity(tmp_path: Path) -> None:
     (tmp_path / "tiny.vhd").write_text(_TINY, encoding="ascii")
@@ -132,9 +138,10 @@ def test_a_column_without_entries_is_left_out() -> None:
     assert not table.is_good
 
 
-@pytest.mark.parametrize("ros", list(RosVersion))
+@pytest.mark.check
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
 @pytest.mark.parametrize("message", sorted({message for _, message in fuzz.MESSAGES}))
-def test_two_readers_agree_on_what_is_broken(ros: RosVersion, message: str) -> None:
+def test_two_readers_agree_on_what_is_broken(ros: Middleware, message: str) -> None:
     """The judge of the frames and our codec, each written for itself, and neither by the other's rules."""
     print(f"seed {SEED}")
     name = parse_name(message)
@@ -165,6 +172,7 @@ def _is_read(payloads: Payloads, payload: bytes) -> bool:
     return True
 
 
+@pytest.mark.check
 @needs_verilator
 @pytest.mark.parametrize(
     "converter", [row for row in fuzz.rows() if row.ros == 2], ids=lambda row: f"{row.message}-{row.width}"
@@ -177,9 +185,10 @@ def test_a_thousand_broken_frames(tmp_path: Path, converter: Converter) -> None:
     assert tally.delivered == tally.good > 300
 
 
+@pytest.mark.check
 @needs_verilator
 def test_cycles_are_counted(tmp_path: Path) -> None:
-    payloads = Payloads(RosVersion.ROS1, QUATERNION)
+    payloads = Payloads(ROS1, QUATERNION)
     data = [payloads.draw(random.Random(SEED)) for _ in range(3)]
     for direction, make, beats in ((SUBSCRIBER, subscriber_model, 36), (PUBLISHER, publisher_model, 37)):
         folder = tmp_path / direction
@@ -189,11 +198,12 @@ def test_cycles_are_counted(tmp_path: Path) -> None:
         assert all(each.beat_cycles == beats and each.message_cycles <= 2 for each in found)
 
 
+@pytest.mark.check
 @needs_verilator
 def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
     """Each way in which the records can differ from what was sent."""
     model = subscriber_model(Converter(1, QUATERNION, SUBSCRIBER, 64), tmp_path)
-    payloads = Payloads(RosVersion.ROS1, QUATERNION)
+    payloads = Payloads(ROS1, QUATERNION)
     payload = payloads.draw(random.Random(SEED))
     good = fuzz.fuzz_frame(payloads, len(payload).to_bytes(4, "little") + payload)
     broken = fuzz.fuzz_frame(payloads, len(payload).to_bytes(4, "little") + payload[1:])
@@ -215,10 +225,11 @@ def test_a_wrong_delivery_is_seen(tmp_path: Path) -> None:
         assert fuzz.difference(model, frames, wrong)
 
 
+@pytest.mark.check
 def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
     """And what is measured ends well: a broken call would be measured as well."""
     systems.write_system(tmp_path, SEED)
-    libraries = {ros: MessageLibrary(ros) for ros in RosVersion}
+    libraries = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
     system = load_system(tmp_path / "spec.yaml", libraries).system
     assert len(system.subscribers) + len(system.publishers) + len(system.accelerators) == systems.BLOCKS
     assert len({connection.frame.message for connection in system.connections}) == systems.MESSAGES
@@ -230,6 +241,7 @@ def test_the_system_of_the_bench_is_as_large_as_it_says(tmp_path: Path) -> None:
         systems.run(systems.JOBS[0], tmp_path)
 
 
+@pytest.mark.check
 def test_an_edit_makes_just_its_dependants_anew() -> None:
     """The rows of the bench, of a sixth of its messages; FuseSoC runs as it does there."""
     rows = [*store.edit_rows(6)]

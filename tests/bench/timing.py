@@ -9,14 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from fusesoc_firm.render import render
+from fusesoc_firm.scheduling.policies import POLICIES
+from fusesoc_firm.text.render import render
 from tests.bench import schedulers
 from tests.bench.area import Subject
 from tests.bench.nextpnr import Nextpnr
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
 from tests.bench.yosys import SynthesisError
-from tests.sim.ghdl import GhdlError, Library, core_files
-from tests.sim.schedulers import ENTITIES
+from tests.hdl.ghdl import GhdlError, Library, core_files
 
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.
@@ -100,7 +100,7 @@ def _cells(row: Row, found: list[float | str]) -> tuple[str, ...]:
 
 
 def _schedulers() -> Iterator[Row]:
-    for policy in schedulers.POLICIES:
+    for policy in POLICIES:
         yield Row(policy, _scheduler(policy))
 
 
@@ -123,7 +123,7 @@ def _loop(policy: str) -> Make:
         configuration = {
             "entity": _LOOP_ENTITY,
             "scheduler": scheduler,
-            "is_preemptive": str(ENTITIES[policy].is_preemptive).lower(),
+            "is_preemptive": str(POLICIES[policy].is_preemptive).lower(),
         }
         file.write_text(render(file.name, configuration, Path(__file__).parent), encoding="ascii")
         library.analyse([file])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusesoc_firm.scheduling.models import POLICIES, Generics
+from fusesoc_firm.scheduling.models import Generics, make_model
+from fusesoc_firm.scheduling.policies import POLICIES
 from tests.bench.schedulers import LONGEST_TIME, SHORTEST_TIME, TIME_BITS
 from tests.bench.tables import MET, MISSED, Table, Tell
 
@@ -50,7 +51,7 @@ def used_of(policy: str, requesters: int, beats: int, seed: int) -> float:
     """Cycles with a beat in percent of all, with tasks of so many beats."""
     shape = (_SETS, requesters)
     periods = np.random.default_rng(seed).integers(SHORTEST_TIME, LONGEST_TIME, shape, endpoint=True)
-    model = POLICIES[policy](Generics(periods, np.full(shape, beats), time_bits=TIME_BITS))
+    model = make_model(policy, Generics(periods, np.full(shape, beats), time_bits=TIME_BITS))
     sets = np.arange(_SETS)
     everybody = np.ones(shape, np.bool_)
     left = np.full(shape, beats)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from fusesoc_firm.yaml_sections import Key, Section, keys_of
+from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.converter.order import order_of_config
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.message.library import libraries
+from fusesoc_firm.text.diagnostics import InputError
 from tests.expected import check_expected
 
 FOLDER = Path(__file__).parent / "config"

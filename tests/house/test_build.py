@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 from fusesoc import edalizer
 
-from fusesoc_firm.library_path import library_root
+from fusesoc_firm.tools.library_path import library_root
+from tests.hdl.ghdl import REPOSITORY
 from tests.processes import IGNORING_INTERRUPTS
-from tests.sim.ghdl import REPOSITORY
 
 CONFIGURATION = f"""\
 [main]
@@ -189,6 +189,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
+@pytest.mark.check
 def test_eight_runs_of_one_target_at_once(project: Path, tmp_path: Path) -> None:
     alone = ("one", "--target", "sim", "--build-root", "alone")
     assert build(project, *alone)[0] == 0
@@ -300,6 +301,7 @@ def cluster() -> Iterator[str]:
         yield machines.scheduler_address
 
 
+@pytest.mark.check
 @pytest.mark.xdist_group("dask")
 def test_on_a_cluster(project: Path, cluster: str) -> None:
     status, out, err = build(
@@ -316,6 +318,7 @@ def test_on_a_cluster(project: Path, cluster: str) -> None:
     assert not list((project / "build").glob(".firm_build*"))
 
 
+@pytest.mark.check
 @pytest.mark.xdist_group("dask")
 def test_ctrl_c_ends_what_runs_on_a_cluster(project: Path, cluster: str) -> None:
     running = start(project, "one", "two", "--target", "long", "--setup", "--cluster", cluster)

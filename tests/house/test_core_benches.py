@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from fusesoc_firm.building.plan import Build, make_plan
 from fusesoc_firm.building.pool import Pool
-from tests.sim.ghdl import CORES, core_files
+from tests.hdl.ghdl import CORES, core_description, core_files
 
 
 def benches() -> dict[str, dict[str, Any]]:
     """The targets with a flow of each core, by its name."""
     found = {}
     for path in sorted(CORES.rglob("*.core")):
-        core = yaml.safe_load(path.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
+        core = core_description(path)
         targets = {name: target for name, target in core["targets"].items() if "flow" in target}
         if targets:
             found[core["name"]] = targets
@@ -33,7 +32,7 @@ def tops(targets: Mapping[str, Mapping[str, Any]]) -> set[str]:
 
 @pytest.mark.parametrize("path", sorted(CORES.rglob("*.core")), ids=lambda path: path.stem)
 def test_every_bench_is_the_top_of_a_target(path: Path) -> None:
-    core = yaml.safe_load(path.read_text(encoding="utf-8").replace("CAPI=2:", "", 1))
+    core = core_description(path)
     named = core_files(str(path.relative_to(CORES).with_suffix("")), fileset="tb") if "tb" in core["filesets"] else []
     files = {file.stem for file in named if file.stem.endswith("_tb")}
     assert files == tops(benches().get(core["name"], {}))
@@ -44,6 +43,7 @@ def test_no_bench_is_without_a_core() -> None:
     assert tests == set().union(*map(tops, benches().values()))
 
 
+@pytest.mark.check
 @pytest.mark.skipif(shutil.which("iverilog") is None, reason="Icarus Verilog is not installed")
 def test_all_of_them_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "fusesoc.conf").write_text(f"[library.cores]\nlocation = {CORES}\n")

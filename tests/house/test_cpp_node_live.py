@@ -11,11 +11,12 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.host.simulator import BuiltSimulator, build_simulator
+from fusesoc_firm.simulation.simulator import BuiltSimulator, build_simulator
 from tests.house.test_live_simulators import SPECS, answers
-from tests.unit.host.drivers import Driver, compile_driver
-from tests.unit.host.test_cpp_node import puts, run
+from tests.node.drivers import Driver, cpp_driver
+from tests.node.test_cpp_node import puts, run
 
+pytestmark = pytest.mark.check
 SEED = 20261126
 TOOLS = [
     pytest.param(tool, marks=pytest.mark.skipif(shutil.which(tool) is None, reason=f"{tool} is not installed"))
@@ -24,8 +25,8 @@ TOOLS = [
 
 
 @pytest.fixture(scope="module")
-def driver(tmp_path_factory: pytest.TempPathFactory) -> Driver:
-    return compile_driver("node", tmp_path_factory.mktemp("node"))
+def driver() -> Driver:
+    return cpp_driver("node")
 
 
 @pytest.fixture(scope="module", params=TOOLS)

@@ -1,4 +1,4 @@
-"""docs/first_converter.md, followed to the letter in a workspace of the shape that it describes."""
+"""docs/tutorials/first-converter.md, followed to the letter in a workspace of the shape that it describes."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
-PAGE = REPOSITORY / "docs" / "first_converter.md"
+PAGE = REPOSITORY / "docs" / "tutorials" / "first-converter.md"
 needs_tools = pytest.mark.skipif(
     not all(map(shutil.which, ("ghdl", "verilator"))), reason="GHDL or Verilator is not installed"
 )

@@ -12,7 +12,8 @@ from types import MappingProxyType
 
 import pytest
 
-from fusesoc_firm import __version__, manifest
+from fusesoc_firm import __version__
+from fusesoc_firm.tools import manifest
 
 ROOT = Path(__file__).resolve().parents[2]
 FUSESOC = Path(sys.executable).parent / "fusesoc"
@@ -38,6 +39,7 @@ def run(
         "HOME": str(build_root.parent),
         "LANG": "C.UTF-8",
         "FUSESOC_FIRM_CACHE": str(build_root.parent / "store"),
+        **{name: os.environ[name] for name in ("OBJCACHE", "CCACHE_DIR") if name in os.environ},
         **environment,
     }
     command = ["fusesoc" if is_activated else str(FUSESOC), "run", f"--build-root={build_root}", f"--target={target}"]
@@ -58,6 +60,7 @@ def has_passed(done: subprocess.CompletedProcess[str]) -> bool:
     return done.returncode == 0 and "PASS 100/100" in done.stdout.splitlines()
 
 
+@pytest.mark.check
 @pytest.mark.parametrize(
     ("name", "messages"),
     [
@@ -98,6 +101,7 @@ def copy_project(destination: Path) -> Path:
     return destination
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("core", shared)
 def test_it_passes_and_a_second_time_comes_out_of_the_store(core: str, build_root: Path) -> None:
     assert has_passed(run(core, build_root))
@@ -107,6 +111,7 @@ def test_it_passes_and_a_second_time_comes_out_of_the_store(core: str, build_roo
         assert f"far: {core}-{instance} from store in " in second.stdout
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("core", shared)
 def test_it_passes_without_an_activated_environment(core: str, build_root: Path) -> None:
     (work_folder(build_root, core) / manifest.FILE).unlink(missing_ok=True)
@@ -114,6 +119,7 @@ def test_it_passes_without_an_activated_environment(core: str, build_root: Path)
     assert {"ghdl", "fusesoc", "edalize", "fusesoc-firm"} <= manifest.read(work_folder(build_root, core)).keys()
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("core", shared)
 def test_another_seed_and_waves_on_request(core: str, build_root: Path) -> None:
     waves = work_folder(build_root, core) / "waves.ghw"
@@ -127,6 +133,7 @@ def test_another_seed_and_waves_on_request(core: str, build_root: Path) -> None:
     waves.unlink()
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("core", "source", "right", "wrong"),
     [
@@ -166,6 +173,7 @@ def generated_files(build_root: Path) -> dict[str, bytes]:
     return found
 
 
+@pytest.mark.check
 @pytest.mark.parametrize("core", CORES)
 def test_two_clean_builds_are_the_same_to_the_byte(core: str, tmp_path: Path) -> None:
     builds = []

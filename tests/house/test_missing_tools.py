@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from tests.sim.ghdl import REPOSITORY
+from tests.hdl.ghdl import REPOSITORY
 
 CORE = REPOSITORY / "specs" / "obstacle" / "obstacle.core"
 APT = "apt-get install --no-install-recommends"
@@ -96,6 +96,7 @@ def test_every_target_is_listed() -> None:
     assert set(targets) == {"default", *SAID}
 
 
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("target", SAID)
 def test_missing_programs_are_named_with_their_packages(bare: Bare, target: str) -> None:
     said = bare.run(target)

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm import __version__, manifest
+from fusesoc_firm import __version__
+from fusesoc_firm.tools import manifest
 from tests.house.test_main_job import run
 
 pytestmark = pytest.mark.skipif(
@@ -29,6 +30,7 @@ def report(done: subprocess.CompletedProcess[str]) -> list[str]:
     return [lines[start].partition(";")[0], *lines[start + 1 : end + 1]]
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_all_simulators_receive_the_same(system: str, tmp_path: Path) -> None:
     reports, received = [], []
@@ -51,6 +53,7 @@ def build_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("simulators") / "build"
 
 
+@pytest.mark.check
 def test_another_seed(build_root: Path) -> None:
     first = run("quat2euler", build_root, "--SEED=7", "--STALL_PERCENT=60", target="sim_icarus")
     assert "seed 7, stalls 60 %, 8 bits; to repeat: +SEED=7 +STALL_PERCENT=60" in first.stdout
@@ -59,6 +62,7 @@ def test_another_seed(build_root: Path) -> None:
     assert report(first) == report(ghdl)
 
 
+@pytest.mark.check
 def test_a_wrong_answer_fails_by_exit_status(build_root: Path, tmp_path: Path) -> None:
     expected = build_root / f"robot_sys_sobel_{__version__}" / "sim_icarus" / "expected.txt"
     assert run("sobel", build_root, target="sim_icarus").returncode == 0
@@ -74,12 +78,14 @@ def test_a_wrong_answer_fails_by_exit_status(build_root: Path, tmp_path: Path) -
         assert "FAIL 6/7" in done.stdout.splitlines()
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize("system", [*SYSTEMS, "sobel", "robotic_arm"])
 def test_lint_is_clean(system: str, build_root: Path) -> None:
     done = run(system, build_root, target="lint")
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.check
 def test_what_a_simulator_cannot_do_is_said(build_root: Path) -> None:
     done = run("quat2euler_hls", build_root, target="sim_icarus")
     assert done.returncode != 0

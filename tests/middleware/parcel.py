@@ -1,11 +1,11 @@
-"""Parcel, a middleware that there is not: the example of docs/middlewares.md.
+"""Parcel, a fictitious middleware: the example of docs/how-to/add-a-middleware.md.
 
 A definition is a file `<Message>.parcel` in the folder of its package, a line for each field:
 
     id: u16                 # a number, flag or stamp
     place: lab/Place        # another message; without a package, of the same
     values: 3 f32           # three of them
-    samples: any i16        # as many as there are
+    samples: any i16        # a variable number of them
 
 On the wire a payload begins with the bytes CA FE. Numbers are aligned to two bytes, counted from behind these.
 """
@@ -17,7 +17,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from fusesoc_firm.diagnostics import Diagnostics, SourceRef, fail, nearest
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
@@ -29,12 +28,12 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
     StringType,
 )
 from fusesoc_firm.message.piece import Piece, read_lines
-from fusesoc_firm.wire import INTEGER_AND_FLOAT, WireRules
+from fusesoc_firm.message.wire import INTEGER_AND_FLOAT, WireRules
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail, nearest
 
 RULES = WireRules(
     scalars=MappingProxyType(
@@ -60,8 +59,8 @@ RULES = WireRules(
 TYPES = frozenset(RULES.scalars) | frozenset(RULES.compounds) | {"text"}
 
 
-def parse(text: str, name: MessageName, ros: RosVersion, file: str, diagnostics: Diagnostics) -> MessageDefinition:
-    """Reads a definition; a line that is wrong is noted, and hides nothing in the next."""
+def parse(text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics) -> MessageDefinition:
+    """Parse a definition; a fault in one line does not hide faults in later lines."""
     lines = [line.partition("#")[0] for line in read_lines(text, file)]
     fields = [_field(line, name.package, diagnostics) for line in lines if line.text]
     found = tuple(field for field in fields if field)
@@ -131,7 +130,8 @@ def _folders(environment: Mapping[str, str]) -> list[Path]:
 
 
 MIDDLEWARE = Middleware(
-    ros=RosVersion.add(3, "Parcel"),
+    number=3,
+    title="Parcel",
     words=("PARCEL",),
     rules=RULES,
     parse=parse,

@@ -17,21 +17,22 @@ import pytest
 from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE, constants_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.diagnostics import InputError
 from fusesoc_firm.frame.codec import decode, encode, pack_frame
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import middleware
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
+from fusesoc_firm.message.middleware import MIDDLEWARES
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.render import render
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.loop import PUBLISHER_ID, SUBSCRIBER_ID, loop_text
 from fusesoc_firm.verify.simulation import firm_library, simulate, write_frames
-from tests.unit.frame.oracle import is_same
+from tests.frame.oracle import is_same
 
 SEED = 20241123
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "middlewares.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "add-a-middleware.md"
 MODULE = Path(__file__).parent / "parcel.py"
 POSE, SCAN = MessageName("lab", "Pose"), MessageName("lab", "Scan")
 DEFINITIONS = {
@@ -44,7 +45,6 @@ DEFINITIONS = {
 @pytest.fixture
 def parcel(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     """The module, registered until the test ends."""
-    monkeypatch.setattr(RosVersion, "known", dict(RosVersion.known))
     monkeypatch.setattr(middleware, "_registered", dict(middleware._registered))
     words = dict(MIDDLEWARES)
     module = importlib.import_module("tests.middleware.parcel")
@@ -105,7 +105,7 @@ def packed(message: MessageName, value: dict[str, Any]) -> bytes:
 def test_its_layout_and_codec(message: MessageName, parcel: ModuleType, package: Path) -> None:
     print(f"seed {SEED}")
     chance = random.Random(SEED)
-    library = libraries([package], None, None)[parcel.MIDDLEWARE.ros]
+    library = libraries([package], None, None)[parcel.MIDDLEWARE]
     frame = frame_of(message, library.closure(message))
     assert (frame.ros.title, frame.is_fixed_size) == ("Parcel", message == POSE)
     for _ in range(30):
@@ -122,7 +122,7 @@ def test_its_converters_in_simulation(
     """What the host sends to the subscriber comes back from the publisher."""
     print(f"seed {SEED}")
     chance = random.Random(SEED)
-    definitions = MessageLibrary(parcel.MIDDLEWARE.ros, [package]).closure(message)
+    definitions = MessageLibrary(parcel.MIDDLEWARE, [package]).closure(message)
     frame = frame_of(message, definitions)
     payloads = [packed(message, value_of(message, chance)) for _ in range(5)]
     write_frames(
@@ -147,7 +147,7 @@ def write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
 
 
 def test_its_signature(parcel: ModuleType, package: Path) -> None:
-    definitions = MessageLibrary(parcel.MIDDLEWARE.ros, [package]).closure(POSE)
+    definitions = MessageLibrary(parcel.MIDDLEWARE, [package]).closure(POSE)
     assert signature(POSE, definitions) == parcel.checksum(POSE, definitions)
     text = render(CONSTANTS_TEMPLATE, constants_configuration(POSE, definitions, "lab_pose_pkg"))
     assert f'"{parcel.checksum(POSE, definitions)}"' in text
@@ -155,7 +155,7 @@ def test_its_signature(parcel: ModuleType, package: Path) -> None:
 
 def test_its_faults_and_its_places(parcel: ModuleType, package: Path) -> None:
     (package / "Bad.parcel").write_text("id u16\nlevel: f33\nsome: -1 u8\n", encoding="utf-8")
-    library = MessageLibrary(parcel.MIDDLEWARE.ros, (), {"PARCEL_HOME": str(package)})
+    library = MessageLibrary(parcel.MIDDLEWARE, (), {"PARCEL_HOME": str(package)})
     with pytest.raises(InputError) as raised:
         library.get(MessageName("lab", "Bad"))
     places = [(fault.source.line, fault.message) for fault in raised.value.diagnostics if fault.source]
@@ -182,7 +182,7 @@ def test_a_system_speaks_it(package: Path) -> None:
         f"raise SystemExit(main(['system', 'check', {str(specification)!r}, '--path', {str(package)!r}]))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=PAGE.parents[1]
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=PAGE.parents[2]
     )
     assert done.stdout.endswith("lab is right: 1 subscriber, 0 accelerators, 1 publisher\n"), done.stderr
 

@@ -1,4 +1,4 @@
-"""`make proofs`: prove everything, see every broken copy fail, and write the table of docs/proofs.md.
+"""`make proofs`: prove everything, see every broken copy fail, and write the table of docs/figures/proofs.md.
 
 The exit code is 1 if a property is not proved or a fault is not found.
 """

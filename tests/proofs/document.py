@@ -1,15 +1,15 @@
-"""docs/proofs.md: its tables hold what is proved, of which sizes, by what, and how long it took."""
+"""docs/figures/proofs.md: its tables hold what is proved, of which sizes, by what, and how long it took."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
 
+from tests.hdl.ghdl import REPOSITORY
 from tests.proofs.all import PROOFS
 from tests.proofs.proof import Proof
-from tests.sim.ghdl import REPOSITORY
 
-DOCUMENT = REPOSITORY / "docs" / "proofs.md"
+DOCUMENT = REPOSITORY / "docs" / "figures" / "proofs.md"
 
 _TABLES = re.compile(r"(?<=<!-- by make proofs -->\n).*?(?=<!-- end -->)", re.DOTALL)
 _COLUMNS = ("harness", "of", "sizes", "method", "faults found", "seconds")

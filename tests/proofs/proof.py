@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.hdl.ghdl import Generic, Library, core_files
 from tests.proofs.symbiyosys import Outcome, Task
-from tests.sim.ghdl import Generic, Library, core_files
 
 HARNESSES = Path(__file__).parent / "harness"
 

@@ -225,7 +225,7 @@ def _parallel(policy: int, name: str) -> tuple[Proof, ...]:
             Mutation(file, "grant_valid_r  <= '1'", "grant_valid_r  <= not beat", ("grant_stays_valid",)),
         ),
         "scheduler_preemption": (
-            Mutation(file, "beats < SHORTEST_RUN else '0'", "beats < SHORTEST_RUN-1 else '0'", ("no_short_run",)),
+            Mutation(file, "beats < SHORTEST_RUN else", "beats < SHORTEST_RUN-1 else", ("no_short_run",)),
         ),
         "scheduler_service": (
             Mutation(

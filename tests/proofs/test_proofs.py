@@ -22,6 +22,7 @@ def _size_name(proof: Proof, size: object) -> str:
     return f"{proof.name}-{size}"
 
 
+@pytest.mark.check
 @needs_solver
 @pytest.mark.parametrize(("proof", "size"), _SIZES, ids=[_size_name(*each) for each in _SIZES])
 def test_it_is_proved(proof: Proof, size: dict[str, int], tmp_path: Path) -> None:
@@ -29,6 +30,7 @@ def test_it_is_proved(proof: Proof, size: dict[str, int], tmp_path: Path) -> Non
     assert outcome.is_proved, outcome.log
 
 
+@pytest.mark.check
 @needs_solver
 @pytest.mark.parametrize(("proof", "mutation", "label"), _FAULTS, ids=[f"{p.name}-{label}" for p, _, label in _FAULTS])
 def test_a_broken_copy_fails(proof: Proof, mutation: Mutation, label: str, tmp_path: Path) -> None:
@@ -54,4 +56,4 @@ def test_a_mutation_must_find_its_text_once(file: str, old: str, tmp_path: Path)
 def test_the_document_holds_what_is_proved() -> None:
     tables = document.tables()
     for line in [*document.properties(), *(document.row(proof) for proof in PROOFS)]:
-        assert line in tables, f"docs/proofs.md has no row {line} `make proofs` writes it"
+        assert line in tables, f"docs/figures/proofs.md has no row {line} `make proofs` writes it"

@@ -1,4 +1,4 @@
-"""The end of a simulator's pipe (docs/transport.md) that sends every frame back at once, of whatever size."""
+"""The end of a simulator's pipe (docs/reference/transports.md) that sends every frame back at once, of any size."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from tests.ros.cpp_nodes import NodeProcess, Ros
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SPECS = REPOSITORY / "specs"
-MODEL_SIMULATOR = REPOSITORY / "tests/unit/host/model_simulator.py"
+MODEL_SIMULATOR = REPOSITORY / "tests/node/model_simulator.py"
 
 
 def model_address(*arguments: str) -> str:

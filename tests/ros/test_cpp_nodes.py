@@ -20,21 +20,23 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
-from fusesoc_firm.host.node.description import describe
-from fusesoc_firm.host.node.steps import write_ways
-from fusesoc_firm.host.simulator import build_simulator
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import MessageName, RosVersion
-from fusesoc_firm.system.generator import load_system
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.node.description import describe
+from fusesoc_firm.node.steps import write_ways
+from fusesoc_firm.simulation.simulator import build_simulator
+from fusesoc_firm.system.system_core import load_system
+from tests.applications.images import filtered, image, load_model
 from tests.ros.cpp_nodes import Node, Peer, Ros, missing_ros, running_ros
-from tests.sim.images import filtered, image, load_model
 
 REPOSITORY = Path(__file__).parents[2]
 SPECS = REPOSITORY / "specs"
 ECHO_SIMULATOR = f"pipe:exec {sys.executable} {Path(__file__).with_name('echo_simulator.py')}"
-MODEL_SIMULATOR = REPOSITORY / "tests/unit/host/model_simulator.py"
+MODEL_SIMULATOR = REPOSITORY / "tests/node/model_simulator.py"
 APPLICATIONS = ["quat2euler", "image_pipeline", "multi_type", "mobile_robot", "robotic_arm", "sobel"]
 SEED = 20240721
+pytestmark = pytest.mark.check
 # A simulator on a machine that does other things, too, comes to rest late.
 PATIENT = ("--drain", "100")
 
@@ -214,8 +216,8 @@ def test_blocks_in_software_run_beside_the_hardware(workshop: Workshop) -> None:
     spec = workshop.specification("image_pipeline_software")
     model, source = load_model("image_pipeline"), random.Random(SEED)
     name = MessageName("sensor_msgs", "Image")
-    frame = frame_of(name, MessageLibrary(RosVersion.ROS1).closure(name))
-    software = f"PYTHONPATH={REPOSITORY} exec {sys.executable} -m fusesoc_firm.host.software_process {spec}"
+    frame = frame_of(name, MessageLibrary(middleware_of(1)).closure(name))
+    software = f"PYTHONPATH={REPOSITORY} exec {sys.executable} -m fusesoc_firm.node.software_process {spec}"
     program, transport = workshop.program("image_pipeline_software"), live_simulator(workshop, spec)
     with (
         Node(workshop.ros, program, transport, *PATIENT, "--software", software) as node,

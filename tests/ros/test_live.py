@@ -21,6 +21,7 @@ from tests.ros.cpp_nodes import Peer, Ros, missing_ros, running_ros
 from tests.ros.live_nodes import LiveNode, model_address, paced, specification
 
 # Topics of no bytes and of any number, with no accelerator between.
+pytestmark = pytest.mark.check
 ECHO = """\
 project: {name: echo, width: 512}
 blocks:

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TOOLS = Path(__file__).resolve().parent
 ZYNQ = ("zynq7000", "zcu104")
 WITH_KERNELS = "quat2euler_hls"
-# Six applications (docs/applications.md), and two of them with accelerators in C++ and in Verilog.
+# Six applications (docs/reference/applications.md), and two of them with accelerators in C++ and in Verilog.
 CORES = (
     *("image_pipeline", "mobile_robot", "multi_type", "quat2euler", "robotic_arm", "sobel"),
     *(WITH_KERNELS, "multi_type_verilog"),
@@ -119,6 +119,7 @@ class Project:
         return done.stderr
 
 
+@pytest.mark.one_in(9)
 @pytest.mark.parametrize("board", ZYNQ)
 @pytest.mark.parametrize("core", CORES)
 def test_every_system_beside_a_processor(tmp_path: Path, core: str, board: str) -> None:
@@ -132,6 +133,7 @@ def test_every_system_beside_a_processor(tmp_path: Path, core: str, board: str) 
     )
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("core", ["quat2euler", "multi_type_verilog"])
 def test_a_project_of_quartus(tmp_path: Path, core: str) -> None:
     lines = Project(tmp_path / "build", core, "quartus").lines()
@@ -148,6 +150,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("board", "clock", "pin"), [("zynq7000", "clk_fpga_", "FCLK_CLK"), ("zcu104", "clk_pl_", "pl_clk")]
 )
@@ -219,6 +222,7 @@ ADDRESS = "assign_bd_address -offset 0x40400000 -range 64K -target_address_space
 DESIGN = "robot_zynq7000.bd"
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -302,6 +306,7 @@ def kernel(tmp_path_factory: pytest.TempPathFactory) -> Project:
     return Project(tmp_path_factory.mktemp("kernel") / "build", WITH_KERNELS, "zcu104")
 
 
+@pytest.mark.one_in(4)
 @pytest.mark.parametrize(
     ("name", "old", "new", "message"),
     [

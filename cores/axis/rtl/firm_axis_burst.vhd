@@ -6,8 +6,8 @@
 -- whose; a frame's last one waits for nobody. A held beat therefore never blocks another source, and a run has no gap.
 -- In which sources a frame has begun is kept in a memory, a bit a source. It is cleared in the 2**n cycles after reset,
 -- n bits being the index; nothing is taken meanwhile.
--- The paths from input to output are combinational, and what is offered may change with the source until it is taken, as
--- behind the multiplexer: put a register slice behind it, which shows it to nobody.
+-- The paths from input to output are combinational, and what is offered may change with the source until it is taken,
+-- as behind the multiplexer: put a register slice behind it, which shows it to nobody.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,7 +17,8 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_burst is
   generic (
     WIDTH   : integer := 8;
-    SOURCES : integer := 2);
+    SOURCES : integer := 2
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -34,7 +35,8 @@ entity firm_axis_burst is
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_axis_burst;
 
 architecture rtl of firm_axis_burst is

@@ -2,8 +2,8 @@
 -- Takes the id off a frame and routes the rest to one of DESTINATIONS. Data is broadcast, only `tvalid` and
 -- `tready` are decoded. At 8 bits the id's beat ends here; at wider streams it goes on with its lowest lane void
 -- (the bytes are still there, `tkeep` is unchanged), so nothing has to be re-aligned. A frame whose id belongs to
--- nobody, or that is nothing but its id at 8 bits, is swallowed and `id_error` pulses in the cycle after its first beat.
--- The paths from input to output are combinational: put a register slice in front.
+-- nobody, or that is nothing but its id at 8 bits, is swallowed and `id_error` pulses in the cycle after its first
+-- beat. The paths from input to output are combinational: put a register slice in front.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -12,7 +12,8 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_demux is
   generic (
     WIDTH        : integer := 8;
-    DESTINATIONS : integer := 2);
+    DESTINATIONS : integer := 2
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -31,7 +32,8 @@ entity firm_axis_demux is
     m_axis_tvalid : out std_logic_vector(DESTINATIONS-1 downto 0);
     m_axis_tready : in  std_logic_vector(DESTINATIONS-1 downto 0);
 
-    id_error : out std_logic);
+    id_error : out std_logic
+  );
 end entity firm_axis_demux;
 
 architecture rtl of firm_axis_demux is
@@ -76,11 +78,13 @@ begin
     generic map (
       WORDS   => DESTINATIONS,
       WIDTH   => 1,
-      DECODED => true)
+      DECODED => true
+    )
     port map (
       words_in => m_axis_tready,
       index    => index,
-      word     => ready);
+      word     => ready
+    );
 
   valid             <= s_axis_tvalid and forward;
   s_axis_tready_out <= ready(0) or not forward;

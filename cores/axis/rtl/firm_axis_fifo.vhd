@@ -11,7 +11,8 @@ entity firm_axis_fifo is
   generic (
     WIDTH : integer := 8;
     -- Beats of memory, 2 or more; a power of two wastes none.
-    DEPTH : integer := 16);
+    DEPTH : integer := 16
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -26,7 +27,8 @@ entity firm_axis_fifo is
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_axis_fifo;
 
 architecture rtl of firm_axis_fifo is

@@ -14,7 +14,8 @@ entity firm_axis_length_buffer is
   generic (
     WIDTH : integer := 8;
     -- Beats of memory, 2 or more: the longest frame, id and length included.
-    DEPTH : integer := 64);
+    DEPTH : integer := 64
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -36,7 +37,8 @@ entity firm_axis_length_buffer is
     s_frame_error      : in  std_logic                    := '0';
     s_frame_error_code : in  std_logic_vector(3 downto 0) := (others => '0');
     frame_error        : out std_logic;
-    frame_error_code   : out std_logic_vector(3 downto 0));
+    frame_error_code   : out std_logic_vector(3 downto 0)
+  );
 end entity firm_axis_length_buffer;
 
 architecture rtl of firm_axis_length_buffer is
@@ -199,7 +201,8 @@ begin
   u_queue : entity firm.firm_axis_fifo
     generic map (
       WIDTH => 32,
-      DEPTH => QUEUE_DEPTH)
+      DEPTH => QUEUE_DEPTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -212,7 +215,8 @@ begin
       m_axis_tkeep  => open,
       m_axis_tvalid => next_valid,
       m_axis_tlast  => open,
-      m_axis_tready => start);
+      m_axis_tready => start
+    );
 
   -- Out -------------------------------------------------------------------------------------------------------------
 

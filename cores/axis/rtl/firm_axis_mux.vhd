@@ -9,7 +9,8 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_mux is
   generic (
     WIDTH   : integer := 8;
-    SOURCES : integer := 2);
+    SOURCES : integer := 2
+  );
   port (
     source : in std_logic_vector(index_bits(SOURCES)-1 downto 0);
     enable : in std_logic;
@@ -25,7 +26,8 @@ entity firm_axis_mux is
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_axis_mux;
 
 architecture rtl of firm_axis_mux is
@@ -47,11 +49,13 @@ begin
     generic map (
       WORDS   => SOURCES,
       WIDTH   => WIDTH,
-      DECODED => true)
+      DECODED => true
+    )
     port map (
       words_in => s_axis_tdata,
       index    => source,
-      word     => m_axis_tdata);
+      word     => m_axis_tdata
+    );
 
   -- A beat of one byte is full.
   byte_wide : if WIDTH = 8 generate
@@ -63,32 +67,38 @@ begin
       generic map (
         WORDS   => SOURCES,
         WIDTH   => WIDTH/8,
-        DECODED => true)
+        DECODED => true
+      )
       port map (
         words_in => s_axis_tkeep,
         index    => source,
-        word     => m_axis_tkeep);
+        word     => m_axis_tkeep
+      );
   end generate wider;
 
   u_select_tlast : entity firm.firm_axis_select
     generic map (
       WORDS   => SOURCES,
       WIDTH   => 1,
-      DECODED => true)
+      DECODED => true
+    )
     port map (
       words_in => s_axis_tlast,
       index    => source,
-      word     => chosen_tlast);
+      word     => chosen_tlast
+    );
 
   u_select_tvalid : entity firm.firm_axis_select
     generic map (
       WORDS   => SOURCES,
       WIDTH   => 1,
-      DECODED => true)
+      DECODED => true
+    )
     port map (
       words_in => s_axis_tvalid,
       index    => source,
-      word     => chosen_tvalid);
+      word     => chosen_tvalid
+    );
 
   take          <= enable and m_axis_tready;
   m_axis_tvalid <= enable and chosen_tvalid(0);

@@ -11,7 +11,8 @@ use firm.firm_axis_pkg.all;
 
 entity firm_axis_pack is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -28,7 +29,8 @@ entity firm_axis_pack is
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_axis_pack;
 
 architecture rtl of firm_axis_pack is

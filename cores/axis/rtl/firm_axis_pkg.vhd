@@ -27,7 +27,8 @@ package firm_axis_pkg is
   -- The number of ones in a contiguous `keep`, which is one of a stream: it has 1 to 64 bits.
   function lanes_kept(keep : std_logic_vector) return std_logic_vector;
 
-  -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one AND.
+  -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one
+  -- AND.
   function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector;
 
 end package firm_axis_pkg;

@@ -10,7 +10,8 @@ use firm.firm_axis_pkg.all;
 
 entity firm_axis_register_slice is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -28,7 +29,8 @@ entity firm_axis_register_slice is
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_axis_register_slice;
 
 architecture rtl of firm_axis_register_slice is

@@ -11,7 +11,8 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_resize is
   generic (
     S_WIDTH : integer := 8;
-    M_WIDTH : integer := 64);
+    M_WIDTH : integer := 64
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -29,7 +30,8 @@ entity firm_axis_resize is
     m_axis_tkeep  : out std_logic_vector(M_WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_axis_resize;
 
 architecture rtl of firm_axis_resize is
@@ -126,29 +128,35 @@ begin
     u_end : entity firm.firm_axis_select
       generic map (
         WORDS => PIECES,
-        WIDTH => 1)
+        WIDTH => 1
+      )
       port map (
         words_in => ends,
         index    => std_logic_vector(index_r),
-        word     => is_done);
+        word     => is_done
+      );
 
     u_data : entity firm.firm_axis_select
       generic map (
         WORDS => PIECES,
-        WIDTH => M_WIDTH)
+        WIDTH => M_WIDTH
+      )
       port map (
         words_in => s_axis_tdata,
         index    => std_logic_vector(index_r),
-        word     => m_axis_tdata);
+        word     => m_axis_tdata
+      );
 
     u_keep : entity firm.firm_axis_select
       generic map (
         WORDS => PIECES,
-        WIDTH => LANES)
+        WIDTH => LANES
+      )
       port map (
         words_in => s_axis_tkeep,
         index    => std_logic_vector(index_r),
-        word     => m_axis_tkeep);
+        word     => m_axis_tkeep
+      );
 
     m_axis_tvalid <= s_axis_tvalid;
     m_axis_tlast  <= s_axis_tlast and is_done(0);

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- One word out of many: a tree of multiplexers, two levels of which fit a 6-input LUT a bit. A dynamic array index costs
--- about twice of it through `ghdl --synth`. An index beyond the last word reads any of them, or zeros.
--- If DECODED, the tree is written as ANDs of words and decoded pairs of index bits, and ORs. Yosys maps that as it stands,
--- at the 4-to-1 multiplexers that fit a LUT, and takes nested multiplexers apart. That saves a third of the LUTs for many
--- words that share nothing, and costs more for words with constants, which nested multiplexers absorb.
+-- One word out of many: a tree of multiplexers, two levels of which fit a 6-input LUT a bit. A dynamic array index
+-- costs about twice of it through `ghdl --synth`. An index beyond the last word reads any of them, or zeros. If
+-- DECODED, the tree is written as ANDs of words and decoded pairs of index bits, and ORs. Yosys maps that as it stands,
+-- at the 4-to-1 multiplexers that fit a LUT, and takes nested multiplexers apart. That saves a third of the LUTs for
+-- many words that share nothing, and costs more for words with constants, which nested multiplexers absorb.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -13,17 +13,19 @@ entity firm_axis_select is
   generic (
     WORDS   : integer  := 4;  -- 1 and more
     WIDTH   : positive := 8;
-    DECODED : boolean  := false);
+    DECODED : boolean  := false
+  );
   port (
     words_in : in  std_logic_vector(WORDS*WIDTH-1 downto 0);  -- word 0 lowest
     index    : in  std_logic_vector(index_bits(WORDS)-1 downto 0);
-    word     : out std_logic_vector(WIDTH-1 downto 0));
+    word     : out std_logic_vector(WIDTH-1 downto 0)
+  );
 end entity firm_axis_select;
 
 architecture rtl of firm_axis_select is
 
-  -- Parts the words by the highest bit of the number that tells them apart. Simulation goes only the way to the word, so
-  -- thousands of them take no more time than a few.
+  -- Parts the words by the highest bit of the number that tells them apart. Simulation goes only the way to the word,
+  -- so thousands of them take no more time than a few.
   function chosen(candidates, number : std_logic_vector) return std_logic_vector is
     constant COUNT : positive := candidates'length / WIDTH;
     -- The largest power of two below COUNT; 0 for one word, for which GHDL evaluates it, too.
@@ -44,7 +46,8 @@ architecture rtl of firm_axis_select is
     constant COUNT  : positive := candidates'length / WIDTH;
     constant LOW    : natural  := candidates'low;
     constant PLACES : natural  := clog2(COUNT);
-    -- The bits that choose a part, and those that choose within it. No word is parted in none, but GHDL evaluates it, too.
+    -- The bits that choose a part, and those that choose within it. No word is parted in none, but GHDL evaluates it,
+    -- too.
     constant HERE   : natural  := 2 - PLACES mod 2;
     constant BELOW  : natural  := max(0, PLACES-HERE);
     variable first  : natural;

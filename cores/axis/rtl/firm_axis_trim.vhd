@@ -12,7 +12,8 @@ entity firm_axis_trim is
   generic (
     WIDTH : integer := 8;
     -- So many bytes of filling are no fault.
-    SLACK : natural := 0);
+    SLACK : natural := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -40,7 +41,8 @@ entity firm_axis_trim is
     m_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     m_last  : out std_logic;
     m_valid : out std_logic;
-    m_ready : in  std_logic);
+    m_ready : in  std_logic
+  );
 end entity firm_axis_trim;
 
 architecture rtl of firm_axis_trim is

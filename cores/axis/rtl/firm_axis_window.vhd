@@ -14,7 +14,8 @@ entity firm_axis_window is
   generic (
     WIDTH : integer := 8;
     -- So many low lanes of a frame's first beat hold nothing, though `tkeep` has them: 0 to WIDTH/8-1.
-    VOID_LANES : integer := 0);
+    VOID_LANES : integer := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -35,7 +36,8 @@ entity firm_axis_window is
     take_valid : in std_logic;
     take       : in std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     -- One cycle of it drops the rest of the frame, in preference to `take`; where the window shows none, the next one.
-    skip : in std_logic);
+    skip : in std_logic
+  );
 end entity firm_axis_window;
 
 architecture rtl of firm_axis_window is
@@ -180,7 +182,8 @@ begin
 
     u_slice : entity firm.firm_axis_register_slice
       generic map (
-        WIDTH => WIDTH)
+        WIDTH => WIDTH
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -195,7 +198,8 @@ begin
         m_axis_tuser  => next_user,
         m_axis_tvalid => next_tvalid,
         m_axis_tlast  => next_tlast,
-        m_axis_tready => move);
+        m_axis_tready => move
+      );
 
     next_first <= next_user(7);
     next_bytes <= resize(unsigned(next_user(6 downto 0)), COUNT_BITS);
@@ -224,8 +228,9 @@ begin
 
     taken   <= unsigned(take) when take_valid = '1' else (others => '0');
     move    <= '1' when filled_r = '0' or dropping = '1' or (take_valid = '1' and taken >= left_r) else '0';
-    uses_up <= '1' when filled_r = '1' and dropping = '0' and ends_next = '1' and take_valid = '1' and taken = joined
-               else '0';
+    uses_up <= '1' when filled_r = '1' and dropping = '0' and ends_next = '1' and take_valid = '1'
+                        and taken = joined else
+               '0';
 
     move_beat : process (clk)
     begin

@@ -9,7 +9,8 @@ entity firm_message_fork is
   generic (
     SINKS : integer := 2;
     -- Bits of segment_valid, which a sink that has the message sees no more.
-    SEGMENTS : integer := 1);
+    SEGMENTS : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -22,7 +23,8 @@ entity firm_message_fork is
     sink_valid         : out std_logic_vector(SINKS-1 downto 0);
     sink_ready         : in  std_logic_vector(SINKS-1 downto 0);
     -- The first sink's bits lie lowest.
-    sink_segment_valid : out std_logic_vector(SINKS*SEGMENTS-1 downto 0));
+    sink_segment_valid : out std_logic_vector(SINKS*SEGMENTS-1 downto 0)
+  );
 end entity firm_message_fork;
 
 architecture rtl of firm_message_fork is
@@ -31,7 +33,7 @@ architecture rtl of firm_message_fork is
 
   signal has_it_r : std_logic_vector(SINKS-1 downto 0) := (others => '0');  -- sinks that took the message already
   signal taking   : std_logic_vector(SINKS-1 downto 0);
-  signal release  : std_logic;
+  signal is_done  : std_logic;
 
 begin
 
@@ -50,13 +52,13 @@ begin
       <= source_segment_valid when has_it_r(sink) = '0' else (others => '0');
   end generate offer;
 
-  release      <= '1' when source_valid = '1' and (has_it_r or taking) = ALL_SINKS else '0';
-  source_ready <= release;
+  is_done      <= '1' when source_valid = '1' and (has_it_r or taking) = ALL_SINKS else '0';
+  source_ready <= is_done;
 
   remember : process (clk)
   begin
     if rising_edge(clk) then
-      if rst_n = '0' or release = '1' or source_valid = '0' then
+      if rst_n = '0' or is_done = '1' or source_valid = '0' then
         has_it_r <= (others => '0');
       else
         has_it_r <= has_it_r or taking;

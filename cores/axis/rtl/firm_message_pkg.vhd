@@ -5,9 +5,9 @@ use ieee.std_logic_1164.all;
 
 package firm_message_pkg is
 
-  -- Whether a value has the bits of a constant: `value = reference`, a bit at a time. GHDL 2.0 synthesises a constant of
-  -- 64 bits as zero if its low half is zero, and writes one of more than 32 bits into Verilog as a text; with this, none is
-  -- left that is wider than a bit.
+  -- Whether a value has the bits of a constant: `value = reference`, a bit at a time. GHDL 2.0 synthesises a constant
+  -- of 64 bits as zero if its low half is zero, and writes one of more than 32 bits into Verilog as a text; with this,
+  -- none is left that is wider than a bit.
   function is_equal(value, reference : std_logic_vector) return boolean;
 
 end package firm_message_pkg;

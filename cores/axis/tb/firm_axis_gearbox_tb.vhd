@@ -16,7 +16,8 @@ entity firm_axis_gearbox_tb is
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;
     WATCHDOG      : integer := 1000;
-    QUIET         : integer := 100);
+    QUIET         : integer := 100
+  );
 end entity firm_axis_gearbox_tb;
 
 architecture simulation of firm_axis_gearbox_tb is
@@ -63,7 +64,8 @@ begin
       STALL_PERCENT => STALL_PERCENT,
       SHOWN         => 0,
       WATCHDOG      => WATCHDOG,
-      QUIET         => QUIET)
+      QUIET         => QUIET
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -77,11 +79,13 @@ begin
       s_axis_tid    => out_tid,
       s_axis_tvalid => out_tvalid,
       s_axis_tlast  => out_tlast,
-      s_axis_tready => out_tready);
+      s_axis_tready => out_tready
+    );
 
   u_window : entity firm.firm_axis_window
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -95,7 +99,8 @@ begin
       is_last       => is_last,
       take_valid    => take,
       take          => count,
-      skip          => '0');
+      skip          => '0'
+    );
 
   choose_piece : process (available, is_last, wanted_r, rst_n)
     variable offered : natural;
@@ -133,7 +138,8 @@ begin
 
   u_pack : entity firm.firm_axis_pack
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -146,11 +152,13 @@ begin
       m_axis_tkeep  => out_tkeep,
       m_axis_tvalid => out_tvalid,
       m_axis_tlast  => out_tlast,
-      m_axis_tready => out_tready);
+      m_axis_tready => out_tready
+    );
 
   u_tid : entity firm.firm_sim_tid
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk         => clk,
       rst_n       => rst_n,
@@ -158,7 +166,8 @@ begin
       axis_tvalid => out_tvalid,
       axis_tlast  => out_tlast,
       axis_tready => out_tready,
-      axis_tid    => out_tid);
+      axis_tid    => out_tid
+    );
 
   find_gaps : process (clk)
   begin

@@ -17,8 +17,9 @@ entity firm_axis_length_buffer_tb is
     SINK_STALL_PERCENT : integer := 0;
     -- So many errors of a publisher, early on.
     PUBLISHER_ERRORS : integer := 0;
-    WATCHDOG : integer := 2000;
-    QUIET    : integer := 200);
+    WATCHDOG         : integer := 2000;
+    QUIET            : integer := 200
+  );
 end entity firm_axis_length_buffer_tb;
 
 architecture simulation of firm_axis_length_buffer_tb is
@@ -62,7 +63,8 @@ begin
       STALL_PERCENT => STALL_PERCENT,
       SHOWN         => 0,
       WATCHDOG      => WATCHDOG,
-      QUIET         => QUIET)
+      QUIET         => QUIET
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -77,12 +79,14 @@ begin
       s_axis_tvalid => out_tvalid,
       s_axis_tlast  => out_tlast,
       s_axis_tready => out_tready,
-      frame_error   => frame_error);
+      frame_error   => frame_error
+    );
 
   u_part : entity firm.firm_axis_length_buffer
     generic map (
       WIDTH => WIDTH,
-      DEPTH => DEPTH)
+      DEPTH => DEPTH
+    )
     port map (
       clk                => clk,
       rst_n              => rst_n,
@@ -99,13 +103,15 @@ begin
       s_frame_error      => s_frame_error,
       s_frame_error_code => "0010",
       frame_error        => frame_error(0),
-      frame_error_code   => frame_error_code);
+      frame_error_code   => frame_error_code
+    );
 
   u_stall : entity firm.firm_sim_stall
     generic map (
       WIDTH         => WIDTH,
       SEED          => SEED,
-      STALL_PERCENT => SINK_STALL_PERCENT)
+      STALL_PERCENT => SINK_STALL_PERCENT
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -118,11 +124,13 @@ begin
       m_axis_tkeep  => out_tkeep,
       m_axis_tvalid => out_tvalid,
       m_axis_tlast  => out_tlast,
-      m_axis_tready => out_tready);
+      m_axis_tready => out_tready
+    );
 
   u_tid : entity firm.firm_sim_tid
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk         => clk,
       rst_n       => rst_n,
@@ -130,7 +138,8 @@ begin
       axis_tvalid => out_tvalid,
       axis_tlast  => out_tlast,
       axis_tready => out_tready,
-      axis_tid    => out_tid);
+      axis_tid    => out_tid
+    );
 
   publisher : process (clk)
     variable count : natural := 0;

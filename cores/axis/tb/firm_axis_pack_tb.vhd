@@ -27,7 +27,8 @@ entity firm_axis_pack_tb is
     EMPTY_FRAMES : boolean := false;
     -- The sink is ready only where it saw `tvalid`, which must not wait for it.
     LATE_READY : boolean := false;
-    WATCHDOG   : integer := 1000);
+    WATCHDOG   : integer := 1000
+  );
 end entity firm_axis_pack_tb;
 
 architecture simulation of firm_axis_pack_tb is
@@ -60,7 +61,8 @@ begin
 
   u_pack : entity firm.firm_axis_pack
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -73,7 +75,8 @@ begin
       m_axis_tkeep  => tkeep,
       m_axis_tvalid => tvalid,
       m_axis_tlast  => tlast,
-      m_axis_tready => tready);
+      m_axis_tready => tready
+    );
 
   send : process
     variable content  : frame_file_t;

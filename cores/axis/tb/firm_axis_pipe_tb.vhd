@@ -18,9 +18,10 @@ entity firm_axis_pipe_tb is
     STALL_PERCENT      : integer := 0;
     SINK_STALL_PERCENT : integer := 0;
     -- The sink takes nothing until the part is full, which must hold so many beats; 0: not tested.
-    CAPACITY : integer := 0;
+    CAPACITY      : integer := 0;
     WATCHDOG      : integer := 1000;
-    QUIET         : integer := 100);
+    QUIET         : integer := 100
+  );
 end entity firm_axis_pipe_tb;
 
 architecture simulation of firm_axis_pipe_tb is
@@ -64,7 +65,8 @@ begin
       STALL_PERCENT => STALL_PERCENT,
       SHOWN         => 0,
       WATCHDOG      => WATCHDOG,
-      QUIET         => QUIET)
+      QUIET         => QUIET
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -78,13 +80,15 @@ begin
       s_axis_tid    => out_tid,
       s_axis_tvalid => out_tvalid,
       s_axis_tlast  => out_tlast,
-      s_axis_tready => out_tready);
+      s_axis_tready => out_tready
+    );
 
   slice : if PART = "register_slice" generate
 
     u_part : entity firm.firm_axis_register_slice
       generic map (
-        WIDTH => WIDTH)
+        WIDTH => WIDTH
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -98,7 +102,8 @@ begin
         m_axis_tid    => out_tid,
         m_axis_tvalid => part_tvalid,
         m_axis_tlast  => part_tlast,
-        m_axis_tready => part_tready);
+        m_axis_tready => part_tready
+      );
 
   end generate slice;
 
@@ -106,7 +111,8 @@ begin
 
     u_tid : entity firm.firm_sim_tid
       generic map (
-        WIDTH => WIDTH)
+        WIDTH => WIDTH
+      )
       port map (
         clk         => clk,
         rst_n       => rst_n,
@@ -114,12 +120,14 @@ begin
         axis_tvalid => part_tvalid,
         axis_tlast  => part_tlast,
         axis_tready => part_tready,
-        axis_tid    => out_tid);
+        axis_tid    => out_tid
+      );
 
     u_part : entity firm.firm_axis_fifo
       generic map (
         WIDTH => WIDTH,
-        DEPTH => DEPTH)
+        DEPTH => DEPTH
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -132,7 +140,8 @@ begin
         m_axis_tkeep  => part_tkeep,
         m_axis_tvalid => part_tvalid,
         m_axis_tlast  => part_tlast,
-        m_axis_tready => part_tready);
+        m_axis_tready => part_tready
+      );
 
   end generate fifo;
 
@@ -140,7 +149,8 @@ begin
     generic map (
       WIDTH         => WIDTH,
       SEED          => SEED,
-      STALL_PERCENT => SINK_STALL_PERCENT)
+      STALL_PERCENT => SINK_STALL_PERCENT
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -153,7 +163,8 @@ begin
       m_axis_tkeep  => out_tkeep,
       m_axis_tvalid => stalled_tvalid,
       m_axis_tlast  => out_tlast,
-      m_axis_tready => stalled_tready);
+      m_axis_tready => stalled_tready
+    );
 
   out_tvalid     <= '0' when is_filling_r else stalled_tvalid;
   stalled_tready <= '0' when is_filling_r else out_tready;

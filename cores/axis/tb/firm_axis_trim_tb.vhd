@@ -24,7 +24,8 @@ entity firm_axis_trim_tb is
     SINK_STALL_PERCENT   : integer := 0;
     -- Pieces of all lanes up to a frame's last one; otherwise of 0 and more.
     FULL_PIECES : boolean := false;
-    WATCHDOG    : integer := 1000);
+    WATCHDOG    : integer := 1000
+  );
 end entity firm_axis_trim_tb;
 
 architecture simulation of firm_axis_trim_tb is
@@ -64,7 +65,8 @@ begin
   u_trim : entity firm.firm_axis_trim
     generic map (
       WIDTH => WIDTH,
-      SLACK => SLACK)
+      SLACK => SLACK
+    )
     port map (
       clk       => clk,
       rst_n     => rst_n,
@@ -83,7 +85,8 @@ begin
       m_count   => m_count,
       m_last    => m_last,
       m_valid   => m_valid,
-      m_ready   => m_ready);
+      m_ready   => m_ready
+    );
 
   send : process
     variable content  : frame_file_t;

@@ -27,7 +27,8 @@ entity firm_axis_window_tb is
     -- Each cycle the reader takes `random` (0 to what is available), `all` that is available, or `full`: a frame's
     -- first bytes by a random number, then a whole window each time until the frame's last bytes.
     TAKE     : string  := "random";
-    WATCHDOG : integer := 1000);
+    WATCHDOG : integer := 1000
+  );
 end entity firm_axis_window_tb;
 
 architecture simulation of firm_axis_window_tb is
@@ -63,7 +64,8 @@ begin
   u_window : entity firm.firm_axis_window
     generic map (
       WIDTH      => WIDTH,
-      VOID_LANES => VOID_LANES)
+      VOID_LANES => VOID_LANES
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -77,7 +79,8 @@ begin
       is_last       => is_last,
       take_valid    => take_valid,
       take          => take_count,
-      skip          => skip);
+      skip          => skip
+    );
 
   send : process
     variable content  : frame_file_t;

@@ -16,7 +16,8 @@ entity firm_message_fork_tb is
     -- The chance, each cycle, that a message is withdrawn. Then no sink has it any more.
     WITHDRAW_PERCENT : integer := 0;
     -- The last sink takes nothing for so many cycles at the start; the others must have the first message at once.
-    BLOCKED : integer := 0);
+    BLOCKED : integer := 0
+  );
 end entity firm_message_fork_tb;
 
 architecture simulation of firm_message_fork_tb is
@@ -45,7 +46,8 @@ begin
   u_fork : entity firm.firm_message_fork
     generic map (
       SINKS    => SINKS,
-      SEGMENTS => SEGMENTS)
+      SEGMENTS => SEGMENTS
+    )
     port map (
       clk                  => clk,
       rst_n                => rst_n,
@@ -54,7 +56,8 @@ begin
       source_segment_valid => source_segment_valid,
       sink_valid           => sink_valid,
       sink_ready           => sink_ready,
-      sink_segment_valid   => sink_segment_valid);
+      sink_segment_valid   => sink_segment_valid
+    );
 
   -- Inputs change shortly after the edge, outputs are read at the next.
   run : process

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Finds the ends of frames in a row of bytes, by the lengths that they announce. What comes is bytes and cuts; a cut ends
--- the frame that has begun, so that its converter reports it as broken, and is nothing between frames.
--- A byte that is not the last by its frame's length is held back until the next item tells whether a cut follows.
+-- Finds the ends of frames in a row of bytes, by the lengths that they announce. What comes is bytes and cuts; a cut
+-- ends the frame that has begun, so that its converter reports it as broken, and is nothing between frames. A byte that
+-- is not the last by its frame's length is held back until the next item tells whether a cut follows.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -19,7 +19,8 @@ entity firm_link_framer is
     data  : out std_logic_vector(7 downto 0);
     last  : out std_logic;
     valid : out std_logic;
-    ready : in  std_logic);
+    ready : in  std_logic
+  );
 end entity firm_link_framer;
 
 architecture rtl of firm_link_framer is

@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Between a host link, which knows bytes, and a system's two streams of frames. Bytes from the host wait in a FIFO, get
--- the ends of their frames from the lengths that these announce, and fill beats; beats to the host are sent byte by byte.
--- The host's bytes cannot be stopped here: who drives the link looks at `room`. If bytes are lost, by the link or for want
--- of room, the frame that has begun is cut and all that follows is dropped, as it could be anything, until the host makes
--- itself clear: by a cut of its own, or by TIMEOUT cycles of silence. Silence cuts a frame that has begun in any case.
+-- the ends of their frames from the lengths that these announce, and fill beats; beats to the host are sent byte by
+-- byte. The host's bytes cannot be stopped here: who drives the link looks at `room`. If bytes are lost, by the link or
+-- for want of room, the frame that has begun is cut and all that follows is dropped, as it could be anything, until the
+-- host makes itself clear: by a cut of its own, or by TIMEOUT cycles of silence. Silence cuts a frame that has begun in
+-- any case.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -13,7 +14,8 @@ entity firm_link_streams is
   generic (
     WIDTH   : integer := 8;
     DEPTH   : integer := 1024;  -- bytes from the host that can wait
-    TIMEOUT : integer := 0);    -- 0: silence means nothing
+    TIMEOUT : integer := 0    -- 0: silence means nothing
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -43,7 +45,8 @@ entity firm_link_streams is
     s_axis_tready : out std_logic;
 
     -- Pulses where bytes begin to be dropped.
-    link_error : out std_logic);
+    link_error : out std_logic
+  );
 end entity firm_link_streams;
 
 architecture rtl of firm_link_streams is
@@ -153,7 +156,8 @@ begin
   u_fifo : entity firm.firm_axis_fifo
     generic map (
       WIDTH => 8,
-      DEPTH => DEPTH)
+      DEPTH => DEPTH
+    )
     port map (
       clk             => clk,
       rst_n           => rst_n,
@@ -166,7 +170,8 @@ begin
       m_axis_tkeep    => open,
       m_axis_tvalid   => item_valid,
       m_axis_tlast    => item_cut,
-      m_axis_tready   => item_ready);
+      m_axis_tready   => item_ready
+    );
 
   item_taken <= item_valid and item_ready;
 
@@ -181,7 +186,8 @@ begin
       data       => framed_byte,
       last       => framed_last,
       valid      => framed_valid,
-      ready      => framed_ready);
+      ready      => framed_ready
+    );
 
   fill_lane : process (framed_byte)
   begin
@@ -191,7 +197,8 @@ begin
 
   u_pack : entity firm.firm_axis_pack
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -204,13 +211,15 @@ begin
       m_axis_tkeep  => m_axis_tkeep,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
+      m_axis_tready => m_axis_tready
+    );
 
   -- ------------------------------------------------------------------ to the host
 
   u_window : entity firm.firm_axis_window
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -224,7 +233,8 @@ begin
       is_last       => open,
       take_valid    => take,
       take          => ONE,
-      skip          => '0');
+      skip          => '0'
+    );
 
   has_byte <= '0' when available = NONE else '1';
   take     <= has_byte and tx_ready;

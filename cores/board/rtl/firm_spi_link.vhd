@@ -1,15 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over SPI, mode 0, highest bit first, the host being the master; frames are sent as they are. SPI
--- sends both ways in every byte, asked or not, so each selection (spi_cs_n low) begins with a command:
+-- The host's two streams over SPI, mode 0, highest bit first, the host being the master; frames are sent as they are.
+-- SPI sends both ways in every byte, asked or not, so each selection (spi_cs_n low) begins with a command:
 --
---   00  status  then come: room for bytes to the system (two bytes, the lower first), bytes that wait for the host (two)
+--   00  status  then come: room for bytes to the system (two bytes, lower first), bytes that wait for the host (two)
 --   01  write   what follows are bytes of frames, no more than there is room for
 --   02  read    then come bytes of frames; behind those that waited, 00
 --   03  cut     what is written next begins a frame: both sides are together again after a fault
 --
--- While the command is sent, what comes back is 80, and 1 more if bytes wait, 2 more if bytes were dropped since the last
--- cut. The pins are sampled by clk, so a period of spi_sclk takes 10 cycles of it at least. A byte counts when its last
--- bit is clocked; selections may end anywhere.
+-- While the command is sent, what comes back is 80, and 1 more if bytes wait, 2 more if bytes were dropped since the
+-- last cut. The pins are sampled by clk, so a period of spi_sclk takes 10 cycles of it at least. A byte counts when its
+-- last bit is clocked; selections may end anywhere.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -18,7 +18,8 @@ library firm;
 entity firm_spi_link is
   generic (
     WIDTH : integer := 8;
-    DEPTH : integer := 1024);  -- bytes that can wait, in each direction
+    DEPTH : integer := 1024  -- bytes that can wait, in each direction
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -44,7 +45,8 @@ entity firm_spi_link is
     s_axis_tready : out std_logic;
 
     -- Pulses where bytes begin to be dropped.
-    link_error : out std_logic);
+    link_error : out std_logic
+  );
 end entity firm_spi_link;
 
 architecture rtl of firm_spi_link is
@@ -164,7 +166,8 @@ begin
   u_streams : entity firm.firm_link_streams
     generic map (
       WIDTH => WIDTH,
-      DEPTH => DEPTH)
+      DEPTH => DEPTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -186,12 +189,14 @@ begin
       s_axis_tvalid => s_axis_tvalid,
       s_axis_tlast  => s_axis_tlast,
       s_axis_tready => s_axis_tready,
-      link_error    => error);
+      link_error    => error
+    );
 
   u_fifo : entity firm.firm_axis_fifo
     generic map (
       WIDTH => 8,
-      DEPTH => DEPTH)
+      DEPTH => DEPTH
+    )
     port map (
       clk             => clk,
       rst_n           => rst_n,
@@ -204,7 +209,8 @@ begin
       m_axis_tkeep    => open,
       m_axis_tvalid   => head_valid,
       m_axis_tlast    => open,
-      m_axis_tready   => head_taken);
+      m_axis_tready   => head_taken
+    );
 
   count : process (clk)
   begin

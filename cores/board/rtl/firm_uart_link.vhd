@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent as they are, byte
--- after byte. A break from the host, or a pause of TIMEOUT_MS, ends a frame that has begun; both bring the two sides
--- together again after bytes were lost. uart_rts_n rises while there is little room, in time for the bytes that an
--- adapter still sends.
+-- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent as they are,
+-- byte after byte. A break from the host, or a pause of TIMEOUT_MS, ends a frame that has begun; both bring the two
+-- sides together again after bytes were lost. uart_rts_n rises while there is little room, in time for the bytes that
+-- an adapter still sends.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -13,7 +13,8 @@ entity firm_uart_link is
     CLOCK_HZ   : integer := 100000000;
     BAUD       : integer := 1000000;
     DEPTH      : integer := 1024;  -- bytes from the host that can wait
-    TIMEOUT_MS : integer := 200);
+    TIMEOUT_MS : integer := 200
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -39,7 +40,8 @@ entity firm_uart_link is
     s_axis_tready : out std_logic;
 
     -- Pulses where bytes begin to be dropped.
-    link_error : out std_logic);
+    link_error : out std_logic
+  );
 end entity firm_uart_link;
 
 architecture rtl of firm_uart_link is
@@ -86,7 +88,8 @@ begin
 
   u_receiver : entity firm.firm_uart_receiver
     generic map (
-      DIVISOR => DIVISOR)
+      DIVISOR => DIVISOR
+    )
     port map (
       clk      => clk,
       rst_n    => rst_n,
@@ -94,13 +97,15 @@ begin
       data     => rx_data,
       valid    => rx_valid,
       is_break => rx_break,
-      is_wrong => rx_wrong);
+      is_wrong => rx_wrong
+    );
 
   u_streams : entity firm.firm_link_streams
     generic map (
       WIDTH   => WIDTH,
       DEPTH   => DEPTH,
-      TIMEOUT => CLOCK_HZ/1000 * TIMEOUT_MS)
+      TIMEOUT => CLOCK_HZ/1000 * TIMEOUT_MS
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -122,11 +127,13 @@ begin
       s_axis_tvalid => s_axis_tvalid,
       s_axis_tlast  => s_axis_tlast,
       s_axis_tready => s_axis_tready,
-      link_error    => link_error);
+      link_error    => link_error
+    );
 
   u_transmitter : entity firm.firm_uart_transmitter
     generic map (
-      DIVISOR => DIVISOR)
+      DIVISOR => DIVISOR
+    )
     port map (
       clk        => clk,
       rst_n      => rst_n,
@@ -134,7 +141,8 @@ begin
       valid      => tx_valid,
       ready      => tx_ready,
       uart_txd   => uart_txd,
-      uart_cts_n => uart_cts_n);
+      uart_cts_n => uart_cts_n
+    );
 
   ask_for_bytes : process (clk)
   begin

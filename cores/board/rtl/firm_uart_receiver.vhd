@@ -1,13 +1,14 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Bytes from a serial line: a start bit, eight data bits with the lowest first, a stop bit. A bit is read in its middle.
--- A low stop bit is a break if all else was low too, and a fault otherwise; either way the line has to rise before the
--- next byte may start.
+-- Bytes from a serial line: a start bit, eight data bits with the lowest first, a stop bit. A bit is read in its
+-- middle. A low stop bit is a break if all else was low too, and a fault otherwise; either way the line has to rise
+-- before the next byte may start.
 library ieee;
 use ieee.std_logic_1164.all;
 
 entity firm_uart_receiver is
   generic (
-    DIVISOR : integer := 16);  -- cycles of a bit
+    DIVISOR : integer := 16  -- cycles of a bit
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -17,7 +18,8 @@ entity firm_uart_receiver is
     data     : out std_logic_vector(7 downto 0);
     valid    : out std_logic;   -- a pulse with each byte
     is_break : out std_logic;   -- a pulse
-    is_wrong : out std_logic);  -- a pulse: the stop bit was low
+    is_wrong : out std_logic  -- a pulse: the stop bit was low
+  );
 end entity firm_uart_receiver;
 
 architecture rtl of firm_uart_receiver is
@@ -25,9 +27,9 @@ architecture rtl of firm_uart_receiver is
   constant FIRST_BIT : natural := 0;
   constant STOP_BIT  : natural := 9;  -- behind the start bit and eight of data
 
-  type state_t is (waiting, receiving, recovering);
+  type state_t is (WAITING, RECEIVING, RECOVERING);
 
-  signal line_r  : std_logic_vector(1 downto 0);  -- the pin, which knows no clock, behind two flip-flops; bit 1 is older
+  signal line_r  : std_logic_vector(1 downto 0);  -- the pin after two flip-flops, as it knows no clock; bit 1 is older
   signal state_r : state_t;
   signal count_r : natural range 0 to DIVISOR-1;  -- cycles until the next bit's middle
   signal bit_r   : natural range FIRST_BIT to STOP_BIT;
@@ -48,7 +50,7 @@ begin
       if bit_r = FIRST_BIT then
         -- Too short for a start bit.
         if line_r(1) = '1' then
-          state_r <= waiting;
+          state_r <= WAITING;
         end if;
       elsif bit_r < STOP_BIT then
         byte_r <= line_r(1) & byte_r(7 downto 1);
@@ -57,10 +59,10 @@ begin
 
     procedure finish_byte is
     begin
-      state_r <= waiting;
+      state_r <= WAITING;
       valid   <= line_r(1);
       if line_r(1) = '0' then
-        state_r <= recovering;
+        state_r <= RECOVERING;
         if byte_r = x"00" then
           is_break <= '1';
         else
@@ -75,15 +77,15 @@ begin
       valid    <= '0';
       is_break <= '0';
       is_wrong <= '0';
-      if state_r = waiting then
+      if state_r = WAITING then
         count_r <= DIVISOR/2 - 1;
         bit_r   <= FIRST_BIT;
         if line_r(1) = '0' then
-          state_r <= receiving;
+          state_r <= RECEIVING;
         end if;
-      elsif state_r = recovering then
+      elsif state_r = RECOVERING then
         if line_r(1) = '1' then
-          state_r <= waiting;
+          state_r <= WAITING;
         end if;
       elsif count_r /= 0 then
         count_r <= count_r - 1;
@@ -94,7 +96,7 @@ begin
       end if;
       if rst_n = '0' then
         line_r  <= "11";
-        state_r <= recovering;
+        state_r <= RECOVERING;
       end if;
     end if;
   end process receive;

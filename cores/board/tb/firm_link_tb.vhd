@@ -18,7 +18,8 @@ entity firm_link_tb is
     -- Thousandths of the bit's time by which the host's clock is wrong.
     CLOCK_ERROR : integer := 0;
     WATCHDOG    : integer := 100000;
-    QUIET       : integer := 2000);
+    QUIET       : integer := 2000
+  );
 end entity firm_link_tb;
 
 architecture simulation of firm_link_tb is
@@ -65,7 +66,8 @@ begin
       STALL_PERCENT => STALL_PERCENT,
       SHOWN         => 0,
       WATCHDOG      => WATCHDOG,
-      QUIET         => QUIET)
+      QUIET         => QUIET
+    )
     port map (
       clk            => clk,
       rst_n          => rst_n,
@@ -80,13 +82,15 @@ begin
       s_axis_tvalid  => back_tvalid,
       s_axis_tlast   => back_tlast,
       s_axis_tready  => back_tready,
-      frame_error(0) => link_error);
+      frame_error(0) => link_error
+    );
 
   u_system : entity firm.firm_sim_stall
     generic map (
       WIDTH         => WIDTH,
       SEED          => SEED,
-      STALL_PERCENT => STALL_PERCENT)
+      STALL_PERCENT => STALL_PERCENT
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -99,7 +103,8 @@ begin
       m_axis_tkeep  => from_tkeep,
       m_axis_tvalid => from_tvalid,
       m_axis_tlast  => from_tlast,
-      m_axis_tready => from_tready);
+      m_axis_tready => from_tready
+    );
 
   uart : if LINK = "uart" generate
     signal rxd   : std_logic;
@@ -111,7 +116,8 @@ begin
       generic map (
         BIT_TIME      => BIT_TIME,
         SEED          => SEED,
-        STALL_PERCENT => STALL_PERCENT)
+        STALL_PERCENT => STALL_PERCENT
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -127,14 +133,16 @@ begin
         uart_rxd      => rxd,
         uart_txd      => txd,
         uart_rts_n    => rts_n,
-        uart_cts_n    => cts_n);
+        uart_cts_n    => cts_n
+      );
 
     u_link : entity firm.firm_uart_link
       generic map (
         WIDTH    => WIDTH,
         CLOCK_HZ => CLOCK_HZ,
         BAUD     => BAUD,
-        DEPTH    => DEPTH)
+        DEPTH    => DEPTH
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -152,7 +160,8 @@ begin
         s_axis_tvalid => from_tvalid,
         s_axis_tlast  => from_tlast,
         s_axis_tready => from_tready,
-        link_error    => link_error);
+        link_error    => link_error
+      );
   end generate uart;
 
   spi : if LINK = "spi" generate
@@ -166,7 +175,8 @@ begin
       generic map (
         PERIOD        => BIT_TIME,
         SEED          => SEED,
-        STALL_PERCENT => STALL_PERCENT)
+        STALL_PERCENT => STALL_PERCENT
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -183,12 +193,14 @@ begin
         spi_cs_n      => cs_n,
         spi_mosi      => mosi,
         spi_miso      => miso,
-        spi_irq       => irq);
+        spi_irq       => irq
+      );
 
     u_link : entity firm.firm_spi_link
       generic map (
         WIDTH => WIDTH,
-        DEPTH => DEPTH)
+        DEPTH => DEPTH
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -207,7 +219,8 @@ begin
         s_axis_tvalid => from_tvalid,
         s_axis_tlast  => from_tlast,
         s_axis_tready => from_tready,
-        link_error    => link_error);
+        link_error    => link_error
+      );
   end generate spi;
 
 end architecture simulation;

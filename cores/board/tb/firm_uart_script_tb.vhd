@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A serial line that does what a script says, and the frames that come of it, one a line, in hexadecimal. The script has a
--- word of six characters and a number a line: `byte   171` sends a byte, `wrong  171` one with a low stop bit, `break  0` a
--- break, `glitch 0` a level that is too short to mean anything, `pause  40` leaves the line alone for so many bits;
--- `system 0` stops the system, which takes no beat until `system 1`.
+-- A serial line that does what a script says, and the frames that come of it, one a line, in hexadecimal. The script
+-- has a word of six characters and a number a line: `byte   171` sends a byte, `wrong  171` one with a low stop bit,
+-- `break  0` a break, `glitch 0` a level that is too short to mean anything, `pause  40` leaves the line alone for so
+-- many bits; `system 0` stops the system, which takes no beat until `system 1`.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -16,7 +16,8 @@ entity firm_uart_script_tb is
     DEPTH       : integer := 64;
     SCRIPT_FILE : string  := "script.txt";
     -- What the bench must print but `no room`; empty: anything.
-    EXPECTED_FILE : string := "");
+    EXPECTED_FILE : string := ""
+  );
 end entity firm_uart_script_tb;
 
 architecture simulation of firm_uart_script_tb is
@@ -131,7 +132,7 @@ begin
 
   watch_room : process (rts_n)
   begin
-    if rts_n'event and rts_n = '1' and rst_n = '1' then
+    if rising_edge(rts_n) and rst_n = '1' then
       print("no room");
     end if;
   end process watch_room;
@@ -142,7 +143,8 @@ begin
       CLOCK_HZ   => CLOCK_HZ,
       BAUD       => BAUD,
       DEPTH      => DEPTH,
-      TIMEOUT_MS => 1)
+      TIMEOUT_MS => 1
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -160,6 +162,7 @@ begin
       s_axis_tvalid => '0',
       s_axis_tlast  => '0',
       s_axis_tready => open,
-      link_error    => link_error);
+      link_error    => link_error
+    );
 
 end architecture simulation;

@@ -1,14 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The handshake of a message, or of an element of an array, between two clock domains. What the source shows is a level a
--- segment, and one that all of it came. They go to the sink and are seen there one after the other, in this order;
+-- The handshake of a message, or of an element of an array, between two clock domains. What the source shows is a level
+-- a segment, and one that all of it came. They go to the sink and are seen there one after the other, in this order;
 -- the sink returns which of them it has seen, and whether it has taken the message. Both go back to zero before the
 -- next one, so nothing is lost or seen twice at any ratio of the clocks, and a message may be withdrawn at any time.
 --
 -- The fields are registers of the source's domain, which hold until the sink has let go, as a source that withdraws its
 -- message may change them at once. A source that never does need not have them here: they hold until `s_ready`.
 --
--- What lies within the message, streams and elements, crosses in entities of its own (firm_cdc_stream, firm_cdc_message)
--- which must not be ahead of it: they let nothing in before `s_settled`, and the next message waits for all of them.
+-- What lies within the message, streams and elements, crosses in entities of its own (firm_cdc_stream,
+-- firm_cdc_message) which must not be ahead of it: they let nothing in before `s_settled`, and the next message waits
+-- for all of them.
 --
 -- Constraint: fields are there one cycle of `m_clk` before the sink looks at them; limit their delay to that.
 library ieee;
@@ -22,7 +23,8 @@ entity firm_cdc_message is
     -- Bits of all fields.
     FIELD_BITS : integer := 1;
     -- Streams and elements within.
-    PARTS : integer := 1);
+    PARTS : integer := 1
+  );
   port (
     s_clk   : in std_logic;
     s_rst_n : in std_logic;
@@ -51,7 +53,8 @@ entity firm_cdc_message is
     m_fields        : out std_logic_vector(FIELD_BITS-1 downto 0);
     m_segment_valid : out std_logic_vector(SEGMENTS-1 downto 0);
     m_valid         : out std_logic;
-    m_ready         : in  std_logic);
+    m_ready         : in  std_logic
+  );
 end entity firm_cdc_message;
 
 architecture rtl of firm_cdc_message is
@@ -95,11 +98,13 @@ begin
 
   u_return : entity firm.firm_cdc_sync
     generic map (
-      BITS => SEGMENTS+2)
+      BITS => SEGMENTS+2
+    )
     port map (
       clk    => s_clk,
       level  => answer_r,
-      synced => returned);
+      synced => returned
+    );
 
   shown    <= returned(SEGMENTS downto 0);
   done     <= returned(SEGMENTS+1);
@@ -129,22 +134,25 @@ begin
 
   s_ready   <= request_r(0) and done and not withdrawn_r;
   s_settled <= '1' when request_r(0) = '1' and withdrawn_r = '0' and done = '0'
-                        and shown(SEGMENTS-1 downto 0) = s_segment_valid else '0';
+                        and shown(SEGMENTS-1 downto 0) = s_segment_valid else
+               '0';
   s_idle    <= '1' when request_r(0) = '0' and shown = NONE and done = '0' else '0';
 
   -- The sink's domain
 
   u_request : entity firm.firm_cdc_sync
     generic map (
-      BITS => SEGMENTS+1)
+      BITS => SEGMENTS+1
+    )
     port map (
       clk    => m_clk,
       level  => request_r,
-      synced => requested);
+      synced => requested
+    );
 
   -- Levels that rise or fall together may arrive one after the other, in any order: each is shown behind those before
-  -- it, and none any more when the first of them has fallen. In a reset, which the sink may be through with already, they
-  -- are those from before it.
+  -- it, and none any more when the first of them has fallen. In a reset, which the sink may be through with already,
+  -- they are those from before it.
   is_fallen <= '1' when (answer_r(SEGMENTS downto 0) and not requested) /= NONE else '0';
 
   order : process (requested, m_rst_n, m_enable, answer_r, is_fallen)

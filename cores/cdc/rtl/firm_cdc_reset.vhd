@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A reset for another clock domain: it begins with `rst_n` at once, whatever the clock does, and ends with a rising edge,
--- three or more of them after both `rst_n` and `release` are high. So a reset is never too short to be seen, and when it
--- ends, what came through synchronisers before it is gone from them.
+-- A reset for another clock domain: it begins with `rst_n` at once, whatever the clock does, and ends with a rising
+-- edge, three or more of them after both `rst_n` and `release` are high. So a reset is never too short to be seen, and
+-- when it ends, what came through synchronisers before it is gone from them.
 --
--- Constraint: the paths to the registers' clear and into the first register are asynchronous (docs/clocks.md).
+-- Constraint: the paths to the registers' clear and into the first register are asynchronous
+-- (docs/how-to/use-several-clocks.md).
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -15,7 +16,8 @@ entity firm_cdc_reset is
     -- Of any domain; it is low while `rst_n` is, and for as long as the reset has to last.
     release : in std_logic := '1';
 
-    synced_rst_n : out std_logic);
+    synced_rst_n : out std_logic
+  );
 end entity firm_cdc_reset;
 
 architecture rtl of firm_cdc_reset is

@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A stream of a message between two clock domains, and between two widths where they differ: a FIFO in distributed RAM,
--- as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It takes and gives a beat a cycle; the
--- slower clock, or the narrower end, sets the pace.
+-- as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It takes and gives a beat a cycle;
+-- the slower clock, or the narrower end, sets the pace.
 --
--- A stream's last beat is not taken from the source before the sink has it. So whatever the source shows after a stream,
--- such as that the message is complete, is not ahead of the stream at the sink.
+-- A stream's last beat is not taken from the source before the sink has it. So whatever the source shows after a
+-- stream, such as that the message is complete, is not ahead of the stream at the sink.
 --
--- Constraint: RAM to `m_axis_*` is written two cycles of `m_clk` or more before it is read; limit its delay to one. The bits
--- of a pointer may not be further apart than a cycle of the clock that they come from.
+-- Constraint: RAM to `m_axis_*` is written two cycles of `m_clk` or more before it is read; limit its delay to one. The
+-- bits of a pointer may not be further apart than a cycle of the clock that they come from.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -19,12 +19,14 @@ entity firm_cdc_stream is
     S_WIDTH : integer := 8;
     M_WIDTH : integer := 8;
     -- Beats, a power of two, 4 or more. The pointers' way and back takes some nine cycles: 16 never hold up the stream.
-    DEPTH : integer := 16);
+    DEPTH : integer := 16
+  );
   port (
     s_clk   : in std_logic;
     s_rst_n : in std_logic;
 
-    -- The message that the stream is part of, as its source shows it. When it falls, what has come of the stream is dropped.
+    -- The message that the stream is part of, as its source shows it. When it falls, what has come of the stream is
+    -- dropped.
     s_open   : in  std_logic := '1';
     -- The sink sees this message: beats may follow.
     s_enable : in  std_logic := '1';
@@ -47,7 +49,8 @@ entity firm_cdc_stream is
     m_axis_tkeep  : out std_logic_vector(M_WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_cdc_stream;
 
 architecture rtl of firm_cdc_stream is
@@ -114,7 +117,8 @@ begin
   u_widen : entity firm.firm_axis_resize
     generic map (
       S_WIDTH => S_WIDTH,
-      M_WIDTH => WIDTH)
+      M_WIDTH => WIDTH
+    )
     port map (
       clk           => s_clk,
       rst_n         => s_rst_n,
@@ -128,19 +132,23 @@ begin
       m_axis_tkeep  => wide_tkeep,
       m_axis_tvalid => wide_tvalid,
       m_axis_tlast  => wide_tlast,
-      m_axis_tready => wide_tready);
+      m_axis_tready => wide_tready
+    );
 
   u_read_seen : entity firm.firm_cdc_sync
     generic map (
-      BITS => POINTER_BITS)
+      BITS => POINTER_BITS
+    )
     port map (
       clk    => s_clk,
       level  => read_gray_r,
-      synced => read_seen);
+      synced => read_seen
+    );
 
   -- A pointer is DEPTH ahead of another if its two highest bits in Gray code are the other's, inverted.
   is_full     <= '1' when write_gray_r = (not read_seen(POINTER_BITS-1 downto POINTER_BITS-2))
-                                         & read_seen(POINTER_BITS-3 downto 0) else '0';
+                          & read_seen(POINTER_BITS-3 downto 0) else
+                 '0';
   is_drained  <= '1' when write_gray_r = read_seen else '0';
   write       <= wide_tvalid and not is_full and not last_r;
   wide_tready <= is_drained when last_r = '1' else not is_full and not wide_tlast;
@@ -175,11 +183,13 @@ begin
 
   u_write_seen : entity firm.firm_cdc_sync
     generic map (
-      BITS => POINTER_BITS)
+      BITS => POINTER_BITS
+    )
     port map (
       clk    => m_clk,
       level  => write_gray_r,
-      synced => write_seen);
+      synced => write_seen
+    );
 
   has_beat    <= '1' when read_gray_r /= write_seen else '0';
   word        <= memory(to_integer(read_r(INDEX_BITS-1 downto 0)));
@@ -202,7 +212,8 @@ begin
   u_narrow : entity firm.firm_axis_resize
     generic map (
       S_WIDTH => WIDTH,
-      M_WIDTH => M_WIDTH)
+      M_WIDTH => M_WIDTH
+    )
     port map (
       clk           => m_clk,
       rst_n         => m_rst_n,
@@ -216,6 +227,7 @@ begin
       m_axis_tkeep  => m_axis_tkeep,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
+      m_axis_tready => m_axis_tready
+    );
 
 end architecture rtl;

@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Brings levels into another clock domain: each bit passes a row of registers, in which it has time to settle. Every bit
--- must come from a register of its own domain, with no logic behind it, and no two bits arrive together for certain.
+-- Brings levels into another clock domain: each bit passes a row of registers, in which it has time to settle. Every
+-- bit must come from a register of its own domain, with no logic behind it, and no two bits arrive together for
+-- certain.
 --
--- Constraint: the path into the first register is asynchronous (docs/clocks.md).
+-- Constraint: the path into the first register is asynchronous (docs/how-to/use-several-clocks.md).
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -10,11 +11,13 @@ entity firm_cdc_sync is
   generic (
     BITS : integer := 1;
     -- Registers in a row, 2 or more.
-    STAGES : integer := 2);
+    STAGES : integer := 2
+  );
   port (
     clk    : in  std_logic;
     level  : in  std_logic_vector(BITS-1 downto 0);
-    synced : out std_logic_vector(BITS-1 downto 0));
+    synced : out std_logic_vector(BITS-1 downto 0)
+  );
 end entity firm_cdc_sync;
 
 architecture rtl of firm_cdc_sync is
@@ -26,9 +29,9 @@ architecture rtl of firm_cdc_sync is
   attribute shreg_extract : string;
   attribute preserve      : boolean;
   attribute altera_attribute : string;
-  attribute async_reg of stages_r     : signal is "true";
-  attribute shreg_extract of stages_r : signal is "no";
-  attribute preserve of stages_r      : signal is true;
+  attribute async_reg of stages_r        : signal is "true";
+  attribute shreg_extract of stages_r    : signal is "no";
+  attribute preserve of stages_r         : signal is true;
   attribute altera_attribute of stages_r : signal is
     "-name SYNCHRONIZER_IDENTIFICATION FORCED_IF_ASYNCHRONOUS";
 

@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A message of variable size between two clocks: a field, a stream, and an array of elements that have a field and a
--- stream each. Lengths and bytes follow from the message's number, which is its first field, so the sink knows what must
--- come next. It checks at every edge that fields hold while they are shown, that nothing is ahead of what was before it
--- at the source, and that a withdrawn message leaves nothing behind. A source that withdraws drives 'X' from there on.
+-- stream each. Lengths and bytes follow from the message's number, which is its first field, so the sink knows what
+-- must come next. It checks at every edge that fields hold while they are shown, that nothing is ahead of what was
+-- before it at the source, and that a withdrawn message leaves nothing behind. A source that withdraws drives 'X' from
+-- there on.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -24,7 +25,8 @@ entity firm_cdc_message_tb is
     -- The chance of a message that a reset of one cycle meets it.
     RESET_PERCENT : integer := 0;
     -- The domain that the reset comes from.
-    IS_RESET_AT_SINK : boolean := false);
+    IS_RESET_AT_SINK : boolean := false
+  );
 end entity firm_cdc_message_tb;
 
 architecture simulation of firm_cdc_message_tb is
@@ -122,10 +124,12 @@ begin
   u_clock : entity firm.firm_sim_clock
     generic map (
       PERIOD_PS => M_PERIOD_PS,
-      SEED      => SEED)
+      SEED      => SEED
+    )
     port map (
       reference => s_clk,
-      clk       => m_clk);
+      clk       => m_clk
+    );
 
   resets : block
     signal rst_n        : std_logic;
@@ -144,21 +148,24 @@ begin
       port map (
         clk          => other_clk,
         rst_n        => rst_n,
-        synced_rst_n => seen);
+        synced_rst_n => seen
+      );
 
     u_released : entity firm.firm_cdc_reset
       port map (
         clk          => main_clk,
         rst_n        => rst_n,
         release      => seen,
-        synced_rst_n => released);
+        synced_rst_n => released
+      );
 
     u_synced : entity firm.firm_cdc_reset
       port map (
         clk          => other_clk,
         rst_n        => rst_n,
         release      => released,
-        synced_rst_n => synced_rst_n);
+        synced_rst_n => synced_rst_n
+      );
 
     s_rst_n <= synced_rst_n when IS_RESET_AT_SINK else released;
     m_rst_n <= released when IS_RESET_AT_SINK else synced_rst_n;
@@ -188,7 +195,8 @@ begin
     generic map (
       SEGMENTS   => SEGMENTS,
       FIELD_BITS => FIELD_BITS,
-      PARTS      => 2)
+      PARTS      => 2
+    )
     port map (
       s_clk           => s_clk,
       s_rst_n         => s_rst_n,
@@ -205,12 +213,14 @@ begin
       m_fields        => m_fields,
       m_segment_valid => m_segment_valid,
       m_valid         => m_valid,
-      m_ready         => m_ready);
+      m_ready         => m_ready
+    );
 
   u_stream : entity firm.firm_cdc_stream
     generic map (
       S_WIDTH => S_WIDTH,
-      M_WIDTH => M_WIDTH)
+      M_WIDTH => M_WIDTH
+    )
     port map (
       s_clk         => s_clk,
       s_rst_n       => s_rst_n,
@@ -229,11 +239,13 @@ begin
       m_axis_tkeep  => m_tkeep(0),
       m_axis_tvalid => m_tvalid(0),
       m_axis_tlast  => m_tlast(0),
-      m_axis_tready => m_tready(0));
+      m_axis_tready => m_tready(0)
+    );
 
   u_element : entity firm.firm_cdc_message
     generic map (
-      FIELD_BITS => FIELD_BITS)
+      FIELD_BITS => FIELD_BITS
+    )
     port map (
       s_clk           => s_clk,
       s_rst_n         => s_rst_n,
@@ -251,12 +263,14 @@ begin
       m_fields        => m_element_fields,
       m_segment_valid => m_element_segment,
       m_valid         => m_element_valid,
-      m_ready         => m_element_ready);
+      m_ready         => m_element_ready
+    );
 
   u_element_stream : entity firm.firm_cdc_stream
     generic map (
       S_WIDTH => S_WIDTH,
-      M_WIDTH => M_WIDTH)
+      M_WIDTH => M_WIDTH
+    )
     port map (
       s_clk         => s_clk,
       s_rst_n       => s_rst_n,
@@ -275,7 +289,8 @@ begin
       m_axis_tkeep  => m_tkeep(1),
       m_axis_tvalid => m_tvalid(1),
       m_axis_tlast  => m_tlast(1),
-      m_axis_tready => m_tready(1));
+      m_axis_tready => m_tready(1)
+    );
 
   give : process
     variable random_1 : positive := SEED;
@@ -418,8 +433,8 @@ begin
         wait until rising_edge(s_clk);
       else
         given <= given + 1;
-        let_go;
         -- With the next message at once, the bits of the first segment stay.
+        let_go;
       end if;
     end loop;
     for cycle in 1 to 100 loop

@@ -11,7 +11,8 @@ entity firm_cdc_rate_tb is
     SEED        : integer := 1;
     MESSAGES    : integer := 1000;
     -- Picoseconds from one to the next on average.
-    MOST_PS : integer := 200000);
+    MOST_PS : integer := 200000
+  );
 end entity firm_cdc_rate_tb;
 
 architecture simulation of firm_cdc_rate_tb is
@@ -33,30 +34,35 @@ begin
   u_clock : entity firm.firm_sim_clock
     generic map (
       PERIOD_PS => M_PERIOD_PS,
-      SEED      => SEED)
+      SEED      => SEED
+    )
     port map (
       reference => s_clk,
-      clk       => m_clk);
+      clk       => m_clk
+    );
 
   u_seen : entity firm.firm_cdc_reset
     port map (
       clk          => m_clk,
       rst_n        => rst_n,
-      synced_rst_n => seen);
+      synced_rst_n => seen
+    );
 
   u_released : entity firm.firm_cdc_reset
     port map (
       clk          => s_clk,
       rst_n        => rst_n,
       release      => seen,
-      synced_rst_n => released);
+      synced_rst_n => released
+    );
 
   u_reset : entity firm.firm_cdc_reset
     port map (
       clk          => m_clk,
       rst_n        => rst_n,
       release      => released,
-      synced_rst_n => m_rst_n);
+      synced_rst_n => m_rst_n
+    );
 
   u_message : entity firm.firm_cdc_message
     port map (
@@ -72,7 +78,8 @@ begin
       m_fields        => open,
       m_segment_valid => open,
       m_valid         => open,
-      m_ready         => '1');
+      m_ready         => '1'
+    );
 
   count : process
     variable begun : time;

@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Streams of random length through the crossing, or at one clock through the resizer alone: every byte must come once, in
--- order, in full beats from lane 0 up with zeros in lanes that are not kept. The source may not be rid of a stream's last
--- beat before the sink has it.
--- Without stalls the pace is that of the slower end: the longest stream may take no more than its beats there, and SLACK.
+-- Streams of random length through the crossing, or at one clock through the resizer alone: every byte must come once,
+-- in order, in full beats from lane 0 up with zeros in lanes that are not kept. The source may not be rid of a stream's
+-- last beat before the sink has it.
+-- Without stalls the pace is that of the slower end: the longest stream may take no more than its beats there, and
+-- SLACK.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -24,7 +25,8 @@ entity firm_cdc_stream_tb is
     -- The chance, each cycle, that an end does nothing.
     STALL_PERCENT : integer := 0;
     -- Cycles of the slower end; negative: not tested.
-    SLACK : integer := -1);
+    SLACK : integer := -1
+  );
 end entity firm_cdc_stream_tb;
 
 architecture simulation of firm_cdc_stream_tb is
@@ -77,10 +79,12 @@ begin
   u_clock : entity firm.firm_sim_clock
     generic map (
       PERIOD_PS => M_PERIOD_PS,
-      SEED      => SEED)
+      SEED      => SEED
+    )
     port map (
       reference => tick,
-      clk       => other);
+      clk       => other
+    );
 
   crossing : if PART = "crossing" generate
 
@@ -95,27 +99,31 @@ begin
       port map (
         clk          => m_clk,
         rst_n        => s_rst_n,
-        synced_rst_n => seen);
+        synced_rst_n => seen
+      );
 
     u_released : entity firm.firm_cdc_reset
       port map (
         clk          => s_clk,
         rst_n        => s_rst_n,
         release      => seen,
-        synced_rst_n => released);
+        synced_rst_n => released
+      );
 
     u_reset : entity firm.firm_cdc_reset
       port map (
         clk          => m_clk,
         rst_n        => s_rst_n,
         release      => released,
-        synced_rst_n => m_rst_n);
+        synced_rst_n => m_rst_n
+      );
 
     u_stream : entity firm.firm_cdc_stream
       generic map (
         S_WIDTH => S_WIDTH,
         M_WIDTH => M_WIDTH,
-        DEPTH   => DEPTH)
+        DEPTH   => DEPTH
+      )
       port map (
         s_clk         => s_clk,
         s_rst_n       => released,
@@ -132,7 +140,8 @@ begin
         m_axis_tkeep  => m_tkeep,
         m_axis_tvalid => m_tvalid,
         m_axis_tlast  => m_tlast,
-        m_axis_tready => m_tready);
+        m_axis_tready => m_tready
+      );
 
   end generate crossing;
 
@@ -144,7 +153,8 @@ begin
     u_resize : entity firm.firm_axis_resize
       generic map (
         S_WIDTH => S_WIDTH,
-        M_WIDTH => M_WIDTH)
+        M_WIDTH => M_WIDTH
+      )
       port map (
         clk           => s_clk,
         rst_n         => s_rst_n,
@@ -157,7 +167,8 @@ begin
         m_axis_tkeep  => m_tkeep,
         m_axis_tvalid => m_tvalid,
         m_axis_tlast  => m_tlast,
-        m_axis_tready => m_tready);
+        m_axis_tready => m_tready
+      );
 
   end generate resizer;
 

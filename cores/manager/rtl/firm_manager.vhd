@@ -2,7 +2,8 @@
 -- Stands between the host's two streams and the converters. Host to subscribers: takes the id off a frame and routes
 -- it. Publishers to host: sends the frames of the publisher that the scheduler in the slot grants. Register slices on
 -- the host's sides cut every path between the host and the converters.
--- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host gets bursts (docs/manager.md).
+-- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host gets bursts
+-- (docs/reference/manager.md).
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -14,7 +15,8 @@ entity firm_manager is
     SUBSCRIBERS : integer := 1;
     PUBLISHERS  : integer := 1;
     -- The scheduler may move the grant between any two beats of a frame.
-    PREEMPTIVE : boolean := false);
+    PREEMPTIVE : boolean := false
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -56,7 +58,8 @@ entity firm_manager is
     sched_grant_select : in  std_logic_vector(index_bits(PUBLISHERS)-1 downto 0);
 
     -- Pulses for a frame from the host that reaches no subscriber.
-    id_error : out std_logic);
+    id_error : out std_logic
+  );
 end entity firm_manager;
 
 architecture rtl of firm_manager is
@@ -92,7 +95,8 @@ begin
 
   u_slice_in : entity firm.firm_axis_register_slice
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -106,12 +110,14 @@ begin
       m_axis_tid    => open,
       m_axis_tvalid => routed_tvalid,
       m_axis_tlast  => routed_tlast,
-      m_axis_tready => routed_tready);
+      m_axis_tready => routed_tready
+    );
 
   u_demux : entity firm.firm_axis_demux
     generic map (
       WIDTH        => WIDTH,
-      DESTINATIONS => SUBSCRIBERS)
+      DESTINATIONS => SUBSCRIBERS
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -125,12 +131,14 @@ begin
       m_axis_tlast  => sub_axis_tlast,
       m_axis_tvalid => sub_axis_tvalid,
       m_axis_tready => sub_axis_tready,
-      id_error      => id_error);
+      id_error      => id_error
+    );
 
   u_mux : entity firm.firm_axis_mux
     generic map (
       WIDTH   => WIDTH,
-      SOURCES => PUBLISHERS)
+      SOURCES => PUBLISHERS
+    )
     port map (
       source        => sched_grant_select,
       enable        => sched_grant_valid,
@@ -143,7 +151,8 @@ begin
       m_axis_tkeep  => granted_tkeep,
       m_axis_tvalid => granted_tvalid,
       m_axis_tlast  => granted_tlast,
-      m_axis_tready => granted_tready);
+      m_axis_tready => granted_tready
+    );
 
   whole_frames : if not PREEMPTIVE generate
     sent_tdata     <= granted_tdata;
@@ -157,7 +166,8 @@ begin
     u_burst : entity firm.firm_axis_burst
       generic map (
         WIDTH   => WIDTH,
-        SOURCES => PUBLISHERS)
+        SOURCES => PUBLISHERS
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -171,12 +181,14 @@ begin
         m_axis_tkeep  => sent_tkeep,
         m_axis_tvalid => sent_tvalid,
         m_axis_tlast  => sent_tlast,
-        m_axis_tready => sent_tready);
+        m_axis_tready => sent_tready
+      );
   end generate parts_of_frames;
 
   u_slice_out : entity firm.firm_axis_register_slice
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -190,7 +202,8 @@ begin
       m_axis_tid    => out_tid,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
+      m_axis_tready => m_axis_tready
+    );
 
   -- No publisher has an id of more bits.
   name_publisher : for place in 0 to 7 generate

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The Manager's way to the host under a grant that moves at random, also within frames and also to publishers that have
--- nothing to send; or, for comparison, under a scheduler. What each publisher sends follows from its index and the number of the frame, as the test that reads
--- TRACE_FILE knows, too: of each burst one line, `tid`, a blank and the bytes in hex.
--- The last line that is printed has the beats taken from the publishers, those at the host, and the cycles between the
--- first of the former and the last of the latter.
+-- nothing to send; or, for comparison, under a scheduler. What each publisher sends follows from its index and the
+-- number of the frame, as the test that reads TRACE_FILE knows, too: of each burst one line, `tid`, a blank and the
+-- bytes in hex. The last line that is printed has the beats taken from the publishers, those at the host, and the
+-- cycles between the first of the former and the last of the latter.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -24,10 +24,10 @@ entity firm_manager_burst_tb is
     FRAMES     : positive := 10;
     LONGEST    : natural  := 100;
     -- Publisher 0 stops for ever behind its first beat.
-    STOPPED    : boolean  := false;
-    TRACE_FILE : string   := "bursts.txt";
+    STOPPED       : boolean  := false;
+    TRACE_FILE    : string   := "bursts.txt";
     EXPECTED_FILE : string   := "";
-    SEED       : positive := 1;
+    SEED          : positive := 1;
     -- The chance in a cycle that the grant moves; that it moves to any publisher, whether it has a beat or not; that a
     -- publisher pauses behind a beat; that the host takes none.
     MOVE_PERCENT  : natural := 30;
@@ -35,7 +35,8 @@ entity firm_manager_burst_tb is
     PAUSE_PERCENT : natural := 0;
     STALL_PERCENT : natural := 0;
     -- Cycles without a beat at the host after which the bench gives up.
-    WATCHDOG : natural := 20000);
+    WATCHDOG : natural := 20000
+  );
 end entity firm_manager_burst_tb;
 
 architecture simulation of firm_manager_burst_tb is
@@ -118,7 +119,8 @@ begin
       WIDTH       => WIDTH,
       SUBSCRIBERS => 1,
       PUBLISHERS  => PUBLISHERS,
-      PREEMPTIVE  => PREEMPTIVE)
+      PREEMPTIVE  => PREEMPTIVE
+    )
     port map (
       clk                => clk,
       rst_n              => rst_n,
@@ -148,7 +150,8 @@ begin
       sched_last         => last,
       sched_grant_valid  => grant_valid,
       sched_grant_select => grant_select,
-      id_error           => open);
+      id_error           => open
+    );
 
   drawn : if not SCHEDULED generate
     grant_valid  <= drawn_valid;
@@ -158,7 +161,8 @@ begin
   scheduler : if SCHEDULED generate
     u_scheduler : entity firm.firm_sched_fixed_priority
       generic map (
-        REQUESTERS => PUBLISHERS)
+        REQUESTERS => PUBLISHERS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -166,7 +170,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate scheduler;
 
   play : process (clk)
@@ -311,7 +316,8 @@ begin
     if rising_edge(clk) then
       cycle <= cycle + 1;
       if rst_n = '1' then
-        assert not is_shown or (out_tvalid = '1' and old_tdata = out_tdata and old_rest = out_tkeep & out_tid & out_tlast)
+        assert not is_shown
+          or (out_tvalid = '1' and old_tdata = out_tdata and old_rest = out_tkeep & out_tid & out_tlast)
           report "a beat was withdrawn or changed" severity failure;
         is_shown    := out_tvalid = '1' and out_tready = '0';
         old_tdata   := out_tdata;

@@ -20,7 +20,8 @@ entity firm_manager_tb is
     ECHO_STALL_PERCENT : integer := 0;
     SHOWN              : integer := 0;
     WATCHDOG           : integer := 10000;
-    QUIET              : integer := 300);
+    QUIET              : integer := 300
+  );
 end entity firm_manager_tb;
 
 architecture simulation of firm_manager_tb is
@@ -72,7 +73,8 @@ begin
       STALL_PERCENT => STALL_PERCENT,
       SHOWN         => SHOWN,
       WATCHDOG      => WATCHDOG,
-      QUIET         => QUIET)
+      QUIET         => QUIET
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -87,13 +89,15 @@ begin
       s_axis_tvalid => out_tvalid,
       s_axis_tlast  => out_tlast,
       s_axis_tready => out_tready,
-      id_error      => id_error);
+      id_error      => id_error
+    );
 
   u_manager : entity firm.firm_manager
     generic map (
       WIDTH       => WIDTH,
       SUBSCRIBERS => SUBSCRIBERS,
-      PUBLISHERS  => PUBLISHERS)
+      PUBLISHERS  => PUBLISHERS
+    )
     port map (
       clk                => clk,
       rst_n              => rst_n,
@@ -123,11 +127,13 @@ begin
       sched_last         => last,
       sched_grant_valid  => grant_valid,
       sched_grant_select => grant_select,
-      id_error           => id_error);
+      id_error           => id_error
+    );
 
   u_scheduler : entity firm.firm_sched_fixed_priority
     generic map (
-      REQUESTERS => PUBLISHERS)
+      REQUESTERS => PUBLISHERS
+    )
     port map (
       clk          => clk,
       rst_n        => rst_n,
@@ -135,7 +141,8 @@ begin
       beat         => beat,
       last         => last,
       grant_valid  => grant_valid,
-      grant_select => grant_select);
+      grant_select => grant_select
+    );
 
   channels : for channel in 0 to SUBSCRIBERS-1 generate
     echo : if channel < PUBLISHERS generate
@@ -144,7 +151,8 @@ begin
           WIDTH         => WIDTH,
           ID            => channel,
           SEED          => SEED + channel,
-          STALL_PERCENT => ECHO_STALL_PERCENT)
+          STALL_PERCENT => ECHO_STALL_PERCENT
+        )
         port map (
           clk           => clk,
           rst_n         => rst_n,
@@ -157,7 +165,8 @@ begin
           m_axis_tkeep  => pub_tkeep((channel+1)*WIDTH/8-1 downto channel*WIDTH/8),
           m_axis_tvalid => pub_tvalid(channel),
           m_axis_tlast  => pub_tlast(channel),
-          m_axis_tready => pub_tready(channel));
+          m_axis_tready => pub_tready(channel)
+        );
     end generate echo;
     silent : if channel >= PUBLISHERS generate
       sub_tready(channel) <= '1';

@@ -18,7 +18,8 @@ use firm.firm_sched_queue_pkg.all;
 
 entity firm_sched_arrivals is
   generic (
-    REQUESTERS : integer := 2);
+    REQUESTERS : integer := 2
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -33,7 +34,8 @@ entity firm_sched_arrivals is
     -- A requester finishes a task, which may be known or not. If it has not left, it is forgotten.
     finished       : in std_logic;
     finished_known : in std_logic;  -- it is known and has left; read with `finished` only
-    finished_id    : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    finished_id    : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_arrivals;
 
 architecture rtl of firm_sched_arrivals is
@@ -106,11 +108,13 @@ begin
   u_row_asks : entity firm.firm_axis_select
     generic map (
       WORDS => ROWS,
-      WIDTH => COLUMNS)
+      WIDTH => COLUMNS
+    )
     port map (
       words_in => asks,
       index    => found_row,
-      word     => row_asks);
+      word     => row_asks
+    );
 
   -- Its columns. The request of the one that finishes is its last beat's, not a new task's.
 
@@ -129,13 +133,15 @@ begin
   u_accepted : entity firm.firm_sched_ram
     generic map (
       ADDRESS_BITS => ROW_BITS,
-      WORD_BITS    => COLUMNS)
+      WORD_BITS    => COLUMNS
+    )
     port map (
       clk          => clk,
       address      => next_row,
       read_word    => row_accepted,
       write_enable => accept_row,
-      write_word   => new_accepted);
+      write_word   => new_accepted
+    );
 
   -- Whoever is known no longer is. A task that is forgotten is known, too.
   forgets      <= any_of(batch_r and finished_column) when row_r = finished_row else '0';
@@ -145,7 +151,8 @@ begin
   u_finished : entity firm.firm_sched_ram_2
     generic map (
       ADDRESS_BITS => ROW_BITS,
-      WORD_BITS    => COLUMNS)
+      WORD_BITS    => COLUMNS
+    )
     port map (
       clk          => clk,
       address      => finished_row,
@@ -153,7 +160,8 @@ begin
       write_enable => finish_task,
       write_word   => new_finished,
       address_2    => next_row,
-      read_word_2  => row_finished);
+      read_word_2  => row_finished
+    );
 
   hold_batch : process (clk)
     variable staying : columns_t;

@@ -23,7 +23,8 @@ entity firm_sched_combined is
     TRANSFER_TIMES : times_t := IMPLICIT;
     DEADLINES      : times_t := IMPLICIT;
     TIME_BITS      : integer := 16;
-    SHORTEST_RUN   : integer := 1);
+    SHORTEST_RUN   : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -33,7 +34,8 @@ entity firm_sched_combined is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_combined;
 
 architecture rtl of firm_sched_combined is
@@ -86,7 +88,8 @@ begin
           TRANSFER_TIMES => part_of(TRANSFER_TIMES, FIRST, SIZE),
           DEADLINES      => part_of(DEADLINES, FIRST, SIZE),
           TIME_BITS      => TIME_BITS,
-          SHORTEST_RUN   => SHORTEST_RUN)
+          SHORTEST_RUN   => SHORTEST_RUN
+        )
         port map (
           clk          => clk,
           rst_n        => rst_n,
@@ -94,16 +97,19 @@ begin
           beat         => group_beat(group_index),
           last         => last,
           grant_valid  => group_valid(group_index),
-          grant_select => choice);
+          grant_select => choice
+        );
 
       u_offered : entity firm.firm_axis_select
         generic map (
           WORDS => SIZE,
-          WIDTH => 1)
+          WIDTH => 1
+        )
         port map (
           words_in => request(FIRST+SIZE-1 downto FIRST),
           index    => choice,
-          word     => offered);
+          word     => offered
+        );
 
       group_request(group_index) <= group_valid(group_index) and offered(0);
 
@@ -117,7 +123,8 @@ begin
       generic map (
         POLICY       => TOP_POLICY,
         REQUESTERS   => GROUPS,
-        SHORTEST_RUN => SHORTEST_RUN)
+        SHORTEST_RUN => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -125,16 +132,19 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => top_select);
+        grant_select => top_select
+      );
   end generate among_groups;
 
   u_choice : entity firm.firm_axis_select
     generic map (
       WORDS => GROUPS,
-      WIDTH => SELECT_BITS)
+      WIDTH => SELECT_BITS
+    )
     port map (
       words_in => group_choices,
       index    => top_select,
-      word     => grant_select);
+      word     => grant_select
+    );
 
 end architecture rtl;

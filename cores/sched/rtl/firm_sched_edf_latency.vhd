@@ -13,7 +13,8 @@ entity firm_sched_edf_latency is
     PERIODS      : times_t;
     DEADLINES    : times_t := IMPLICIT;
     TIME_BITS    : integer := 16;
-    SHORTEST_RUN : integer := 1);
+    SHORTEST_RUN : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -23,7 +24,8 @@ entity firm_sched_edf_latency is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_edf_latency;
 
 architecture rtl of firm_sched_edf_latency is
@@ -45,7 +47,8 @@ begin
         SENDS_OWN_TIME => false,
         OFFSETS        => deadlines_of(REQUESTERS, PERIODS, DEADLINES),
         TIME_BITS      => TIME_BITS,
-        SHORTEST_RUN   => SHORTEST_RUN)
+        SHORTEST_RUN   => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -53,7 +56,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_few;
 
   of_many : if REQUESTERS > FEW generate
@@ -63,7 +67,8 @@ begin
         POLICY       => EDF_LATENCY,
         OFFSETS      => deadlines_of(REQUESTERS, PERIODS, DEADLINES),
         TIME_BITS    => TIME_BITS,
-        SHORTEST_RUN => SHORTEST_RUN)
+        SHORTEST_RUN => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -71,7 +76,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_many;
 
 end architecture rtl;

@@ -12,7 +12,8 @@ entity firm_sched_edf_resources is
     PERIODS      : times_t;
     DEADLINES    : times_t := IMPLICIT;
     TIME_BITS    : integer := 16;
-    SHORTEST_RUN : integer := 1);
+    SHORTEST_RUN : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -22,7 +23,8 @@ entity firm_sched_edf_resources is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_edf_resources;
 
 architecture rtl of firm_sched_edf_resources is
@@ -41,7 +43,8 @@ begin
       POLICY       => EDF_RESOURCES,
       OFFSETS      => deadlines_of(REQUESTERS, PERIODS, DEADLINES),
       TIME_BITS    => TIME_BITS,
-      SHORTEST_RUN => SHORTEST_RUN)
+      SHORTEST_RUN => SHORTEST_RUN
+    )
     port map (
       clk          => clk,
       rst_n        => rst_n,
@@ -49,6 +52,7 @@ begin
       beat         => beat,
       last         => last,
       grant_valid  => grant_valid,
-      grant_select => grant_select);
+      grant_select => grant_select
+    );
 
 end architecture rtl;

@@ -30,7 +30,8 @@ entity firm_sched_engine is
     -- From the time at which a task leaves the arrivals to its key; not for LRU.
     OFFSETS      : times_t  := IMPLICIT;
     TIME_BITS    : integer  := 16;
-    SHORTEST_RUN : integer  := 1);
+    SHORTEST_RUN : integer  := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -40,7 +41,8 @@ entity firm_sched_engine is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_engine;
 
 architecture rtl of firm_sched_engine is
@@ -116,7 +118,8 @@ begin
 
   u_arrivals : entity firm.firm_sched_arrivals
     generic map (
-      REQUESTERS => REQUESTERS)
+      REQUESTERS => REQUESTERS
+    )
     port map (
       clk            => clk,
       rst_n          => rst_n,
@@ -126,7 +129,8 @@ begin
       leaves         => a_leaves,
       finished       => finished,
       finished_known => keyed_r,
-      finished_id    => grant_select_r);
+      finished_id    => grant_select_r
+    );
 
   a_is_own <= '1' when a_id = grant_select_r else '0';
 
@@ -176,7 +180,8 @@ begin
     u_stamps : entity firm.firm_sched_stamps
       generic map (
         REQUESTERS => REQUESTERS,
-        STAMP_BITS => STAMP_BITS)
+        STAMP_BITS => STAMP_BITS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -185,7 +190,8 @@ begin
         read         => a_valid,
         read_id      => a_id,
         read_ready   => key_ready,
-        stamp        => a_key);
+        stamp        => a_key
+      );
 
     advance <= '0';
   end generate stamped;
@@ -199,7 +205,8 @@ begin
     u_heap : entity firm.firm_sched_heap
       generic map (
         ITEMS    => max(REQUESTERS, 1),
-        KEY_BITS => KEY_BITS)
+        KEY_BITS => KEY_BITS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -214,14 +221,16 @@ begin
         first_id     => first_id,
         first_key    => first_key,
         pop          => pop,
-        empty        => empty);
+        empty        => empty
+      );
   end generate of_few_luts;
 
   of_few_cycles : if IS_SORTED generate
     u_sorted : entity firm.firm_sched_sorted_queue
       generic map (
         ITEMS    => max(REQUESTERS, 1),
-        KEY_BITS => KEY_BITS)
+        KEY_BITS => KEY_BITS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -236,7 +245,8 @@ begin
         first_id     => first_id,
         first_key    => first_key,
         pop          => pop,
-        empty        => empty);
+        empty        => empty
+      );
   end generate of_few_cycles;
 
   -- Who is granted next.

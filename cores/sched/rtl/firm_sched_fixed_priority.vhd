@@ -15,7 +15,8 @@ entity firm_sched_fixed_priority is
     REQUESTERS : integer := 2;
     PREEMPTIVE : boolean := false;
     -- Beats; of a preemptive one only. A requester that pauses may be interrupted all the same.
-    SHORTEST_RUN : integer := 1);
+    SHORTEST_RUN : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -25,7 +26,8 @@ entity firm_sched_fixed_priority is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_fixed_priority;
 
 architecture rtl of firm_sched_fixed_priority is
@@ -57,7 +59,8 @@ begin
 
   u_choice : entity firm.firm_sched_lowest
     generic map (
-      REQUESTERS => REQUESTERS)
+      REQUESTERS => REQUESTERS
+    )
     port map (
       request     => request,
       index       => grant_select_r,
@@ -65,7 +68,8 @@ begin
       asks        => offered,
       found       => found,
       is_before   => is_before,
-      lowest      => choice);
+      lowest      => choice
+    );
 
   whole_tasks : if not PREEMPTIVE generate
     signal started_r : std_logic;  -- the granted task has had a beat and needs more

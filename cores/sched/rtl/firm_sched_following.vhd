@@ -10,12 +10,14 @@ use firm.firm_sched_pkg.all;
 
 entity firm_sched_following is
   generic (
-    REQUESTERS : integer := 2);
+    REQUESTERS : integer := 2
+  );
   port (
     request   : in  std_logic_vector(REQUESTERS-1 downto 0);
     index     : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
     found     : out std_logic;
-    following : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));  -- any if none is found
+    following : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)  -- any if none is found
+  );
 end entity firm_sched_following;
 
 architecture rtl of firm_sched_following is
@@ -77,20 +79,24 @@ begin
     u_of_row : entity firm.firm_axis_select
       generic map (
         WORDS => ROWS,
-        WIDTH => COLUMNS)
+        WIDTH => COLUMNS
+      )
       port map (
         words_in => padded,
         index    => row,
-        word     => of_row);
+        word     => of_row
+      );
 
     u_of_next : entity firm.firm_axis_select
       generic map (
         WORDS => ROWS,
-        WIDTH => COLUMNS)
+        WIDTH => COLUMNS
+      )
       port map (
         words_in => padded,
         index    => next_row,
-        word     => of_next);
+        word     => of_next
+      );
 
     later     <= of_row and above(column, COLUMNS);
     is_in_row <= any_of(later);

@@ -19,7 +19,8 @@ use firm.firm_sched_queue_pkg.all;
 entity firm_sched_heap is
   generic (
     ITEMS    : positive;
-    KEY_BITS : positive);
+    KEY_BITS : positive
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -38,8 +39,9 @@ entity firm_sched_heap is
     first_valid : out std_logic;
     first_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     first_key   : out std_logic_vector(KEY_BITS-1 downto 0);
-    pop        : in  std_logic;    -- takes that item; only while it is valid
-    empty      : out std_logic);   -- nothing is in the queue; while '0', a root is there or comes
+    pop         : in  std_logic;    -- takes that item; only while it is valid
+    empty       : out std_logic     -- nothing is in the queue; while '0', a root is there or comes
+  );
 end entity firm_sched_heap;
 
 architecture rtl of firm_sched_heap is
@@ -128,7 +130,8 @@ begin
       generic map (
         LEVEL    => level,
         ID_BITS  => LEVELS,
-        KEY_BITS => KEY_BITS)
+        KEY_BITS => KEY_BITS
+      )
       port map (
         clk           => clk,
         rst_n         => rst_n,
@@ -149,7 +152,8 @@ begin
         hole_right    => hole_right(level),
         filler_valid  => up_valid(level),
         filler_id     => up_id(level),
-        filler_key    => up_key(level));
+        filler_key    => up_key(level)
+      );
 
     note_hole : process (clk)
     begin
@@ -169,7 +173,7 @@ begin
   root_id    <= root_id_r;
   root_key   <= root_key_r;
   first_valid <= root_valid_r or (filling_r and up_valid(0));
-  first_id    <= up_id(0)  when filling_r = '1' else root_id_r;
+  first_id    <= up_id(0) when filling_r = '1' else root_id_r;
   first_key   <= up_key(0) when filling_r = '1' else root_key_r;
   empty      <= not (root_valid_r or filling_r or owing_r);
 

@@ -19,7 +19,8 @@ entity firm_sched_heap_level is
   generic (
     LEVEL    : positive;   -- 1 to ID_BITS
     ID_BITS  : positive;
-    KEY_BITS : positive);
+    KEY_BITS : positive
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -48,7 +49,8 @@ entity firm_sched_heap_level is
     hole_right   : in std_logic;
     filler_valid : in std_logic;
     filler_id    : in std_logic_vector(ID_BITS-1 downto 0);
-    filler_key   : in std_logic_vector(KEY_BITS-1 downto 0));
+    filler_key   : in std_logic_vector(KEY_BITS-1 downto 0)
+  );
 end entity firm_sched_heap_level;
 
 architecture rtl of firm_sched_heap_level is
@@ -132,31 +134,35 @@ begin
 
   pairs : if LEVEL > 1 generate
     constant ADDRESS_BITS : positive := LEVEL - 1;
-    signal address : std_logic_vector(ADDRESS_BITS-1 downto 0);
+    signal address        : std_logic_vector(ADDRESS_BITS-1 downto 0);
   begin
     address <= id_r(ID_BITS-1 downto LOW_BITS+1);
 
     u_left : entity firm.firm_sched_ram
       generic map (
         ADDRESS_BITS => ADDRESS_BITS,
-        WORD_BITS    => NODE_BITS)
+        WORD_BITS    => NODE_BITS
+      )
       port map (
         clk          => clk,
         address      => address,
         read_word    => left,
         write_enable => write_left,
-        write_word   => write_node);
+        write_word   => write_node
+      );
 
     u_right : entity firm.firm_sched_ram
       generic map (
         ADDRESS_BITS => ADDRESS_BITS,
-        WORD_BITS    => NODE_BITS)
+        WORD_BITS    => NODE_BITS
+      )
       port map (
         clk          => clk,
         address      => address,
         read_word    => right,
         write_enable => write_right,
-        write_word   => write_node);
+        write_word   => write_node
+      );
   end generate pairs;
 
   item(NODE_BITS-1)                 <= insert_r;
@@ -174,8 +180,8 @@ begin
     second_right <= '1';
   end generate leaves;
   inner_nodes : if LOW_BITS > 0 generate
-    first        <= left  when fill_r = '1'                       else item;
-    second       <= right when fill_r = '1' or id_r(SIDE) = '1'   else left;
+    first        <= left when fill_r = '1' else item;
+    second       <= right when fill_r = '1' or id_r(SIDE) = '1' else left;
     second_right <= fill_r or id_r(SIDE);
   end generate inner_nodes;
   first_rank   <= rank(first, not fill_r and id_r(SIDE));

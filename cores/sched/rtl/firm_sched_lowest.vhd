@@ -11,7 +11,8 @@ use firm.firm_sched_pkg.all;
 
 entity firm_sched_lowest is
   generic (
-    REQUESTERS : integer := 2);
+    REQUESTERS : integer := 2
+  );
   port (
     request     : in  std_logic_vector(REQUESTERS-1 downto 0);
     index       : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
@@ -19,7 +20,8 @@ entity firm_sched_lowest is
     asks        : out std_logic;  -- the given one
     found       : out std_logic;  -- another one asks
     is_before   : out std_logic;  -- one of a lower index does
-    lowest      : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));  -- any if none is found
+    lowest      : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)  -- any if none is found
+  );
 end entity firm_sched_lowest;
 
 architecture rtl of firm_sched_lowest is
@@ -30,9 +32,9 @@ architecture rtl of firm_sched_lowest is
 
   -- The word of a number, found from its highest bit on.
   function word_at(words, number : std_logic_vector) return std_logic_vector is
-    constant HALF : positive := words'length / 2;
-    alias numbered : std_logic_vector(2*HALF-1 downto 0) is words;
-    alias bits     : std_logic_vector(number'length-1 downto 0) is number;
+    constant HALF         : positive := words'length / 2;
+    alias numbered        : std_logic_vector(2*HALF-1 downto 0) is words;
+    alias bits            : std_logic_vector(number'length-1 downto 0) is number;
     variable half_of_word : std_logic_vector(HALF-1 downto 0);
   begin
     if bits(bits'high) = '1' then
@@ -101,11 +103,13 @@ begin
     u_of_first : entity firm.firm_axis_select
       generic map (
         WORDS => ROWS,
-        WIDTH => COLUMNS)
+        WIDTH => COLUMNS
+      )
       port map (
         words_in => padded,
         index    => first_row,
-        word     => of_first);
+        word     => of_first
+      );
 
     of_row     <= word_at(padded, row);
     left       <= of_row and not is_column;

@@ -9,7 +9,8 @@ use firm.firm_sched_pkg.all;
 
 entity firm_sched_lru is
   generic (
-    REQUESTERS : integer := 2);
+    REQUESTERS : integer := 2
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -19,7 +20,8 @@ entity firm_sched_lru is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_lru;
 
 architecture rtl of firm_sched_lru is
@@ -35,7 +37,8 @@ begin
   of_few : if REQUESTERS >= 1 and REQUESTERS <= FEW generate
     u_matrix : entity firm.firm_sched_age_matrix
       generic map (
-        REQUESTERS => REQUESTERS)
+        REQUESTERS => REQUESTERS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -43,14 +46,16 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_few;
 
   of_many : if REQUESTERS > FEW generate
     u_engine : entity firm.firm_sched_engine
       generic map (
         REQUESTERS => REQUESTERS,
-        POLICY     => LRU)
+        POLICY     => LRU
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -58,7 +63,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_many;
 
 end architecture rtl;

@@ -14,7 +14,8 @@ entity firm_sched_lst is
     TRANSFER_TIMES : times_t;  -- beats of a task
     DEADLINES      : times_t := IMPLICIT;
     TIME_BITS      : integer := 16;
-    SHORTEST_RUN   : integer := 1);
+    SHORTEST_RUN   : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -24,14 +25,15 @@ entity firm_sched_lst is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_lst;
 
 architecture rtl of firm_sched_lst is
 
   constant FEW : positive := 8;
 
-  constant FAULT : string := fault_of_deadlines(REQUESTERS, PERIODS, DEADLINES, TIME_BITS, SHORTEST_RUN);
+  constant FAULT          : string := fault_of_deadlines(REQUESTERS, PERIODS, DEADLINES, TIME_BITS, SHORTEST_RUN);
   constant TRANSFER_FAULT : string := fault_of_transfer(TRANSFER_TIMES, REQUESTERS, TIME_BITS);
 
   -- A task's slack: what remains to its deadline if it is sent at once.
@@ -55,7 +57,8 @@ begin
         SENDS_OWN_TIME => true,
         OFFSETS        => OFFSETS,
         TIME_BITS      => TIME_BITS,
-        SHORTEST_RUN   => SHORTEST_RUN)
+        SHORTEST_RUN   => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -63,7 +66,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_few;
 
   of_many : if REQUESTERS > FEW generate
@@ -73,7 +77,8 @@ begin
         POLICY       => LST,
         OFFSETS      => OFFSETS,
         TIME_BITS    => TIME_BITS,
-        SHORTEST_RUN => SHORTEST_RUN)
+        SHORTEST_RUN => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -81,7 +86,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_many;
 
 end architecture rtl;

@@ -24,7 +24,8 @@ entity firm_sched_parallel is
     SENDS_OWN_TIME : boolean := false;  -- a task grows no more urgent by the cycles in which it sends
     OFFSETS        : times_t := IMPLICIT;  -- from the cycle in which a task comes until it is urgent by 0
     TIME_BITS      : integer := 16;
-    SHORTEST_RUN   : integer := 1);
+    SHORTEST_RUN   : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -34,7 +35,8 @@ entity firm_sched_parallel is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_parallel;
 
 architecture rtl of firm_sched_parallel is
@@ -140,7 +142,8 @@ begin
   begin
     beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
     kept  <= any_of(request and current(REQUESTERS-1 downto 0)) and not finished
-             when beats > 0 and beats < SHORTEST_RUN else '0';
+             when beats > 0 and beats < SHORTEST_RUN else
+             '0';
 
     count_beats : process (clk)
     begin

@@ -11,6 +11,7 @@ package firm_sched_pkg is
 
   constant MAX_REQUESTERS : positive := 256;
 
+  -- `make policies` writes the list from fusesoc_firm/scheduling/policies.py.
   type policy_t is (FIXED_PRIORITY, FIXED_PRIORITY_PREEMPTIVE, ROUND_ROBIN, LRU, EDF_RESOURCES, EDF_LATENCY, LST);
   type policies_t is array (natural range <>) of policy_t;
 
@@ -63,7 +64,7 @@ package firm_sched_pkg is
     return string;
   -- Of the times of all groups, if the policy of one knows them.
   function fault_of_group_times(requesters : integer; policies : policies_t;
-                                periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
+    periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
     return string;
 
 end package firm_sched_pkg;
@@ -132,6 +133,11 @@ package body firm_sched_pkg is
   begin
     return policy = EDF_RESOURCES or policy = EDF_LATENCY or policy = LST;
   end function has_deadlines;
+
+  function has_transfer_times(policy : policy_t) return boolean is
+  begin
+    return policy = LST;
+  end function has_transfer_times;
 
   function is_implicit(deadlines : times_t) return boolean is
   begin
@@ -237,7 +243,8 @@ package body firm_sched_pkg is
     return "";
   end function fault_of_time_bits;
 
-  function fault_of_times(generic_name, kind : string; times : times_t; requesters, time_bits : integer) return string is
+  function fault_of_times(generic_name, kind : string; times : times_t; requesters, time_bits : integer)
+    return string is
   begin
     if times'length /= requesters then
       return generic_name & " has " & integer'image(times'length) & " times; legal: one for each of " &
@@ -302,14 +309,14 @@ package body firm_sched_pkg is
   end function fault_of_groups;
 
   function fault_of_group_times(requesters : integer; policies : policies_t;
-                                periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
+    periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
     return string is
     variable any_deadlines : boolean := false;
     variable any_transfer  : boolean := false;
   begin
     for place in policies'range loop
       any_deadlines := any_deadlines or has_deadlines(policies(place));
-      any_transfer  := any_transfer or policies(place) = LST;
+      any_transfer  := any_transfer or has_transfer_times(policies(place));
     end loop;
     if any_deadlines and fault_of_deadlines(requesters, periods, deadlines, time_bits, shortest_run) /= "" then
       return fault_of_deadlines(requesters, periods, deadlines, time_bits, shortest_run);

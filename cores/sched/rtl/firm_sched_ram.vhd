@@ -7,14 +7,16 @@ use ieee.numeric_std.all;
 entity firm_sched_ram is
   generic (
     ADDRESS_BITS : positive;
-    WORD_BITS    : positive);
+    WORD_BITS    : positive
+  );
   port (
     clk : in std_logic;
 
     address      : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
     read_word    : out std_logic_vector(WORD_BITS-1 downto 0);
     write_enable : in  std_logic;
-    write_word   : in  std_logic_vector(WORD_BITS-1 downto 0));
+    write_word   : in  std_logic_vector(WORD_BITS-1 downto 0)
+  );
 end entity firm_sched_ram;
 
 architecture rtl of firm_sched_ram is

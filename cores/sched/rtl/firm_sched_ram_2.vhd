@@ -7,7 +7,8 @@ use ieee.numeric_std.all;
 entity firm_sched_ram_2 is
   generic (
     ADDRESS_BITS : positive;
-    WORD_BITS    : positive);
+    WORD_BITS    : positive
+  );
   port (
     clk : in std_logic;
 
@@ -17,7 +18,8 @@ entity firm_sched_ram_2 is
     write_word   : in  std_logic_vector(WORD_BITS-1 downto 0);
 
     address_2   : in  std_logic_vector(ADDRESS_BITS-1 downto 0);
-    read_word_2 : out std_logic_vector(WORD_BITS-1 downto 0));
+    read_word_2 : out std_logic_vector(WORD_BITS-1 downto 0)
+  );
 end entity firm_sched_ram_2;
 
 architecture rtl of firm_sched_ram_2 is

@@ -10,7 +10,8 @@ use firm.firm_sched_pkg.all;
 
 entity firm_sched_round_robin is
   generic (
-    REQUESTERS : integer := 2);
+    REQUESTERS : integer := 2
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -20,7 +21,8 @@ entity firm_sched_round_robin is
     last    : in std_logic;  -- and is its task's last; read with `beat` only
 
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity firm_sched_round_robin;
 
 architecture rtl of firm_sched_round_robin is
@@ -46,12 +48,14 @@ begin
 
   u_choice : entity firm.firm_sched_following
     generic map (
-      REQUESTERS => REQUESTERS)
+      REQUESTERS => REQUESTERS
+    )
     port map (
       request   => request,
       index     => served,
       found     => found,
-      following => choice);
+      following => choice
+    );
 
   choose : process (clk)
   begin

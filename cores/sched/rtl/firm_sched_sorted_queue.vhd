@@ -14,7 +14,8 @@ use firm.firm_sched_queue_pkg.all;
 entity firm_sched_sorted_queue is
   generic (
     ITEMS    : positive;
-    KEY_BITS : positive);
+    KEY_BITS : positive
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -33,8 +34,9 @@ entity firm_sched_sorted_queue is
     first_valid : out std_logic;
     first_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     first_key   : out std_logic_vector(KEY_BITS-1 downto 0);
-    pop        : in  std_logic;    -- takes that item; only while it is valid
-    empty      : out std_logic);   -- nothing is in the queue; while '0', a root is there or comes
+    pop         : in  std_logic;    -- takes that item; only while it is valid
+    empty       : out std_logic     -- nothing is in the queue; while '0', a root is there or comes
+  );
 end entity firm_sched_sorted_queue;
 
 architecture rtl of firm_sched_sorted_queue is

@@ -19,7 +19,8 @@ use firm.firm_sched_queue_pkg.all;
 entity firm_sched_stamps is
   generic (
     REQUESTERS : integer := 2;
-    STAMP_BITS : positive);  -- those of an index and 5 more
+    STAMP_BITS : positive  -- those of an index and 5 more
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -30,7 +31,8 @@ entity firm_sched_stamps is
     read       : in  std_logic;
     read_id    : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
     read_ready : out std_logic;  -- `stamp` is that of `read_id`
-    stamp      : out std_logic_vector(STAMP_BITS-1 downto 0));
+    stamp      : out std_logic_vector(STAMP_BITS-1 downto 0)
+  );
 end entity firm_sched_stamps;
 
 architecture rtl of firm_sched_stamps is
@@ -85,13 +87,15 @@ begin
   u_stamps : entity firm.firm_sched_ram
     generic map (
       ADDRESS_BITS => ID_BITS,
-      WORD_BITS    => STAMP_BITS)
+      WORD_BITS    => STAMP_BITS
+    )
     port map (
       clk          => clk,
       address      => address,
       read_word    => read_word,
       write_enable => write_enable,
-      write_word   => write_word);
+      write_word   => write_word
+    );
 
   new_marks   <= marks or decode(column, '1', COLUMNS) when clearing = '0' else (others => '0');
   write_marks <= write_enable or clearing;
@@ -99,22 +103,26 @@ begin
   u_marks : entity firm.firm_sched_ram
     generic map (
       ADDRESS_BITS => ROW_BITS,
-      WORD_BITS    => COLUMNS)
+      WORD_BITS    => COLUMNS
+    )
     port map (
       clk          => clk,
       address      => row,
       read_word    => marks,
       write_enable => write_marks,
-      write_word   => new_marks);
+      write_word   => new_marks
+    );
 
   u_is_marked : entity firm.firm_axis_select
     generic map (
       WORDS => COLUMNS,
-      WIDTH => 1)
+      WIDTH => 1
+    )
     port map (
       words_in => marks,
       index    => column,
-      word     => is_marked);
+      word     => is_marked
+    );
 
   found_stamp <= read_word when is_marked(0) = '1' else std_logic_vector(resize(unsigned(address), STAMP_BITS));
 

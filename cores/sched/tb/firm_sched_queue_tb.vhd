@@ -21,7 +21,8 @@ entity firm_sched_queue_tb is
     INSERT_PERCENT : integer := 50;
     POP_PERCENT    : integer := 50;
     TRACE          : string  := "queue.txt";
-    EXPECTED       : string  := "");
+    EXPECTED       : string  := ""
+  );
 end entity firm_sched_queue_tb;
 
 architecture simulation of firm_sched_queue_tb is
@@ -53,7 +54,8 @@ begin
     u_queue : entity firm.firm_sched_heap
       generic map (
         ITEMS    => ITEMS,
-        KEY_BITS => KEY_BITS)
+        KEY_BITS => KEY_BITS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -68,14 +70,16 @@ begin
         first_id     => first_id,
         first_key    => first_key,
         pop          => pop,
-        empty        => empty);
+        empty        => empty
+      );
   end generate heap;
 
   sorted_queue : if SORTED generate
     u_queue : entity firm.firm_sched_sorted_queue
       generic map (
         ITEMS    => ITEMS,
-        KEY_BITS => KEY_BITS)
+        KEY_BITS => KEY_BITS
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -90,7 +94,8 @@ begin
         first_id     => first_id,
         first_key    => first_key,
         pop          => pop,
-        empty        => empty);
+        empty        => empty
+      );
   end generate sorted_queue;
 
   pop <= pop_wanted and first_valid;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Random tasks for the scheduler of any policy. What its ports do in every cycle is written to a file, which is
--- compared with the policy's model in Python: tests/sim/sched_trace.py reads it.
+-- compared with the policy's model in Python: tests/cores/sched_trace.py reads it.
 -- How requesters and sink behave is drawn anew for each stretch of cycles: everybody or a lone one has tasks, of one
 -- beat or many, at once, in bursts or now and then, with pauses and stalls or without.
 library ieee;
@@ -34,8 +34,9 @@ entity firm_sched_trace_tb is
     STRETCH : integer := 0;
     -- At the beginning of a stretch nobody takes a beat for as many cycles at most.
     LONGEST_STALL : integer := 0;
-    TRACE     : string  := "trace.txt";
-    EXPECTED  : string  := "");
+    TRACE         : string  := "trace.txt";
+    EXPECTED      : string  := ""
+  );
 end entity firm_sched_trace_tb;
 
 architecture simulation of firm_sched_trace_tb is
@@ -143,7 +144,8 @@ begin
         TRANSFER_TIMES => TRANSFER_TIMES,
         DEADLINES      => DEADLINES,
         TIME_BITS      => TIME_BITS,
-        SHORTEST_RUN   => SHORTEST_RUN)
+        SHORTEST_RUN   => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -151,7 +153,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate plain;
 
   of_groups : if IS_COMBINED generate
@@ -165,7 +168,8 @@ begin
         TRANSFER_TIMES => TRANSFER_TIMES,
         DEADLINES      => DEADLINES,
         TIME_BITS      => TIME_BITS,
-        SHORTEST_RUN   => SHORTEST_RUN)
+        SHORTEST_RUN   => SHORTEST_RUN
+      )
       port map (
         clk          => clk,
         rst_n        => rst_n,
@@ -173,7 +177,8 @@ begin
         beat         => beat,
         last         => last,
         grant_valid  => grant_valid,
-        grant_select => grant_select);
+        grant_select => grant_select
+      );
   end generate of_groups;
 
   drive : process

@@ -1,8 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The synchroniser as simulation should have it: what changed last before an edge may be seen now or an edge later, each bit
--- for itself, as a metastable register decides. A library has it in place of that of robot:cdc:firm_cdc_sync.
--- Earlier changes have settled: bits that change one after the other are never seen in another order, as in a wire each.
--- What it draws follows from where it stands and from when its input changes first: another phase gives other numbers.
+-- The synchroniser as simulation should have it: what changed last before an edge may be seen now or an edge later,
+-- each bit for itself, as a metastable register decides. A library has it in place of that of robot:cdc:firm_cdc_sync.
+-- Earlier changes have settled: bits that change one after the other are never seen in another order, as in a wire
+-- each. What it draws follows from where it stands and from when its input changes first: another phase gives other
+-- numbers.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -10,11 +11,13 @@ use ieee.math_real.all;
 entity firm_cdc_sync is
   generic (
     BITS   : integer := 1;
-    STAGES : integer := 2);
+    STAGES : integer := 2
+  );
   port (
     clk    : in  std_logic;
     level  : in  std_logic_vector(BITS-1 downto 0);
-    synced : out std_logic_vector(BITS-1 downto 0));
+    synced : out std_logic_vector(BITS-1 downto 0)
+  );
 end entity firm_cdc_sync;
 
 architecture simulation of firm_cdc_sync is

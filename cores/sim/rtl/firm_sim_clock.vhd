@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A clock that has nothing to do with another one: it has about so many edges for each of the other's, begins at any phase,
--- and is off by up to a thousandth, so that its edges wander along the other's. Simulation only.
+-- A clock that has nothing to do with another one: it has about so many edges for each of the other's, begins at any
+-- phase, and is off by up to a thousandth, so that its edges wander along the other's. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -10,11 +10,13 @@ entity firm_sim_clock is
     -- Period in picoseconds, 2 and more.
     PERIOD_PS : integer := 10000;
     -- Different for each instance, 1 and more: the phase, and by how much the period is off.
-    SEED : integer := 1);
+    SEED : integer := 1
+  );
   port (
     -- The clock ends with it, so that a simulation does: when it stood still for some of the longer periods.
     reference : in  std_logic;
-    clk       : out std_logic);
+    clk       : out std_logic
+  );
 end entity firm_sim_clock;
 
 architecture simulation of firm_sim_clock is

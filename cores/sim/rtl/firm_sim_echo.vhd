@@ -14,7 +14,8 @@ entity firm_sim_echo is
     DEPTH : integer := 16;
     SEED  : integer := 1;
     -- The chance of a stall in a cycle, on each side.
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -29,7 +30,8 @@ entity firm_sim_echo is
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_sim_echo;
 
 architecture simulation of firm_sim_echo is
@@ -60,7 +62,8 @@ begin
     generic map (
       WIDTH         => WIDTH,
       SEED          => 2*SEED,
-      STALL_PERCENT => STALL_PERCENT)
+      STALL_PERCENT => STALL_PERCENT
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -73,12 +76,14 @@ begin
       m_axis_tkeep  => taken_tkeep,
       m_axis_tvalid => taken_tvalid,
       m_axis_tlast  => taken_tlast,
-      m_axis_tready => taken_tready);
+      m_axis_tready => taken_tready
+    );
 
   u_fifo : entity firm.firm_axis_fifo
     generic map (
       WIDTH => WIDTH,
-      DEPTH => DEPTH)
+      DEPTH => DEPTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -91,7 +96,8 @@ begin
       m_axis_tkeep  => kept_tkeep,
       m_axis_tvalid => kept_tvalid,
       m_axis_tlast  => kept_tlast,
-      m_axis_tready => kept_tready);
+      m_axis_tready => kept_tready
+    );
 
   find_first : process (clk)
   begin
@@ -127,7 +133,8 @@ begin
     generic map (
       WIDTH         => WIDTH,
       SEED          => 2*SEED + 1,
-      STALL_PERCENT => STALL_PERCENT)
+      STALL_PERCENT => STALL_PERCENT
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -140,6 +147,7 @@ begin
       m_axis_tkeep  => m_axis_tkeep,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
+      m_axis_tready => m_axis_tready
+    );
 
 end architecture simulation;

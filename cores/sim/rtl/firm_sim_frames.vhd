@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's end of a link that carries bytes: finds frames in them by their lengths and passes each on when it is whole.
--- It keeps what it has, however much that is. Simulation only.
+-- The host's end of a link that carries bytes: finds frames in them by their lengths and passes each on when it is
+-- whole. It keeps what it has, however much that is. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -19,7 +19,8 @@ entity firm_sim_frames is
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_sim_frames;
 
 architecture simulation of firm_sim_frames is

@@ -10,7 +10,8 @@ entity firm_sim_gates is
     COUNT : integer := 1;
     SEED  : integer := 1;
     -- The chance that a gate is closed in a cycle in which its source has something; 0 keeps all open.
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -19,7 +20,8 @@ entity firm_sim_gates is
     valid : in std_logic_vector(COUNT-1 downto 0);
     ready : in std_logic_vector(COUNT-1 downto 0);
 
-    is_open : out std_logic_vector(COUNT-1 downto 0));
+    is_open : out std_logic_vector(COUNT-1 downto 0)
+  );
 end entity firm_sim_gates;
 
 architecture simulation of firm_sim_gates is

@@ -1,9 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host beside the hardware, for simulation: makes clock and reset, sends the frames of a stimulus file, compares
--- what comes back with an expected file, and reports. docs/simulation.md says what the files and the report look like.
+-- what comes back with an expected file, and reports. docs/reference/simulation-host.md says what the files and the
+-- report look like.
 --
 -- One process does all of it once a cycle: it reads the inputs as they are before the rising edge, and what it
--- drives changes HOLD after the edge, so no order of delta cycles matters. Where a stream carries nothing, the host drives 'X'.
+-- drives changes HOLD after the edge, so no order of delta cycles matters. Where a stream carries nothing, the host
+-- drives 'X'.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -32,7 +34,8 @@ entity firm_sim_host is
     -- Cycles without a beat after which the host gives up on missing frames.
     WATCHDOG : integer := 100000;
     -- Cycles without a beat in which it listens for surplus frames when everything has come.
-    QUIET : integer := 1000);
+    QUIET : integer := 1000
+  );
   port (
     clk   : out std_logic;
     rst_n : out std_logic;
@@ -54,7 +57,8 @@ entity firm_sim_host is
 
     -- A pulse that the expected file does not announce is a fault.
     id_error    : in std_logic                           := '0';
-    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0'));
+    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0')
+  );
 end entity firm_sim_host;
 
 architecture simulation of firm_sim_host is
@@ -98,7 +102,7 @@ begin
     variable expected : frame_file_t;
 
     variable cycle       : natural := 0;
-    variable idle_cycles : natural := 0;  -- since the last beat sent or expected; surplus ones shall not keep a run alive
+    variable idle_cycles : natural := 0;  -- since the last beat sent or expected; surplus ones do not keep a run alive
     variable faults      : natural := 0;
     variable random_1    : positive;
     variable random_2    : positive := 1;
@@ -132,7 +136,7 @@ begin
     variable held_tlast : std_logic;
 
     -- The file of what came: its line of the frame that comes in.
-    file received         : text;
+    file received          : text;
     variable received_line : line;
 
     variable id_errors    : natural := 0;
@@ -319,7 +323,8 @@ begin
       end if;
       wanted := to_byte(receiving.bytes(bytes_received+1));
       if value /= wanted then
-        frame_fault("byte " & integer'image(bytes_received) & ": expected " & to_hex(wanted) & ", got " & to_hex(value));
+        frame_fault("byte " & integer'image(bytes_received) & ": expected " & to_hex(wanted) & ", got "
+          & to_hex(value));
       end if;
     end procedure compare_byte;
 
@@ -345,7 +350,8 @@ begin
         return;
       end if;
       if bytes_received < receiving.size then
-        frame_fault("ends after " & integer'image(bytes_received) & " bytes, expected " & integer'image(receiving.size));
+        frame_fault("ends after " & integer'image(bytes_received) & " bytes, expected "
+          & integer'image(receiving.size));
       end if;
       if frames_shown < SHOWN then
         show_frame;

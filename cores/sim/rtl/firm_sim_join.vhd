@@ -11,7 +11,8 @@ use firm.firm_axis_pkg.all;
 
 entity firm_sim_join is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -30,7 +31,8 @@ entity firm_sim_join is
     m_axis_tid    : out std_logic_vector(7 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_sim_join;
 
 architecture simulation of firm_sim_join is

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host beside the hardware at the end of a pipe: makes clock and reset, and does what is requested on file descriptor
--- 3: it takes frames for the system, and runs so many cycles. What happened in them is reported on file descriptor 4.
--- docs/transport.md says what requests and reports look like.
+-- The host beside the hardware at the end of a pipe: makes clock and reset, and does what is requested on file
+-- descriptor 3: it takes frames for the system, and runs so many cycles. What happened in them is reported on file
+-- descriptor 4. docs/reference/transports.md says what requests and reports look like.
 --
 -- Between two requests no time passes, so a simulation depends on the requests, on SEED and STALL_PERCENT alone. What
 -- breaks a rule ends it with a message. As in firm_sim_host, one process reads the inputs before the rising edge, and
@@ -22,7 +22,8 @@ entity firm_sim_pipe is
     -- All randomness follows from it.
     SEED : integer := 1;
     -- The chance, each cycle and direction, that the host offers no beat or takes none.
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
   port (
     clk   : out std_logic;
     rst_n : out std_logic;
@@ -43,7 +44,8 @@ entity firm_sim_pipe is
     s_axis_tready : out std_logic;
 
     id_error    : in std_logic                           := '0';
-    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0'));
+    frame_error : in std_logic_vector(ERRORS-1 downto 0) := (others => '0')
+  );
 end entity firm_sim_pipe;
 
 architecture simulation of firm_sim_pipe is
@@ -458,7 +460,8 @@ begin
           if frame_error(converter) = '1' then
             report_error(converter);
           elsif frame_error(converter) /= '0' then
-            fail_in_cycle("frame_error(" & integer'image(converter) & ") is " & std_logic'image(frame_error(converter)));
+            fail_in_cycle("frame_error(" & integer'image(converter) & ") is "
+              & std_logic'image(frame_error(converter)));
           end if;
         end loop;
       end if;

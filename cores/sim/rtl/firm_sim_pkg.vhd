@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The frame files of the simulation host (docs/simulation.md): read, checked and kept in memory, a character a byte.
--- Simulation only. A fault of form ends the simulation with `file:line: what`.
+-- The frame files of the simulation host (docs/reference/simulation-host.md): read, checked and kept in memory, a
+-- character a byte. Simulation only. A fault of form ends the simulation with `file:line: what`.
 library ieee;
 use ieee.std_logic_1164.all;
 use std.textio.all;
@@ -65,7 +65,7 @@ end package firm_sim_pkg;
 
 package body firm_sim_pkg is
 
-  constant HEX_DIGITS : string(1 to 16) := "0123456789abcdef";
+  constant HEX_DIGITS   : string(1 to 16) := "0123456789abcdef";
   constant HEADER_BYTES : positive := 5;
 
   type byte_table_t is array (character) of byte_t;
@@ -279,7 +279,7 @@ package body firm_sim_pkg is
   end procedure start_frame;
 
   procedure append_bytes(path : in string; line_number : in natural; text : in string; is_mask_legal : in boolean;
-                         frame : inout frame_t) is
+    frame : inout frame_t) is
     variable place : positive := 1;
     variable high  : integer;
     variable low   : integer;
@@ -308,7 +308,8 @@ package body firm_sim_pkg is
   end procedure append_bytes;
 
   -- `! id_error n` or `! frame_error n`.
-  procedure announce_errors(path : in string; line_number : in natural; text : in string; content : inout frame_file_t) is
+  procedure announce_errors(path : in string; line_number : in natural; text : in string;
+    content : inout frame_file_t) is
     constant ID_ERROR    : string := "! id_error ";
     constant FRAME_ERROR : string := "! frame_error ";
     variable pulses      : integer := -1;
@@ -331,7 +332,8 @@ package body firm_sim_pkg is
   end procedure announce_errors;
 
   -- The last frame is complete: check it and put it behind the others with its id.
-  procedure close_frame(path : in string; line_number : in natural; mark : in character; content : inout frame_file_t) is
+  procedure close_frame(path : in string; line_number : in natural; mark : in character;
+    content : inout frame_file_t) is
     variable announced : natural := HEADER_BYTES;
     variable is_masked : boolean := false;
     variable id        : natural;
@@ -371,7 +373,7 @@ package body firm_sim_pkg is
   end procedure close_frame;
 
   procedure read_line(path : in string; line_number : in natural; mark : in character; text : in string;
-                      content : inout frame_file_t) is
+    content : inout frame_file_t) is
     alias characters : string(1 to text'length) is text;
     variable frame   : frame_ptr_t;
   begin

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host as the master of an SPI link: frames of firm_sim_host, and back. It asks for the status, writes as much as there
--- is room for, reads what waits, and begins anew; selections are cut short at random where STALL_PERCENT is not 0.
--- Simulation only.
+-- The host as the master of an SPI link: frames of firm_sim_host, and back. It asks for the status, writes as much as
+-- there is room for, reads what waits, and begins anew; selections are cut short at random where STALL_PERCENT is not
+-- 0. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -13,7 +13,8 @@ entity firm_sim_spi is
     PERIOD : time    := 100 ns;  -- of spi_sclk
     SEED   : integer := 1;
     -- The chance that it pauses before a byte, and that it ends a selection within one.
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -34,7 +35,8 @@ entity firm_sim_spi is
     spi_cs_n : out std_logic;
     spi_mosi : out std_logic;
     spi_miso : in  std_logic;
-    spi_irq  : in  std_logic);
+    spi_irq  : in  std_logic
+  );
 end entity firm_sim_spi;
 
 architecture simulation of firm_sim_spi is
@@ -89,7 +91,8 @@ begin
       wait for PERIOD;
       send_bits(command);
       assert answer(7 downto 1) = "1000000"
-        report "firm_sim_spi: the answer to a command begins with an unknown byte, or bytes were dropped" severity failure;
+        report "firm_sim_spi: the answer to a command begins with an unknown byte, or bytes were dropped"
+        severity failure;
     end procedure begin_selection;
 
     procedure end_selection is
@@ -191,6 +194,7 @@ begin
       m_axis_tid    => m_axis_tid,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
+      m_axis_tready => m_axis_tready
+    );
 
 end architecture simulation;

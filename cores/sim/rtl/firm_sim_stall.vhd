@@ -11,7 +11,8 @@ entity firm_sim_stall is
     -- Different for each instance, 1 and more.
     SEED : integer := 1;
     -- The chance of a stall in a cycle; 0 is a wire.
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -26,7 +27,8 @@ entity firm_sim_stall is
     m_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tvalid : out std_logic;
     m_axis_tlast  : out std_logic;
-    m_axis_tready : in  std_logic);
+    m_axis_tready : in  std_logic
+  );
 end entity firm_sim_stall;
 
 architecture simulation of firm_sim_stall is

@@ -6,7 +6,8 @@ use ieee.std_logic_1164.all;
 
 entity firm_sim_tid is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -15,7 +16,8 @@ entity firm_sim_tid is
     axis_tvalid : in  std_logic;
     axis_tlast  : in  std_logic;
     axis_tready : in  std_logic;
-    axis_tid    : out std_logic_vector(7 downto 0));
+    axis_tid    : out std_logic_vector(7 downto 0)
+  );
 end entity firm_sim_tid;
 
 architecture simulation of firm_sim_tid is

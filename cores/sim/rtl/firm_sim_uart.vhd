@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The host with its serial adapter: frames of firm_sim_host over two lines, and back. It sends as an adapter does: with
--- pauses, and up to LAG bytes more after the other side's `rts_n` has risen. It opens the line with a break, as the host's
--- software should. Simulation only.
+-- pauses, and up to LAG bytes more after the other side's `rts_n` has risen. It opens the line with a break, as the
+-- host's software should. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -13,7 +13,8 @@ entity firm_sim_uart is
     SEED     : integer := 1;
     -- The chance that it pauses before a byte, and, as `uart_cts_n`, that it wants none.
     STALL_PERCENT : integer := 0;
-    LAG           : integer := 16);
+    LAG           : integer := 16
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -34,7 +35,8 @@ entity firm_sim_uart is
     uart_rxd   : out std_logic;
     uart_txd   : in  std_logic;
     uart_rts_n : in  std_logic;
-    uart_cts_n : out std_logic);
+    uart_cts_n : out std_logic
+  );
 end entity firm_sim_uart;
 
 architecture simulation of firm_sim_uart is
@@ -147,6 +149,7 @@ begin
       m_axis_tid    => m_axis_tid,
       m_axis_tvalid => m_axis_tvalid,
       m_axis_tlast  => m_axis_tlast,
-      m_axis_tready => m_axis_tready);
+      m_axis_tready => m_axis_tready
+    );
 
 end architecture simulation;

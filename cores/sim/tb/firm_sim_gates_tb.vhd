@@ -11,7 +11,8 @@ entity firm_sim_gates_tb is
     SEED          : integer := 1;
     STALL_PERCENT : integer := 30;
     -- The source of gate 1 withdraws its valid, which must be found.
-    WITHDRAWS : boolean := false);
+    WITHDRAWS : boolean := false
+  );
 end entity firm_sim_gates_tb;
 
 architecture simulation of firm_sim_gates_tb is
@@ -34,13 +35,15 @@ begin
     generic map (
       COUNT         => GATES,
       SEED          => SEED,
-      STALL_PERCENT => STALL_PERCENT)
+      STALL_PERCENT => STALL_PERCENT
+    )
     port map (
       clk     => clk,
       rst_n   => rst_n,
       valid   => valid,
       ready   => ready,
-      is_open => is_open);
+      is_open => is_open
+    );
 
   play : process (clk)
     type counts_t is array (valid'range) of natural;

@@ -15,7 +15,8 @@ entity firm_sim_host_tb is
     SHOWN         : integer := 10;
     WATCHDOG      : integer := 200;
     QUIET         : integer := 50;
-    FAULT         : string  := "none");
+    FAULT         : string  := "none"
+  );
 end entity firm_sim_host_tb;
 
 architecture simulation of firm_sim_host_tb is
@@ -52,7 +53,8 @@ begin
       STALL_PERCENT => STALL_PERCENT,
       SHOWN         => SHOWN,
       WATCHDOG      => WATCHDOG,
-      QUIET         => QUIET)
+      QUIET         => QUIET
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -68,12 +70,14 @@ begin
       s_axis_tlast  => in_tlast,
       s_axis_tready => in_tready,
       id_error      => id_error,
-      frame_error   => frame_error);
+      frame_error   => frame_error
+    );
 
   u_system : entity firm.firm_sim_wire
     generic map (
       WIDTH => WIDTH,
-      FAULT => FAULT)
+      FAULT => FAULT
+    )
     port map (
       clk           => clk,
       s_axis_tdata  => out_tdata,
@@ -88,6 +92,7 @@ begin
       m_axis_tlast  => in_tlast,
       m_axis_tready => in_tready,
       id_error      => id_error,
-      frame_error   => frame_error);
+      frame_error   => frame_error
+    );
 
 end architecture simulation;

@@ -10,7 +10,8 @@ entity firm_sim_join_tb is
     STIMULUS_FILE : string  := "stimulus.txt";
     EXPECTED_FILE : string  := "expected.txt";
     SEED          : integer := 1;
-    STALL_PERCENT : integer := 0);
+    STALL_PERCENT : integer := 0
+  );
 end entity firm_sim_join_tb;
 
 architecture simulation of firm_sim_join_tb is
@@ -42,7 +43,8 @@ begin
       SEED          => SEED,
       STALL_PERCENT => STALL_PERCENT,
       WATCHDOG      => 200,
-      QUIET         => 50)
+      QUIET         => 50
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -56,11 +58,13 @@ begin
       s_axis_tid    => frame_tid,
       s_axis_tvalid => frame_tvalid,
       s_axis_tlast  => frame_tlast,
-      s_axis_tready => frame_tready);
+      s_axis_tready => frame_tready
+    );
 
   u_tid : entity firm.firm_sim_tid
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk         => clk,
       rst_n       => rst_n,
@@ -68,11 +72,13 @@ begin
       axis_tvalid => burst_tvalid,
       axis_tlast  => burst_tlast,
       axis_tready => burst_tready,
-      axis_tid    => burst_tid);
+      axis_tid    => burst_tid
+    );
 
   u_join : entity firm.firm_sim_join
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -87,6 +93,7 @@ begin
       m_axis_tid    => frame_tid,
       m_axis_tvalid => frame_tvalid,
       m_axis_tlast  => frame_tlast,
-      m_axis_tready => frame_tready);
+      m_axis_tready => frame_tready
+    );
 
 end architecture simulation;

@@ -9,7 +9,8 @@ entity firm_sim_pipe_tb is
     WIDTH         : integer := 8;
     SEED          : integer := 1;
     STALL_PERCENT : integer := 0;
-    FAULT         : string  := "none");
+    FAULT         : string  := "none"
+  );
 end entity firm_sim_pipe_tb;
 
 architecture simulation of firm_sim_pipe_tb is
@@ -40,7 +41,8 @@ begin
       WIDTH         => WIDTH,
       ERRORS        => 1,
       SEED          => SEED,
-      STALL_PERCENT => STALL_PERCENT)
+      STALL_PERCENT => STALL_PERCENT
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -56,12 +58,14 @@ begin
       s_axis_tlast  => in_tlast,
       s_axis_tready => in_tready,
       id_error      => id_error,
-      frame_error   => frame_error);
+      frame_error   => frame_error
+    );
 
   u_system : entity firm.firm_sim_wire
     generic map (
       WIDTH => WIDTH,
-      FAULT => FAULT)
+      FAULT => FAULT
+    )
     port map (
       clk           => clk,
       s_axis_tdata  => out_tdata,
@@ -76,6 +80,7 @@ begin
       m_axis_tlast  => in_tlast,
       m_axis_tready => in_tready,
       id_error      => id_error,
-      frame_error   => frame_error);
+      frame_error   => frame_error
+    );
 
 end architecture simulation;

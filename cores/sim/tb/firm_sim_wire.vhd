@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A system that is a wire, for benches of simulated hosts: what comes goes straight back. FAULT makes it break the stream
--- in one way, so that a test can see that the host finds it.
+-- A system that is a wire, for benches of simulated hosts: what comes goes straight back. FAULT makes it break the
+-- stream in one way, so that a test can see that the host finds it.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -8,7 +8,8 @@ entity firm_sim_wire is
   generic (
     WIDTH : integer := 8;
     -- The way to break the stream; "none" for none. The process `spoil` shows them all.
-    FAULT : string := "none");
+    FAULT : string := "none"
+  );
   port (
     clk : in std_logic;
 
@@ -26,7 +27,8 @@ entity firm_sim_wire is
     m_axis_tready : in  std_logic;
 
     id_error    : out std_logic;
-    frame_error : out std_logic_vector(0 downto 0));
+    frame_error : out std_logic_vector(0 downto 0)
+  );
 end entity firm_sim_wire;
 
 architecture simulation of firm_sim_wire is
@@ -58,7 +60,8 @@ begin
     end if;
   end process watch_frames;
 
-  spoil : process (s_axis_tdata, s_axis_tkeep, s_axis_tvalid, s_axis_tlast, m_axis_tready, first_r, id_r, beats_r, idle_r, held_r)
+  spoil : process (s_axis_tdata, s_axis_tkeep, s_axis_tvalid, s_axis_tlast, m_axis_tready,
+                   first_r, id_r, beats_r, idle_r, held_r)
     variable is_third  : boolean;
     variable is_fourth : boolean;
   begin

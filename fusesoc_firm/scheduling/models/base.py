@@ -3,7 +3,7 @@
 A model does what its entity in cores/sched does, cycle by cycle, for a batch of schedulers at once: B of them, each
 with N requesters. The ports are arrays; `step` is a rising edge of the clock.
 
-    scheduler = POLICIES["lru"](Generics(periods))
+    scheduler = make_model("lru", Generics(periods))
     while ...:
         granted = scheduler.grant_select[scheduler.grant_valid]
         scheduler.step(request, beat, last)

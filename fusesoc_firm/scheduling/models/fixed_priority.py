@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
+from fusesoc_firm.scheduling.models.base import Bools, Generics, Ints, Scheduler
 from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
 
 
@@ -38,3 +38,13 @@ class PreemptiveFixedPriority(Scheduler):
         granted = self.grant_select
         self._grant(eligible.argmax(axis=1), eligible.any(axis=1) & ~kept)
         self._beats = np.where(finished | (self.grant_select != granted), 0, beats)
+
+
+def fixed_priority(generics: Generics) -> Scheduler:
+    """The non-preemptive one."""
+    return FixedPriority(generics.batch, generics.requesters)
+
+
+def fixed_priority_preemptive(generics: Generics) -> Scheduler:
+    """The preemptive one."""
+    return PreemptiveFixedPriority(generics.batch, generics.requesters, generics.shortest_run)

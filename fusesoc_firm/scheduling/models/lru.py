@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
+from fusesoc_firm.scheduling.models.base import Bools, Generics, Ints, Scheduler
 from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
 from fusesoc_firm.scheduling.models.engine import Engine, Heap, Keys, index_bits, rows_and_columns
 
@@ -83,8 +83,9 @@ class Stamps(Keys):
         self._sweep = (self._sweep + moves) % self._size
 
 
-def lru(batch: int, requesters: int) -> Scheduler:
+def lru(generics: Generics) -> Scheduler:
     """Few requesters are compared all at once, the tasks of more of them wait in a heap."""
+    batch, requesters = generics.batch, generics.requesters
     if requesters <= ImmediateLru.MAX_REQUESTERS:
         return ImmediateLru(batch, requesters)
     return Engine(batch, requesters, Heap(batch, requesters), Stamps(batch, requesters))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fusesoc_firm.scheduling.models.base import Bools, Ints
+from fusesoc_firm.scheduling.models.base import Bools, Generics, Ints, Scheduler
 from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
 
 
@@ -23,3 +23,8 @@ class RoundRobin(ChoosingScheduler):
         after = eligible & (self._indices > self._served[:, np.newaxis])
         choice: Ints = np.where(after.any(axis=1), after.argmax(axis=1), eligible.argmax(axis=1))
         return choice
+
+
+def round_robin(generics: Generics) -> Scheduler:
+    """As many turns as there are requesters."""
+    return RoundRobin(generics.batch, generics.requesters)

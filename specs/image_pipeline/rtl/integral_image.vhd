@@ -12,7 +12,8 @@ entity integral_image is
   generic (
     WIDTH       : integer := 8;
     -- The widest image; a wider one becomes an empty one.
-    MAX_COLUMNS : integer := 2048);
+    MAX_COLUMNS : integer := 2048
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -77,7 +78,8 @@ entity integral_image is
     out_data_axis_tready            : in  std_logic;
     out_segment_valid               : out std_logic_vector(2 downto 0);
     out_msg_valid                   : out std_logic;
-    out_msg_ready                   : in  std_logic);
+    out_msg_ready                   : in  std_logic
+  );
 end entity integral_image;
 
 architecture rtl of integral_image is
@@ -152,7 +154,8 @@ begin
       GROUP_BYTES  => PIXELS,
       OUT_ENCODING => "32SC1",
       OUT_BYTES    => 4,
-      MAX_COLUMNS  => MAX_COLUMNS)
+      MAX_COLUMNS  => MAX_COLUMNS
+    )
     port map (
       clk                             => clk,
       rst_n                           => rst_n,
@@ -216,7 +219,8 @@ begin
       result_count                    => result_count,
       result_last                     => result_last,
       result_valid                    => result_valid,
-      result_ready                    => result_ready);
+      result_ready                    => result_ready
+    );
 
   last_part <= '1' when part_r = PARTS-1 or sums_end_r = '1' else '0';
   advance   <= (result_ready and last_part) or not sums_valid_r;

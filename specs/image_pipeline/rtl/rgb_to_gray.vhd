@@ -10,7 +10,8 @@ use firm.firm_axis_pkg.all;
 
 entity rgb_to_gray is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -75,7 +76,8 @@ entity rgb_to_gray is
     out_data_axis_tready            : in  std_logic;
     out_segment_valid               : out std_logic_vector(2 downto 0);
     out_msg_valid                   : out std_logic;
-    out_msg_ready                   : in  std_logic);
+    out_msg_ready                   : in  std_logic
+  );
 end entity rgb_to_gray;
 
 architecture rtl of rgb_to_gray is
@@ -141,7 +143,8 @@ begin
       GROUP_BYTES  => LANES,
       IN_ENCODING  => "rgb8",
       OUT_ENCODING => "mono8",
-      IN_BYTES     => 3)
+      IN_BYTES     => 3
+    )
     port map (
       clk                             => clk,
       rst_n                           => rst_n,
@@ -205,9 +208,10 @@ begin
       result_count                    => result_count,
       result_last                     => result_last,
       result_valid                    => result_valid,
-      result_ready                    => result_ready);
+      result_ready                    => result_ready
+    );
 
-  joined      <= X"0000" & group_data & previous_r;
+  joined      <= x"0000" & group_data & previous_r;
   advance     <= result_ready or not valid_r(3);
   group_ready <= advance;
 

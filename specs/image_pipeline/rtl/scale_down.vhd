@@ -17,7 +17,8 @@ entity scale_down is
     COLUMNS_IN  : integer := 3;
     COLUMNS_OUT : integer := 1;
     ROWS_IN     : integer := 9;
-    ROWS_OUT    : integer := 4);
+    ROWS_OUT    : integer := 4
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -82,7 +83,8 @@ entity scale_down is
     out_data_axis_tready            : in  std_logic;
     out_segment_valid               : out std_logic_vector(2 downto 0);
     out_msg_valid                   : out std_logic;
-    out_msg_ready                   : in  std_logic);
+    out_msg_ready                   : in  std_logic
+  );
 end entity scale_down;
 
 architecture rtl of scale_down is
@@ -146,7 +148,8 @@ begin
       COLUMNS_IN   => COLUMNS_IN,
       COLUMNS_OUT  => COLUMNS_OUT,
       ROWS_IN      => ROWS_IN,
-      ROWS_OUT     => ROWS_OUT)
+      ROWS_OUT     => ROWS_OUT
+    )
     port map (
       clk                             => clk,
       rst_n                           => rst_n,
@@ -210,7 +213,8 @@ begin
       result_count                    => result_count,
       result_last                     => result_last,
       result_valid                    => result_valid,
-      result_ready                    => result_ready);
+      result_ready                    => result_ready
+    );
 
   advance     <= result_ready or not valid_r(3);
   group_ready <= advance;

@@ -183,7 +183,7 @@ begin
     );
 
   to_speeds : process (clk)
-    variable gain : integer;
+    variable gain        : integer;
     variable left, right : signed(TWIST_BITS+32 downto 0);
   begin
     if rising_edge(clk) then
@@ -233,7 +233,10 @@ begin
   -- Counts to twist -------------------------------------------------------------------------------------------------
 
   back : process (clk)
-    variable front_left, front_right, rear_left, rear_right : signed(9 downto 0);
+    variable front_left  : signed(9 downto 0);
+    variable front_right : signed(9 downto 0);
+    variable rear_left   : signed(9 downto 0);
+    variable rear_right  : signed(9 downto 0);
   begin
     if rising_edge(clk) then
       if out_start = '1' then

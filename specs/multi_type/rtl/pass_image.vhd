@@ -6,7 +6,8 @@ use ieee.std_logic_1164.all;
 
 entity pass_image is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -71,7 +72,8 @@ entity pass_image is
     out_data_axis_tready            : in  std_logic;
     out_segment_valid               : out std_logic_vector(2 downto 0);
     out_msg_valid                   : out std_logic;
-    out_msg_ready                   : in  std_logic);
+    out_msg_ready                   : in  std_logic
+  );
 end entity pass_image;
 
 architecture rtl of pass_image is

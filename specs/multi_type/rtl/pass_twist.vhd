@@ -6,7 +6,8 @@ use ieee.std_logic_1164.all;
 
 entity pass_twist is
   generic (
-    WIDTH : integer := 8);
+    WIDTH : integer := 8
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -51,7 +52,8 @@ entity pass_twist is
     out_twist_angular_z             : out std_logic_vector(63 downto 0);
     out_segment_valid               : out std_logic_vector(1 downto 0);
     out_msg_valid                   : out std_logic;
-    out_msg_ready                   : in  std_logic);
+    out_msg_ready                   : in  std_logic
+  );
 end entity pass_twist;
 
 architecture rtl of pass_twist is

@@ -59,7 +59,7 @@ architecture rtl of quat2euler is
   type kind_t is record
     undefined : std_logic;
     zero      : std_logic;
-  end record;
+  end record kind_t;
 
   -- The angle that goes to float64 next; HOLD until the message is taken.
   type turn_t is (ROLL, YAW, PITCH, HOLD);
@@ -275,8 +275,8 @@ begin
 
   pitch_out_ready <= '1' when turn_r = PITCH else '0';
 
-  issue <= angles_valid_r  when turn_r = ROLL else
-           '1'             when turn_r = YAW else
+  issue <= angles_valid_r when turn_r = ROLL else
+           '1' when turn_r = YAW else
            pitch_out_valid when turn_r = PITCH else
            '0';
 

@@ -15,8 +15,8 @@ use std.textio.all;
 
 entity quat2euler_tb is
   generic (
-    VECTORS      : string  := "vectors.txt";
-    RESULTS      : string  := "results.txt";
+    VECTORS      : string   := "vectors.txt";
+    RESULTS      : string   := "results.txt";
     SEED         : positive := 1;
     -- Chance in percent that the source is silent, or the sink not ready, in a cycle: 0 to 99.
     STALL_IN     : natural := 0;
@@ -163,7 +163,10 @@ begin
     variable seed1       : positive := SEED;
     variable seed2       : positive := 20011;
     variable stalled     : boolean;
-    variable x, y, z, w  : number_t;
+    variable x           : number_t;
+    variable y           : number_t;
+    variable z           : number_t;
+    variable w           : number_t;
   begin
     wait until rising_edge(clk) and rst_n = '1';
     while not endfile(vector_file) loop

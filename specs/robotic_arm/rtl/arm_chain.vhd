@@ -280,7 +280,7 @@ begin
       out_undefined => fixed_undefined
     );
 
-  multiples : block is
+  multiples : block
     -- pi/4 with more fraction bits is a multiple of it with fewer.
     constant PI_BITS      : unsigned(FRACTION+1 downto 0) := arctangent(0, FRACTION+2);
     constant TWO_PI_BITS  : unsigned(FRACTION+2 downto 0) := arctangent(0, FRACTION+3);
@@ -378,7 +378,9 @@ begin
   -- Products --------------------------------------------------------------------------------------------------------
 
   operands : process (clk)
-    variable x, y, z   : number_t;
+    variable x         : number_t;
+    variable y         : number_t;
+    variable z         : number_t;
     variable along     : number_t;
     variable own       : number_t;
     variable element   : natural range 0 to 15;

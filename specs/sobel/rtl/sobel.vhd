@@ -16,7 +16,8 @@ entity sobel is
   generic (
     WIDTH       : integer := 8;
     -- The widest image; a wider one becomes an empty one.
-    MAX_COLUMNS : integer := 2048);
+    MAX_COLUMNS : integer := 2048
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -81,7 +82,8 @@ entity sobel is
     out_data_axis_tready            : in  std_logic;
     out_segment_valid               : out std_logic_vector(2 downto 0);
     out_msg_valid                   : out std_logic;
-    out_msg_ready                   : in  std_logic);
+    out_msg_ready                   : in  std_logic
+  );
 end entity sobel;
 
 architecture rtl of sobel is
@@ -105,7 +107,7 @@ architecture rtl of sobel is
     first : std_logic;
     last  : std_logic;
     count : unsigned(COUNT_BITS-1 downto 0);
-  end record;
+  end record group_t;
 
   -- The column at a lane.
   function smoothed(a, b, c : std_logic_vector(7 downto 0)) return smooth_t is
@@ -152,7 +154,7 @@ architecture rtl of sobel is
   signal rows_r       : natural range 0 to 2;                   -- rows that came, as far as it matters
 
   -- The two rows before, the later one low.
-  signal memory : rows_t;
+  signal memory  : rows_t;
   signal earlier : std_logic_vector(2*WIDTH-1 downto 0);
 
   -- A group of the row that comes.
@@ -197,7 +199,8 @@ begin
     generic map (
       WIDTH        => WIDTH,
       GROUP_BYTES  => LANES,
-      MAX_COLUMNS  => MAX_COLUMNS)
+      MAX_COLUMNS  => MAX_COLUMNS
+    )
     port map (
       clk                             => clk,
       rst_n                           => rst_n,
@@ -261,15 +264,18 @@ begin
       result_count                    => result_count,
       result_last                     => result_last,
       result_valid                    => result_valid,
-      result_ready                    => result_ready);
+      result_ready                    => result_ready
+    );
 
   advance <= result_ready or not out_r;
   -- Where a row is one group, the next one may not be read before this one is written.
   settled <= '0' when valid_r = '1' and address_r = index_r else '1';
-  is_last <= group_last when phase_r = ROWS else '1' when index_r = last_index_r else '0';
+  is_last <= group_last when phase_r = ROWS else
+             '1' when index_r = last_index_r else
+             '0';
 
   offered <= group_valid and not group_end when phase_r = ROWS else
-             '1'                           when phase_r = LAST_ROW or phase_r = LAST_GROUP else
+             '1' when phase_r = LAST_ROW or phase_r = LAST_GROUP else
              '0';
 
   take        <= offered and advance and settled;

@@ -8,7 +8,8 @@ use firm.firm_sched_pkg.all;
 
 entity combined_scheduler is
   generic (
-    REQUESTERS : integer := 4);
+    REQUESTERS : integer := 4
+  );
   port (
     clk          : in  std_logic;
     rst_n        : in  std_logic;
@@ -16,7 +17,8 @@ entity combined_scheduler is
     beat         : in  std_logic;
     last         : in  std_logic;
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity combined_scheduler;
 
 architecture rtl of combined_scheduler is
@@ -31,7 +33,8 @@ begin
       REQUESTERS => REQUESTERS,
       SIZES      => SIZES,
       POLICIES   => POLICIES,
-      TOP_POLICY => ROUND_ROBIN)
+      TOP_POLICY => ROUND_ROBIN
+    )
     port map (
       clk          => clk,
       rst_n        => rst_n,
@@ -39,6 +42,7 @@ begin
       beat         => beat,
       last         => last,
       grant_valid  => grant_valid,
-      grant_select => grant_select);
+      grant_select => grant_select
+    );
 
 end architecture rtl;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A scheduler (`DUT) and what may happen around it; to be included in a harness.
 //
-// All inputs are free (`anyseq`: the solver chooses them anew in each cycle) but for these assumptions, which docs/manager.md makes of the Manager and AXI-Stream of the publishers:
+// All inputs are free (`anyseq`: the solver chooses them anew in each cycle) but for these assumptions, which docs/reference/manager.md makes of the Manager and AXI-Stream of the publishers:
 // * the first cycle is a reset; others may follow at any time;
 // * a request stays until a beat of its requester is taken;
 // * a beat is taken if and only if the granted one requests and the sink is ready.

@@ -11,7 +11,8 @@ entity timed_scheduler is
   generic (
     POLICY       : integer := 4;  -- its place in policy_t
     REQUESTERS   : integer := 2;
-    SHORTEST_RUN : integer := 1);
+    SHORTEST_RUN : integer := 1
+  );
   port (
     clk          : in  std_logic;
     rst_n        : in  std_logic;
@@ -19,7 +20,8 @@ entity timed_scheduler is
     beat         : in  std_logic;
     last         : in  std_logic;
     grant_valid  : out std_logic;
-    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0));
+    grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
+  );
 end entity timed_scheduler;
 
 architecture rtl of timed_scheduler is
@@ -42,7 +44,8 @@ begin
       PERIODS        => falling_from(12),
       TRANSFER_TIMES => falling_from(9),
       TIME_BITS      => 8,
-      SHORTEST_RUN   => SHORTEST_RUN)
+      SHORTEST_RUN   => SHORTEST_RUN
+    )
     port map (
       clk          => clk,
       rst_n        => rst_n,
@@ -50,6 +53,7 @@ begin
       beat         => beat,
       last         => last,
       grant_valid  => grant_valid,
-      grant_select => grant_select);
+      grant_select => grant_select
+    );
 
 end architecture rtl;

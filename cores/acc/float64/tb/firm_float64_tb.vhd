@@ -36,7 +36,7 @@ architecture test of firm_float64_tb is
   signal rst_n            : std_logic := '0';
   signal is_block_done    : boolean   := false;
   signal is_fixed_done    : boolean   := false;
-  signal received : natural := 0;
+  signal received         : natural := 0;
 
   signal block_in_valid   : std_logic := '0';
   signal block_in_ready   : std_logic;

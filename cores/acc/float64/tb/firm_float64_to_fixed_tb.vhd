@@ -30,7 +30,7 @@ architecture test of firm_float64_to_fixed_tb is
   signal clk           : std_logic := '0';
   signal rst_n         : std_logic := '0';
   signal is_done       : boolean   := false;
-  signal received : natural := 0;
+  signal received      : natural := 0;
   signal in_valid      : std_logic := '0';
   signal in_number     : std_logic_vector(63 downto 0) := (others => '0');
   signal out_valid     : std_logic;

@@ -19,7 +19,8 @@ entity firm_image_frame is
     COLUMNS_OUT  : integer := 1;
     ROWS_IN      : integer := 1;
     ROWS_OUT     : integer := 1;
-    MAX_COLUMNS  : integer := 65535);
+    MAX_COLUMNS  : integer := 65535
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -92,7 +93,8 @@ entity firm_image_frame is
     result_count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     result_last  : in  std_logic;
     result_valid : in  std_logic;
-    result_ready : out std_logic);
+    result_ready : out std_logic
+  );
 end entity firm_image_frame;
 
 architecture rtl of firm_image_frame is
@@ -125,7 +127,8 @@ begin
       COLUMNS_OUT  => COLUMNS_OUT,
       ROWS_IN      => ROWS_IN,
       ROWS_OUT     => ROWS_OUT,
-      MAX_COLUMNS  => MAX_COLUMNS)
+      MAX_COLUMNS  => MAX_COLUMNS
+    )
     port map (
       clk                             => clk,
       rst_n                           => rst_n,
@@ -173,7 +176,8 @@ begin
       padding                         => padding,
       rows                            => rows,
       show                            => show,
-      done                            => done_r);
+      done                            => done_r
+    );
 
   data_valid          <= in_data_axis_tvalid and running;
   in_data_axis_tready <= data_ready and running;
@@ -181,7 +185,8 @@ begin
   u_rows : entity firm.firm_image_rows
     generic map (
       WIDTH       => WIDTH,
-      GROUP_BYTES => GROUP_BYTES)
+      GROUP_BYTES => GROUP_BYTES
+    )
     port map (
       clk           => clk,
       rst_n         => running,
@@ -201,11 +206,13 @@ begin
       group_final   => group_final,
       group_end     => group_end,
       group_valid   => group_valid,
-      group_ready   => group_ready);
+      group_ready   => group_ready
+    );
 
   u_pack : entity firm.firm_axis_pack
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => running,
@@ -218,7 +225,8 @@ begin
       m_axis_tkeep  => out_data_axis_tkeep,
       m_axis_tvalid => packed_valid,
       m_axis_tlast  => packed_last,
-      m_axis_tready => packed_ready);
+      m_axis_tready => packed_ready
+    );
 
   packed_ready         <= out_data_axis_tready and show;
   out_data_axis_tvalid <= packed_valid and show;

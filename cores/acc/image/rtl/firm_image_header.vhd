@@ -26,7 +26,8 @@ entity firm_image_header is
     -- The widest image; 65535/OUT_BYTES at most.
     MAX_COLUMNS : integer := 65535;
     -- A longer frame_id is cut.
-    FRAME_ID_BYTES : integer := 256);
+    FRAME_ID_BYTES : integer := 256
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
@@ -79,7 +80,8 @@ entity firm_image_header is
     rows      : out std_logic_vector(15 downto 0);  -- none where all data is to be dropped
     -- The beats of the pixels may be shown; they have all been taken.
     show      : out std_logic;
-    done      : in  std_logic);
+    done      : in  std_logic
+  );
 end entity firm_image_header;
 
 architecture rtl of firm_image_header is
@@ -97,7 +99,7 @@ architecture rtl of firm_image_header is
     constant LETTERS : string(1 to text'length) := text;
   begin
     if index >= LETTERS'length then
-      return X"00";
+      return x"00";
     end if;
     return std_logic_vector(to_unsigned(character'pos(LETTERS(index + 1)), 8));
   end function letter_of;
@@ -124,7 +126,7 @@ architecture rtl of firm_image_header is
     left      : unsigned(SIZE_BITS-1 downto 0);  -- the bits to come
     quotient  : unsigned(SIZE_BITS-1 downto 0);
     remainder : unsigned(SIZE_BITS downto 0);
-  end record;
+  end record scaled_t;
 
   procedure scale(signal value : inout scaled_t; constant numerator, denominator : in positive) is
     variable sum   : unsigned(SIZE_BITS+1 downto 0);
@@ -234,7 +236,8 @@ begin
   u_frame_id : entity firm.firm_axis_fifo
     generic map (
       WIDTH => WIDTH,
-      DEPTH => FRAME_ID_BEATS)
+      DEPTH => FRAME_ID_BEATS
+    )
     port map (
       clk           => clk,
       rst_n         => store_rst_n,
@@ -247,7 +250,8 @@ begin
       m_axis_tkeep  => out_header_frame_id_axis_tkeep,
       m_axis_tvalid => frame_id_valid,
       m_axis_tlast  => frame_id_last,
-      m_axis_tready => frame_id_pop);
+      m_axis_tready => frame_id_pop
+    );
 
   in_encoding_axis_tready <= '1' when state_r = ENCODING and in_segment_valid(1) = '1' else '0';
 
@@ -382,7 +386,7 @@ begin
   show_encoding : for lane in 0 to LANES-1 generate
     show_lane : process (beat_r)
     begin
-      out_encoding_axis_tdata(8*lane+7 downto 8*lane) <= X"00";
+      out_encoding_axis_tdata(8*lane+7 downto 8*lane) <= x"00";
       out_encoding_axis_tkeep(lane)                   <= '0';
       for beat in 0 to OUT_BEATS-1 loop
         if beat_r = beat and LANES*beat + lane < OUT_ENCODING'length then

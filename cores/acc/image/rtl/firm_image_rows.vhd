@@ -11,7 +11,8 @@ entity firm_image_rows is
   generic (
     WIDTH       : integer := 8;
     -- The bytes of every group but the last of a row, WIDTH/8 at most.
-    GROUP_BYTES : integer := 1);
+    GROUP_BYTES : integer := 1
+  );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;  -- low between images, while the sizes below change
@@ -36,7 +37,8 @@ entity firm_image_rows is
     -- No group but the image's end: the stream is over. It comes once, and also if the stream is too short.
     group_end   : out std_logic;
     group_valid : out std_logic;
-    group_ready : in  std_logic);
+    group_ready : in  std_logic
+  );
 end entity firm_image_rows;
 
 architecture rtl of firm_image_rows is
@@ -73,7 +75,8 @@ begin
 
   u_window : entity firm.firm_axis_window
     generic map (
-      WIDTH => WIDTH)
+      WIDTH => WIDTH
+    )
     port map (
       clk           => clk,
       rst_n         => rst_n,
@@ -87,7 +90,8 @@ begin
       is_last       => is_last,
       take_valid    => take_valid,
       take          => std_logic_vector(take),
-      skip          => '0');
+      skip          => '0'
+    );
 
   available <= unsigned(available_lanes);
 

@@ -1,0 +1,194 @@
+"""Check the style of VHDL: cores, specs, and a sample of everything that is generated.
+
+    python lint_vhdl.py [FILE...]
+
+The style is in vsg.yaml, and what generated text may do beside it in vsg_generated.yaml. Each violation is printed as
+`file:line: rule: remedy`; the exit code is 1 if there is one. Files given as arguments are checked instead, as
+hand-written ones. A file that passed is not checked again until it, the style or vsg changes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from importlib import metadata
+from os import cpu_count
+from pathlib import Path
+
+import yaml
+
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS2
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.verify.loop import loop_text
+
+ROOT = Path(__file__).resolve().parents[1]
+VSG = Path(sys.executable).with_name("vsg")
+WORK = ROOT / "build" / "vhdl_lint"
+PASSED = WORK / "passed"
+KEPT = 2000  # verdicts: several times the files of a run
+SAMPLES = WORK / "samples"
+GOLDEN = ROOT / "tests" / "converter" / "golden"
+TEMPLATES = ROOT / "fusesoc_firm" / "templates"
+HAND_WRITTEN = (ROOT / "vsg.yaml",)
+GENERATED = (*HAND_WRITTEN, ROOT / "vsg_generated.yaml")
+
+# In the report, a file that vsg cannot read looks like one without violations.
+UNREADABLE = re.compile(r"^Error while processing (.+?): *\nError: (.*) @ Line (\d+)", re.MULTILINE)
+
+# vsg reads its port `release` as a statement of VHDL-2008.
+NOT_READ = {ROOT / "cores" / "cdc" / "rtl" / "firm_cdc_reset.vhd"}
+
+# Generator calls: a core, an entry of its section `generate`, and other parameters for it. Together with `GOLDEN`
+# they use every template (`unused_templates`).
+CALLS: Sequence[tuple[str, str, Mapping[str, object]]] = (
+    ("quat2euler/quat2euler", "system", {"board": "ulx3s"}),
+    ("quat2euler/quat2euler_hls", "system", {}),
+    ("quat2euler/quat2euler_hls", "simulation", {}),
+    ("mobile_robot/mobile_robot", "simulation", {"simulator": "icarus"}),
+    ("image_pipeline/image_pipeline", "system", {}),
+    ("multi_type/multi_type_verilog", "system", {}),
+)
+
+
+def generate(call: tuple[str, str, Mapping[str, object]]) -> None:
+    """Call a generator as FuseSoC does, in a folder of `SAMPLES`."""
+    core, name, changes = call
+    path = ROOT / "specs" / f"{core}.core"
+    entry = yaml.safe_load(path.read_text(encoding="utf-8").partition("\n")[2])["generate"][name]
+    folder = SAMPLES / f"{path.stem}-{name}"
+    folder.mkdir(parents=True)
+    request = {
+        "gapi": "1.0",
+        "files_root": str(path.parent),
+        "vlnv": f"robot:sys:{folder.name}:1",
+        "parameters": entry["parameters"] | changes,
+    }
+    (folder / "call.yml").write_text(yaml.safe_dump(request), encoding="utf-8")
+    run(sys.executable, ROOT / "generators" / f"{entry['generator']}_generator.py", "call.yml", cwd=folder)
+
+
+def write_skeletons() -> None:
+    """Write first versions of accelerators."""
+    folder = SAMPLES / "skeletons"
+    folder.mkdir(parents=True)
+    shutil.copy(ROOT / "specs" / "multi_type" / "multi_type.yaml", folder)
+    run(sys.executable, "-m", "fusesoc_firm.cli", "system", "skeleton", "multi_type.yaml", cwd=folder)
+
+
+def write_loop() -> None:
+    """Write the bench of `firm message verify`."""
+    name = parse_name("sensor_msgs/LaserScan")
+    text = loop_text(frame_of(name, MessageLibrary(ROS2).closure(name)), 64)
+    SAMPLES.mkdir(parents=True, exist_ok=True)
+    (SAMPLES / "loop.vhd").write_text(text, encoding="ascii")
+
+
+def run(*command: str | Path, cwd: Path) -> None:
+    """Run a program. Ends this one, with its output, if it fails."""
+    done = subprocess.run(command, cwd=cwd, text=True, capture_output=True, check=False)
+    if done.returncode:
+        sys.exit(f"{done.stdout}{done.stderr}error: {' '.join(map(str, command))} failed in {cwd}")
+
+
+def samples() -> list[Path]:
+    """Generate the samples. Their paths, without copies of users' sources."""
+    shutil.rmtree(SAMPLES, ignore_errors=True)
+    with ThreadPoolExecutor(cpu_count()) as pool:
+        list(pool.map(generate, CALLS))
+    write_skeletons()
+    write_loop()
+    made = [*SAMPLES.glob("*.vhd"), *SAMPLES.glob("*/*.vhd"), *SAMPLES.glob("skeletons/rtl/*.vhd")]
+    return sorted([*made, *GOLDEN.glob("*.vhd")])
+
+
+def unused_templates(paths: Iterable[Path]) -> list[Path]:
+    """The templates of VHDL of which none of these files has a line that no other template has."""
+    lines = {path: _lines(path) for path in sorted(TEMPLATES.glob("*/*.vhd.mustache"))}
+    found = set().union(*map(_lines, paths))
+    others = {path: set().union(*(lines[other] for other in lines if other != path)) for path in lines}
+    return [path for path in lines if not (lines[path] - others[path]) & found]
+
+
+def _lines(path: Path) -> set[str]:
+    return {line for line in path.read_text(encoding="utf-8").splitlines() if "{{" not in line}
+
+
+def hand_written() -> list[Path]:
+    """The VHDL of cores and specs."""
+    return sorted({*(ROOT / "cores").rglob("*.vhd"), *(ROOT / "specs").rglob("*.vhd")} - NOT_READ)
+
+
+def violations(paths: Sequence[Path], style: Sequence[Path]) -> list[str]:
+    """What vsg finds in these files, sorted. Files that it found clean before are not checked."""
+    passed = PASSED.read_text(encoding="utf-8").split() if PASSED.exists() else []
+    digests = {path: digest(path, style) for path in paths}
+    waiting = [path for path, value in digests.items() if value not in passed]
+    found = check(waiting, style) if waiting else {}
+    clean = [value for path, value in digests.items() if path not in found]
+    WORK.mkdir(parents=True, exist_ok=True)
+    PASSED.write_text("\n".join(list(dict.fromkeys(clean + passed))[:KEPT]), encoding="utf-8")
+    return [line for path in sorted(found) for line in found[path]]
+
+
+def digest(path: Path, style: Sequence[Path]) -> str:
+    """Of everything that the verdict on a file depends on."""
+    parts = [metadata.version("vsg").encode(), *(item.read_bytes() for item in style), path.read_bytes()]
+    return hashlib.sha256(b"".join(hashlib.sha256(part).digest() for part in parts)).hexdigest()
+
+
+def check(paths: Sequence[Path], style: Sequence[Path]) -> dict[Path, list[str]]:
+    """The violations in each file that has some. Ends the program if vsg fails otherwise."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder, "report.json")
+        command = [str(VSG), "--all_phases", "--jobs", str(cpu_count()), "--output_format", "summary"]
+        command += ["--json", str(report), "--configuration", *map(str, style), "--filename", *map(str, paths)]
+        done = subprocess.run(command, text=True, capture_output=True, check=False)
+        listed = json.loads(report.read_text(encoding="utf-8"))["files"] if report.exists() else []
+    output = done.stdout + done.stderr
+    found = {
+        Path(file["file_path"]): [
+            f"{shown(Path(file['file_path']))}:{item['linenumber']}: {item['rule']}: {item['solution']}"
+            for item in file["violations"]
+        ]
+        for file in listed
+        if file["violations"]
+    }
+    found |= {Path(path): [f"{shown(Path(path))}:{line}: {fault}"] for path, fault, line in UNREADABLE.findall(output)}
+    if not listed or (done.returncode and not found):
+        sys.exit(f"{output}error: {VSG.name} failed")
+    return found
+
+
+def shown(path: Path) -> Path:
+    """A path as it is printed."""
+    return path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Check files, or everything. The exit code."""
+    if arguments:
+        paths = [Path(argument).resolve() for argument in arguments]
+        if missing := [str(path) for path in paths if not path.is_file()]:
+            sys.exit(f"error: not a file: {', '.join(missing)}")
+        found = violations(paths, HAND_WRITTEN)
+    else:
+        made = samples()
+        found = violations(hand_written(), HAND_WRITTEN) + violations(made, GENERATED)
+        found += [
+            f"{path.relative_to(ROOT)}:1: no sample uses it: add one in {__file__}" for path in unused_templates(made)
+        ]
+    print(*found, sep="\n", end="\n" if found else "")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,1 @@
+"""Recorded data: from topics to the messages of a system, and back into a bag."""

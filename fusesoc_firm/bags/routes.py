@@ -1,0 +1,172 @@
+"""Who takes the messages of a bag: each topic's way to the subscribers of a system."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.message.bags import BAGS, Bag, Stream, open_bag
+from fusesoc_firm.message.joint import signature_of_text
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.system.derived.model import Topic, absolute_name
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
+
+AnyTopic = TypeVar("AnyTopic", bound=Topic)
+Message = tuple[Middleware, MessageName]
+
+
+@dataclass(frozen=True)
+class Route:
+    """Who takes the messages of a stream, and why they cannot if they cannot."""
+
+    subscribers: tuple[Topic, ...]
+    misfit: str = ""
+
+
+def renamed(topics: Iterable[AnyTopic], names: Mapping[str, str]) -> list[AnyTopic]:
+    """The topics, those of some blocks under other `names`."""
+    return [replace(item, given_name=names.get(item.block, item.given_name)) for item in topics]
+
+
+def routes_of(
+    bag: Bag, subscribers: Sequence[Topic], signatures: Mapping[Message, str] | None = None
+) -> dict[Stream, Route]:
+    """The route of each stream that has one; all streams of a topic have one, or none.
+
+    A topic goes to all subscribers whose topic is called so. One that has none such in the bag takes the only topic of
+    its type, if it is the only subscriber of it. `signatures` are those of the system's messages, where they are known.
+    Raises `InputError` with every topic that does not fit.
+    """
+    return _Routing(bag, subscribers, signatures or {}).routes()
+
+
+@dataclass
+class _Routing:
+    """The making of routes."""
+
+    bag: Bag
+    subscribers: Sequence[Topic]
+    signatures: Mapping[Message, str]
+    faults: Diagnostics = field(default_factory=Diagnostics)
+
+    def routes(self) -> dict[Stream, Route]:
+        takers = {stream.topic: self._named(stream.topic) for stream in self.bag.streams}
+        named = {item.block for items in takers.values() for item in items}
+        for item in self.subscribers:
+            if item.block not in named and (topic := self._only_topic(item, takers)):
+                takers[topic] = (item,)
+        self._check_versions(takers)
+        self.faults.raise_if_any()
+        return {
+            stream: Route(takers[stream.topic], self._misfit(stream, takers[stream.topic]))
+            for stream in self.bag.streams
+            if takers[stream.topic]
+        }
+
+    def _named(self, topic: str) -> tuple[Topic, ...]:
+        return tuple(item for item in self.subscribers if item.name == absolute_name(topic))
+
+    def _only_topic(self, subscriber: Topic, takers: Mapping[str, Sequence[Topic]]) -> str:
+        """The topic of a subscriber that no topic is called like; empty if there is none, or no single one."""
+        streams = self.bag.streams
+        topics = [item.topic for item in streams if not takers[item.topic] and self._fits(item, subscriber)]
+        rivals = [item for item in self.subscribers if _meant(item) == _meant(subscriber)]
+        found = list(dict.fromkeys(topics))
+        if len(found) == len(rivals) == 1:
+            return found[0]
+        names = ", ".join(item.block for item in rivals)
+        hint = "name the topic like one of them, or give one the key 'topic'"
+        if len(rivals) > 1:
+            for topic in found:
+                self.faults.error(f"topic {topic} of {self.bag.path} could go to {names}", hint=hint)
+        elif found:
+            self.faults.error(f"topics {', '.join(found)} of {self.bag.path} could go to {names}", hint=hint)
+        return ""
+
+    def _fits(self, stream: Stream, subscriber: Topic) -> bool:
+        return self._is_of(stream, subscriber) and self.bag.form.ros == subscriber.frame.ros
+
+    def _is_of(self, stream: Stream, subscriber: Topic) -> bool:
+        """Whether a stream has the subscriber's message by name, in whichever version of ROS."""
+        name = _message(stream)
+        return name is not None and _present(name, self.bag.form.ros) == _meant(subscriber)
+
+    def _check_versions(self, takers: Mapping[str, Sequence[Topic]]) -> None:
+        """Note each topic of a message that the system takes of the other version of ROS alone."""
+        ros = self.bag.form.ros
+        for stream in self.bag.streams:
+            fitting = [item for item in self.subscribers if self._is_of(stream, item)]
+            wrong = [item for item in takers[stream.topic] or fitting if item.frame.ros != ros]
+            if wrong and not any(item.frame.ros == ros for item in fitting):
+                versions = f"is of {ros.title}, but '{wrong[0].block}' speaks {wrong[0].frame.ros.title}"
+                self.faults.error(f"topic {stream.topic} of {self.bag.path} {versions}")
+
+    def _misfit(self, stream: Stream, subscribers: Sequence[Topic]) -> str:
+        """Why subscribers cannot take a stream that is theirs by name; empty if they can."""
+        for item in subscribers:
+            wanted = item.frame.message
+            if not self._is_of(stream, item):
+                return f"it is a {_spelled(stream)}, but '{item.block}' takes {wanted}"
+            if item.frame.ros != self.bag.form.ros:
+                return f"it is of {self.bag.form.ros.title}, but '{item.block}' speaks {item.frame.ros.title}"
+            ours, theirs = self.signatures.get((item.frame.ros, wanted)), self._signatures(stream, wanted)
+            if ours and theirs and ours not in theirs:
+                return f"it is another {wanted} than that of '{item.block}': {theirs[0]}, not {ours}"
+        return ""
+
+    def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
+        """What the bag says of a message: that of its definition, too, as not every writer knows all rules."""
+        said = [stream.signature] if _is_signature(stream.signature) else []
+        if stream.definition and (defined := signature_of_text(message, stream.definition, self.bag.form.ros)):
+            said.append(defined)
+        return said
+
+
+def _message(stream: Stream) -> MessageName | None:
+    """The message of a stream; None if it is none that a specification can name."""
+    try:
+        return parse_name(stream.type)
+    except InputError:
+        return None
+
+
+def _meant(topic: Topic) -> MessageName:
+    return _present(topic.frame.message, topic.frame.ros)
+
+
+def _present(name: MessageName, ros: Middleware) -> MessageName:
+    """The present name of a message that may have had another one."""
+    return ros.aliases.get(name, name)
+
+
+def _spelled(stream: Stream) -> str:
+    return str(_message(stream) or stream.type)
+
+
+def _is_signature(text: str) -> bool:
+    """Whether a bag says something; ROS 1 has `*` for any message, and old bags of ROS 2 have nothing."""
+    return text.startswith("RIHS01_") or re.fullmatch(r"[0-9a-f]{32}", text) is not None
+
+
+def read_bag(
+    path: Path, subscribers: Sequence[Topic], hint: str = BAGS
+) -> Iterator[tuple[Topic, bytes, dict[str, Any]]]:
+    """Subscriber, payload and decoded message of all messages that somebody takes, by time. Raises `InputError`."""
+    with open_bag(path, hint) as bag:
+        routes = routes_of(bag, subscribers)
+        for stream, route in routes.items():
+            if route.misfit:
+                fail(f"topic {stream.topic} of {path}: {route.misfit}")
+        for recorded in bag.messages({stream.topic for stream in routes}):
+            for subscriber in routes[recorded.stream].subscribers:
+                try:
+                    message = decode(subscriber.frame, recorded.payload)
+                except CodecError as error:
+                    fail(f"{path}, topic {recorded.stream.topic}: {error}")
+                yield subscriber, recorded.payload, message

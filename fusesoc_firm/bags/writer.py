@@ -1,0 +1,124 @@
+"""Bags to write: each appears when it is complete, and the same messages give the same bytes."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag1 import Writer as Rosbag1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
+
+from fusesoc_firm.message.bags import Form
+from fusesoc_firm.message.joint import joint_text
+from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.outputs import check_parent
+
+_FILES = {".bag": Form.ROS1, ".mcap": Form.MCAP, ".db3": Form.SQLITE3}
+_PLUGINS = {Form.SQLITE3: StoragePlugin.SQLITE3, Form.MCAP: StoragePlugin.MCAP}
+# What the folder of a bag may hold and be one that may be replaced.
+_IN_A_BAG = ("metadata.yaml", "*.db3", "*.mcap", "*.db3.zstd", "*.mcap.zstd")
+
+
+@dataclass(frozen=True)
+class RecordedTopic:
+    """A topic with its type, such as geometry_msgs/msg/Point, and what that means to its reader."""
+
+    name: str
+    type: str
+    definition: str
+    signature: str
+
+    @classmethod
+    def of(cls, name: str, definitions: Definitions) -> RecordedTopic:
+        """The topic of the last message of `definitions`, which hold all within it."""
+        message = list(definitions)[-1]
+        kind = definitions[message].kind
+        type_ = f"{message.package}/{kind}/{message.name}"
+        return cls(name, type_, joint_text(message, definitions), signature(message, definitions))
+
+
+@dataclass
+class BagWriter:
+    """A bag that is being written; it has every topic, even one without a message."""
+
+    _writer: Rosbag1Writer | Rosbag2Writer
+    _connections: dict[RecordedTopic, Connection] = field(default_factory=dict)
+
+    def add(self, topic: RecordedTopic) -> None:
+        """Let the bag have a topic; a second time changes nothing."""
+        if topic in self._connections:
+            return
+        if isinstance(self._writer, Rosbag1Writer):
+            # ROS 1 knows no kinds of messages, rosbags' writer only this one.
+            type_ = "/msg/".join(topic.type.split("/")[::2])
+            made = self._writer.add_connection(topic.name, type_, msgdef=topic.definition, md5sum=topic.signature)
+        else:
+            made = self._writer.add_connection(topic.name, topic.type, msgdef=topic.definition, rihs01=topic.signature)
+        self._connections[topic] = made
+
+    def write(self, topic: RecordedTopic, stamp: int, payload: bytes) -> None:
+        """Add a message of one of the topics, recorded at `stamp` (ns)."""
+        self._writer.write(self._connections[topic], stamp, payload)
+
+
+def form_of(path: Path) -> Form | None:
+    """The form that a bag's name says: that of a file with its ending, if it has one."""
+    return _FILES.get(path.suffix)
+
+
+def check_writable(path: Path, *, force: bool) -> None:
+    """Raise `InputError` if there is something that must not, or without `force` should not, be replaced."""
+    check_parent(path)
+    if path.is_dir() and (other := next((file for file in path.iterdir() if not _is_of_bag(file)), None)):
+        fail(f"{path} is a folder, and no bag's: it holds {other.name}")
+    if path.exists() and not force:
+        fail(f"{path} is there already", hint="--force replaces it")
+
+
+def _is_of_bag(file: Path) -> bool:
+    return file.is_file() and any(file.match(pattern) for pattern in _IN_A_BAG)
+
+
+@contextmanager
+def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterator[BagWriter]:
+    """A bag at `path` with some topics; it takes the place of what is there at the context's end, unless that fails.
+
+    Raises `InputError` if it cannot be written.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
+            made = Path(folder, path.name)
+            with _writer(made, form) as writer:
+                bag = BagWriter(writer)
+                for topic in topics:
+                    bag.add(topic)
+                yield bag
+            _put(made, path)
+    except OSError as error:
+        fail(f"cannot write {path}: {error.strerror or error}")
+    except sqlite3.Error as error:
+        fail(f"cannot write {path}: {error}")
+
+
+def _put(made: Path, path: Path) -> None:
+    """Let a bag take its place."""
+    if path.suffix in _FILES and made.is_dir():
+        # A bag of ROS 2 as one file: the folder has it beside its metadata, which it holds, too.
+        made = made / f"{path.name}{path.suffix}"
+    if path.is_dir():
+        shutil.rmtree(path)
+    made.replace(path)
+
+
+def _writer(path: Path, form: Form) -> Rosbag1Writer | Rosbag2Writer:
+    if form is Form.ROS1:
+        return Rosbag1Writer(path)
+    return Rosbag2Writer(path, version=Rosbag2Writer.VERSION_LATEST, storage_plugin=_PLUGINS[form])

@@ -1,0 +1,243 @@
+"""The cores that FuseSoC knows here: what each consists of, and which of them an edit touches.
+
+What a core consists of is read for all its targets and flags together, so nothing that some build uses is left out.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.request.core_reader import CoreFile, read_core
+from fusesoc_firm.request.request import GeneratorCall
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.render import render
+
+GRAPH_TEMPLATE = "dot/cores.dot"
+
+
+@dataclass(frozen=True)
+class ProjectCore:
+    """A core: its name, its files with its description first, what it depends on, the calls of generators it makes.
+
+    `names` are those by which others can depend on it, and `depends` names of that kind: vendor, library and name.
+    """
+
+    vlnv: str
+    names: frozenset[str]
+    files: tuple[Path, ...]
+    depends: frozenset[str]
+    calls: tuple[GeneratorCall, ...]
+
+
+def project_cores() -> list[ProjectCore]:
+    """Every core in FuseSoC's libraries, as `fusesoc` finds them in the current folder, sorted by name."""
+    from fusesoc.fusesoc import Fusesoc
+
+    found = Fusesoc(configuration()).get_cores()
+    return [_core(name, Path(found[name].core_file)) for name in sorted(found)]
+
+
+def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
+    """A core, and all others that one of its targets depends on, sorted by name.
+
+    Raises `InputError` if there is no such core, or if something that it depends on is missing.
+    """
+    fusesoc, top = _found(core)
+    needed: dict[str, Path] = {}
+    for target in top.get_data({}).targets:
+        needed |= {str(item.name): Path(item.core_file) for item, _ in solved(fusesoc, top, target)}
+    needed.pop(str(top.name), None)
+    return _core(str(top.name), Path(top.core_file)), [_core(name, needed[name]) for name in sorted(needed)]
+
+
+def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
+    """The cores that are touched themselves or depend on such a core, each with the reason, in the order of `cores`.
+
+    `touches` says what of a core itself is touched, or None.
+    """
+    cores = list(cores)
+    reasons = {core.vlnv: reason for core in cores if (reason := touches(core))}
+    new = set(reasons)
+    while new:
+        by_name = {name: core.vlnv for core in cores if core.vlnv in new for name in core.names}
+        new = set()
+        for core in cores:
+            if core.vlnv not in reasons and (through := sorted(core.depends & by_name.keys())):
+                reasons[core.vlnv] = f"by {by_name[through[0]]}"
+                new.add(core.vlnv)
+    return {core.vlnv: reasons[core.vlnv] for core in cores if core.vlnv in reasons}
+
+
+def changed_files(revision: str, folder: Path) -> list[Path]:
+    """The files of the repository around `folder` that differ from a revision, new and removed ones too, absolute.
+
+    Raises `InputError` if there is no repository or no such revision.
+    """
+    root = Path(_git(folder, "rev-parse", "--show-toplevel").rstrip("\n"))
+    # As a commit: what begins with a dash is no option then.
+    commit = _git(folder, "rev-parse", "--verify", "--end-of-options", f"{revision}^{{commit}}").strip()
+    listed = _git(root, "diff", "--name-only", "--no-renames", "-z", commit)
+    listed += _git(root, "ls-files", "--others", "--exclude-standard", "-z")
+    return sorted({root / name for name in listed.split("\0") if name})
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    try:
+        done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        fail("this needs the program 'git'", hint="Debian and Ubuntu: apt install git")
+    if done.returncode:
+        fail(f"git {arguments[0]}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list[str]]) -> str:
+    """What a target of a core depends on, in Graphviz's language: cores, what is generated for them, and of what.
+
+    Raises `InputError` if there is no such core or target, or if something that it depends on is missing.
+    """
+    fusesoc, top = _found(core)
+    cores = solved(fusesoc, top, target)
+    names = {name: str(item.name) for item, _ in cores for name in _names(read_core(Path(item.core_file)))}
+    edges: list[tuple[str, str]] = []
+    generated: dict[str, str] = {}
+    sources: dict[str, None] = {}
+    for item, flags in cores:
+        needed = [names.get(_short(str(depend)), "") for depend in item.get_depends(flags)]
+        edges += [(str(item.name), name) for name in needed if name]
+        for made in calls_of(item, flags):
+            generated[made.vlnv] = made.generator
+            edges.append((str(item.name), made.vlnv))
+            for source in inputs_of(made):
+                sources[source] = None
+                edges.append((made.vlnv, source))
+    return render(
+        GRAPH_TEMPLATE,
+        {
+            "cores": [{"name": str(item.name)} for item, _ in cores],
+            "generated": [{"name": name, "generator": generator} for name, generator in generated.items()],
+            "sources": [{"name": name} for name in sources],
+            "edges": [{"from": start, "to": end} for start, end in edges],
+        },
+    )
+
+
+def configuration() -> Any:
+    """What FuseSoC is configured to in the current folder, as its own command reads it."""
+    from fusesoc.config import Config
+
+    return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
+
+
+def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, Any]]]:
+    """All cores of a target, those that others depend on first, the core itself last, each with its flags.
+
+    Raises `InputError` if there is no such target, or if something that it depends on is missing.
+    """
+    from fusesoc.coremanager import DependencyError
+
+    try:
+        flags = {**top.get_flags(target), "target": target}
+        cores = fusesoc.cm.get_depends(top.name, {**flags, "is_toplevel": True})
+    except DependencyError as error:
+        fail(f"{top.name} depends on what FuseSoC does not know here: {error.value}")
+    except RuntimeError as error:
+        fail(str(error))
+    return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
+
+
+def _found(core: str) -> tuple[Any, Any]:
+    """FuseSoC, and the core of this name."""
+    from fusesoc.coremanager import DependencyError
+    from fusesoc.fusesoc import Fusesoc
+
+    fusesoc = Fusesoc(configuration())
+    try:
+        return fusesoc, fusesoc.get_core(core)
+    except (DependencyError, SyntaxError):
+        fail(f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
+
+
+def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
+    """The calls of generators that a core of FuseSoC makes with these flags."""
+    for call in core.get_ttptttg(dict(flags)):
+        yield _call(str(core.name), call["name"], call["generator"], core.files_root, call["config"])
+
+
+def _core(vlnv: str, path: Path) -> ProjectCore:
+    core = read_core(path)
+    filesets = core.section("filesets").values()
+    files = [word for fileset in filesets for item in _listed(fileset, "files") for word in _words(_file(item))]
+    files += [str(item["command"]) for item in core.section("generators").values() if "command" in item]
+    depends = {_short(word) for fileset in filesets for item in _listed(fileset, "depend") for word in _words(item)}
+    return ProjectCore(
+        vlnv,
+        frozenset(_names(core)),
+        (path.resolve(), *((path.parent / file).resolve() for file in dict.fromkeys(files))),
+        frozenset(depends),
+        tuple(_calls(vlnv, core)),
+    )
+
+
+def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
+    """The call of each instance, and again with the parameters that a target changes."""
+    known = core.section("generate")
+    changes: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
+    for target in core.section("targets").values():
+        for item in _listed(target, "generate"):
+            changes += item.items() if isinstance(item, dict) else ()
+    for name, changed in changes:
+        generator = str(known.get(name, {}).get("generator"))
+        yield _call(vlnv, name, generator, core.path.parent, {**core.parameters(name), **(changed or {})})
+
+
+def _call(vlnv: str, instance: str, generator: str, folder: Path | str, parameters: Mapping[str, Any]) -> GeneratorCall:
+    vendor, library, name, version = vlnv.split(":")
+    return GeneratorCall(
+        generator, f"{vendor}:{library}:{name}-{instance}:{version}", str(Path(folder).absolute()), parameters
+    )
+
+
+def _names(core: CoreFile) -> list[str]:
+    """The names that a core has or stands for."""
+    return [_short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
+
+
+def _listed(section: Mapping[str, Any], key: str) -> list[Any]:
+    """A list of a section, with what it adds to an inherited one."""
+    return [item for name in (key, f"{key}_append") for item in section.get(name) or ()]
+
+
+def _file(item: object) -> str:
+    """The name of a file, with or without attributes."""
+    return str(next(iter(item)) if isinstance(item, dict) else item)
+
+
+def _words(item: object) -> list[str]:
+    """What a text means for any flags: `target_sim ? (x)` is x. One that FuseSoC refuses stays as it is."""
+    from fusesoc.capi2.exprs import parse
+
+    def words(tree: Iterable[Any]) -> Iterator[str]:
+        for part in tree:
+            yield from part.split() if isinstance(part, str) else words(part[2])
+
+    try:
+        return [*words(parse(str(item)))]
+    except ValueError:
+        return [str(item)]
+
+
+def _short(name: str) -> str:
+    """Vendor, library and name of a core, whatever its version. A name that FuseSoC refuses stays as it is."""
+    from fusesoc.vlnv import Vlnv
+
+    try:
+        core = Vlnv(name)
+    except SyntaxError:
+        return name
+    return f"{core.vendor}:{core.library}:{core.name}"

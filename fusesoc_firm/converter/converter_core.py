@@ -1,0 +1,121 @@
+"""The generator `firm`: the converters of messages, and the packages of their constants, as a core."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
+from fusesoc_firm.converter.constants import (
+    CONSTANTS_TEMPLATE,
+    constants_configuration,
+    constants_package,
+)
+from fusesoc_firm.converter.interfaces import INTERFACE_TEMPLATE, interface_configuration
+from fusesoc_firm.converter.order import Order, Selection, order_of_config, order_of_message
+from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message.library import MessageLibrary, libraries
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
+from fusesoc_firm.text.render import render
+
+VHDL = "vhdlSource-93"
+
+
+def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], str | None]:
+    """Where a request's messages come from, as `MessageLibrary` takes it: folders, environment, distribution."""
+    paths = request.parameters.get("paths") or []
+    distro = request.parameters.get("distro")
+    assert isinstance(paths, list)
+    folders = [*(request.files_root / path for path in paths), *request.message_folders.of(request.listed("messages"))]
+    return folders, os.environ, None if distro is None else str(distro)
+
+
+def load(request: Request) -> LoadedRequest:
+    """The converters that a request asks for. Raises `InputError`."""
+    order = order_of_request(request)
+    return LoadedRequest(
+        request,
+        order.files,
+        lambda: converters_core(order),
+        lambda: [(order.libraries[wanted.ros], wanted.definitions) for wanted in order.messages],
+    )
+
+
+def converters_core(order: Order) -> GeneratedCore:
+    """The core of an order, its files in the order in which a tool reads them. Raises `InputError`."""
+    files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
+    interfaces: dict[str, GeneratedFile] = {}
+    for wanted in order.messages:
+        for direction, files_of in (("subscriber", subscriber_files), ("publisher", publisher_files)):
+            if direction in wanted.interfaces:
+                files |= files_of([wanted.frame], order.width, order.prefix)
+                converter = order.entity(wanted.frame, direction)
+                vhdl = str(files[f"{converter}.vhd"].content)
+                interfaces |= _interface_files(wanted.interfaces[direction], converter, vhdl, wanted.frame)
+    return GeneratedCore(f"Converters of {order.title}", files | interfaces)
+
+
+def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix: str = "") -> dict[str, GeneratedFile]:
+    """The package of each message, of which none comes twice; the definitions are of it and all within it."""
+    return {
+        path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
+        for path, configuration in constants_configurations(messages, prefix)
+    }
+
+
+def constants_configurations(
+    messages: Sequence[tuple[MessageName, Definitions]], prefix: str = ""
+) -> Iterator[tuple[str, Configuration]]:
+    """The file of each message's package, and what it is rendered from."""
+    counts = Counter(name for name, _ in messages)
+    for name, definitions in messages:
+        package = constants_package(name, definitions[name].ros if counts[name] > 1 else None, prefix)
+        yield f"{package}.vhd", constants_configuration(name, definitions, package)
+
+
+def subscriber_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
+    """`<prefix>_axis_to_<pkg>_<type>.vhd` of each frame."""
+    entities = {subscriber_entity(frame, prefix=prefix): frame for frame in frames}
+    return {f"{entity}.vhd": _file(subscriber_source(frame, width, entity)) for entity, frame in entities.items()}
+
+
+def publisher_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
+    """`<prefix>_<pkg>_<type>_to_axis.vhd` of each frame."""
+    entities = {publisher_entity(frame, prefix=prefix): frame for frame in frames}
+    return {f"{entity}.vhd": _file(publisher_source(frame, width, entity)) for entity, frame in entities.items()}
+
+
+def _file(source: ConverterSource) -> GeneratedFile:
+    return GeneratedFile(render(source.template, source.configuration), VHDL)
+
+
+def order_of_request(request: Request) -> Order:
+    """What the request asks for, be it a message or what a configuration file lists."""
+    config, ros, width = (request.parameters.get(name) for name in ("config", "ros", "width"))
+    if config is not None:
+        return order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
+    assert isinstance(ros, int) and isinstance(width, int)
+    library = MessageLibrary(middleware_of(ros), *library_sources(request))
+    message, direction = str(request.parameters["message"]), str(request.parameters["direction"])
+    selection = Selection(request.listed("include"), request.listed("exclude"))
+    order = order_of_message(message, direction, width, library, selection)
+    return replace(order, prefix=str(request.parameters.get("name") or ""))
+
+
+def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:
+    """`<name>.vhd` of each name of a converter, whose text is `vhdl`, that is not its own."""
+    message = f"{frame.message} ({frame.ros.title})"
+    return {
+        f"{name}.vhd": GeneratedFile(
+            render(INTERFACE_TEMPLATE, interface_configuration(name, converter, vhdl, message)), VHDL
+        )
+        for name in names
+        if name.lower() != converter
+    }

@@ -1,0 +1,102 @@
+"""A message on each stage of its way to hardware, as text.
+
+What a stage needs is imported for it alone: whoever looks at a message waits for the import.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from fusesoc_firm.text.yaml_text import yaml_dump
+
+if TYPE_CHECKING:
+    from fusesoc_firm.converter.sources import ConverterSource
+    from fusesoc_firm.message.derived import Interface
+    from fusesoc_firm.message.library import MessageLibrary
+    from fusesoc_firm.message.model import MessageName
+    from fusesoc_firm.message.signature import Definitions
+
+
+def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> str:
+    """A message, or those of a service or action, in one of `STAGES`, without the last line's end.
+
+    `width` are the bits of the converters' stream. Raises `InputError`.
+    """
+    from fusesoc_firm.message.parser import parse_full_name
+
+    kind, name = parse_full_name(type_)
+    interface = library.interface(name, kind)
+    names = interface.messages if interface else (name,)
+    definitions = library.joint_closure(names)
+    texts = [STAGES[stage](each, definitions, width) for each in names]
+    if interface and stage == "message":
+        texts.insert(0, _title(interface, definitions))
+    separator = "\n---\n" if stage in _YAML else "\n\n"
+    return separator.join(text.rstrip("\n") for text in texts)
+
+
+def _title(interface: Interface, definitions: Definitions) -> str:
+    """What stands above the messages of a service or an action."""
+    from fusesoc_firm.message.signature import signature
+
+    title = f"# {interface} ({interface.ros.title})"
+    if not interface.has_signature:
+        return title
+    return f"{title}\n# signature: {signature(interface.name, definitions, interface.kind)}"
+
+
+def _tree(name: MessageName, definitions: Definitions, _: int) -> str:
+    from fusesoc_firm.frame import tree
+    from fusesoc_firm.frame.layout import frame_of
+
+    return tree.text(tree.rows(name, definitions, frame_of(name, definitions)))
+
+
+def _message(name: MessageName, definitions: Definitions, _: int) -> str:
+    from fusesoc_firm.message.printer import to_text
+    from fusesoc_firm.message.signature import signature
+
+    return to_text(definitions[name], signature(name, definitions))
+
+
+def _frame(name: MessageName, definitions: Definitions, _: int) -> str:
+    from fusesoc_firm.frame.description import description
+    from fusesoc_firm.frame.layout import frame_of
+
+    return yaml_dump(description(frame_of(name, definitions)))
+
+
+def _configuration(name: MessageName, definitions: Definitions, width: int) -> str:
+    return "---\n".join(yaml_dump(source.configuration) for source in _sources(name, definitions, width))
+
+
+def _vhdl(name: MessageName, definitions: Definitions, width: int) -> str:
+    from fusesoc_firm.text.render import render
+
+    return "\n".join(render(source.template, source.configuration) for source in _sources(name, definitions, width))
+
+
+def _sources(name: MessageName, definitions: Definitions, width: int) -> Iterator[ConverterSource]:
+    """The message's package of constants and both converters."""
+    from fusesoc_firm.converter import constants
+    from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
+    from fusesoc_firm.frame.layout import frame_of
+
+    frame = frame_of(name, definitions)
+    package = constants.constants_package(frame.message)
+    configuration = constants.constants_configuration(frame.message, definitions, package)
+    yield ConverterSource(constants.CONSTANTS_TEMPLATE, configuration)
+    yield subscriber_source(frame, width)
+    yield publisher_source(frame, width)
+
+
+STAGES: Mapping[str, Callable[[MessageName, Definitions, int], str]] = {
+    "tree": _tree,
+    "message": _message,
+    "frame": _frame,
+    "config": _configuration,
+    "vhdl": _vhdl,
+}
+"""The text of a message, with all definitions within it, for a stream of so many bits: by the stage's name."""
+_YAML = ("frame", "config")

@@ -1,0 +1,64 @@
+"""Literals, operands and conditions in VHDL, for the values that templates print: statements stand in the templates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+# About so long are the lines of a condition.
+LINE = 80
+
+
+def vhdl_type(width: int | None) -> str:
+    """`std_logic` for None, else a vector of `width` bits."""
+    return "std_logic" if width is None else f"std_logic_vector({width - 1} downto 0)"
+
+
+def bit(vector: str, number: int) -> str:
+    """A bit of a vector."""
+    return f"{vector}({number})"
+
+
+def bits(vector: str, high: int, low: int) -> str:
+    """Some bits of a vector."""
+    return f"{vector}({high} downto {low})"
+
+
+def binary(value: int, width: int) -> str:
+    """A number of `width` bits as a literal."""
+    return f'"{value:0{width}b}"'
+
+
+def hexadecimal(data: bytes) -> str:
+    """Bytes as a literal, the first one lowest."""
+    return f'x"{data[::-1].hex()}"'
+
+
+def bits_of_bool(port: str) -> str:
+    """A bool's bit as the byte that is sent."""
+    return f'"0000000" & {port}'
+
+
+def within(number: str, first: int, last: int) -> str:
+    """The condition that a number is one of `first` to `last`."""
+    return f"{number} = {first}" if first == last else f"({number} >= {first} and {number} <= {last})"
+
+
+def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
+    """Operands with an operator between them, in lines of about `length` characters that lack it at their ends."""
+    lines: list[str] = []
+    for operand in operands:
+        if lines and len(lines[-1]) + len(operand) < length:
+            lines[-1] += f" {operator} {operand}"
+        else:
+            lines.append(operand)
+    return lines
+
+
+def all_of(conditions: Iterable[str]) -> str:
+    """What is '1' while all of them are."""
+    return " and ".join(conditions)
+
+
+def any_of(conditions: Iterable[str]) -> str:
+    """The condition that one of them holds; "" if there is none."""
+    return " or\n        ".join(wrapped(conditions, "or", LINE))

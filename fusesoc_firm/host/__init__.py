@@ -1,1 +1,0 @@
-"""What runs beside the hardware: stimuli and expected frames of a simulation."""

@@ -1,0 +1,401 @@
+"""A node of a running ROS that carries serialised messages between its topics and a socket.
+
+It runs under the Python that ROS is installed for, which is seldom ours: so it is a program of its own and needs
+nothing but ROS and the standard library of Python 3.8. `node/carrier.py` starts it.
+
+    python3 bridge.py SOCKET [ARGUMENT OF ROS ...]         # SOCKET is a file descriptor, a stream of parcels
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+from abc import ABC, abstractmethod
+from typing import Any, NamedTuple
+
+# To the bridge: what it is to be. From the bridge: what the topics are called after remapping.
+CONFIGURE, READY = b"C", b"R"
+# A message: from a topic, or to be published on one. From the bridge: it is published, if this is asked for.
+MESSAGE, PUBLISHED = b"M", b"P"
+# To the bridge: take no more messages. From the bridge: ROS wants the node to end.
+STOP = b"S"
+# From the bridge: all that was taken before STOP is handed over. Or: what went wrong; it ends then.
+DONE, FAULT = b"D", b"E"
+
+# The kind, the topic's number, a time of the system's monotonic clock in ns, and how many bytes follow.
+_HEADER = struct.Struct("<cHqI")
+# How long what was published may take to leave, in s.
+_FLUSH_SECONDS = 2.0
+
+
+class Parcel(NamedTuple):
+    """What goes over the socket at once."""
+
+    kind: bytes
+    topic: int
+    time_ns: int
+    data: bytes
+
+
+class Channel:
+    """One end of the socket. Any thread may send; one receives."""
+
+    def __init__(self, end: socket.socket) -> None:
+        self._socket = end
+        self._file = end.makefile("rb", 1 << 16)
+        self._lock = threading.Lock()
+
+    def send(self, kind: bytes, topic: int = 0, data: bytes = b"", time_ns: int = 0) -> None:
+        """Send a parcel; waits while the other end reads nothing. Raises OSError when the other end is gone."""
+        header = _HEADER.pack(kind, topic, time_ns, len(data))
+        with self._lock:
+            if len(data) < 1 << 16:
+                self._socket.sendall(header + data)
+            else:
+                self._socket.sendall(header)
+                self._socket.sendall(data)
+
+    def receive(self) -> Parcel | None:
+        """The next parcel; None when the other end is closed, or gone within a parcel."""
+        try:
+            header = self._file.read(_HEADER.size)
+            if len(header) < _HEADER.size:
+                return None
+            kind, topic, time_ns, size = _HEADER.unpack(header)
+            data = self._file.read(size)
+        except (OSError, ValueError):  # ValueError: this end is closed
+            return None
+        return None if len(data) < size else Parcel(kind, topic, time_ns, data)
+
+    def finish(self) -> None:
+        """Send no more; the other end learns of it."""
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_WR)
+
+    def is_closed(self) -> bool:
+        """Whether the other end is closed, and nothing is left to be received."""
+        try:
+            return not self._socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
+
+    def close(self) -> None:
+        """Close this end; whoever waits for something from it has waited long enough."""
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+        # The socket lives as long as its file.
+        self._file.close()
+        self._socket.close()
+
+
+class BridgeError(Exception):
+    """ROS cannot do what is asked for."""
+
+
+class Ros(ABC):
+    """What both versions of ROS have in common."""
+
+    def __init__(self, config: dict[str, Any], channel: Channel) -> None:
+        self._config = config
+        self._channel = channel
+        self._is_taking = True
+        self._ended = threading.Event()
+
+    def take(self, topic: int, payload: bytes) -> None:
+        """Hand over a message; waits while nobody takes it."""
+        if not self._is_taking:
+            return
+        try:
+            self._channel.send(MESSAGE, topic, payload, time.monotonic_ns())
+        except OSError:
+            self._is_taking = False
+
+    def end(self) -> None:
+        """Let `spin` return; any thread."""
+        self._ended.set()
+
+    @abstractmethod
+    def names(self) -> dict[str, dict[int, str]]:
+        """What the topics are called after remapping."""
+
+    @abstractmethod
+    def publish(self, topic: int, payload: bytes) -> None:
+        """Publish a message."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Take no more messages, and say DONE when all that was taken is handed over."""
+
+    @abstractmethod
+    def spin(self) -> None:
+        """Work until `end`."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let leave what was published, and be no node any more."""
+
+
+class Ros1(Ros):
+    """A node of ROS 1 by rospy; no message package need be installed."""
+
+    def __init__(self, config: dict[str, Any], arguments: list[str], channel: Channel) -> None:
+        super().__init__(config, channel)
+        # rospy looks for remappings here, some of them when it is imported.
+        sys.argv = [config["name"], *arguments]
+        import rospy
+
+        self._rospy = rospy
+        rospy.init_node(config["name"], disable_signals=True)
+        rospy.on_shutdown(self._stopped_by_ros)
+        self._classes = {topic["number"]: _raw_class(rospy, topic) for topic in config["publishers"]}
+        self._publishers = {
+            topic["number"]: rospy.Publisher(
+                topic["name"], self._classes[topic["number"]], queue_size=config["depth"], tcp_nodelay=True
+            )
+            for topic in config["publishers"]
+        }
+        self._subscribers = {
+            topic["number"]: rospy.Subscriber(
+                topic["name"], _raw_class(rospy, topic), self._taken, topic["number"], tcp_nodelay=True
+            )
+            for topic in config["subscribers"]
+        }
+
+    def _taken(self, message: Any, topic: int) -> None:
+        self.take(topic, message._buff)  # noqa: SLF001 - rospy has no other name for it
+
+    def _stopped_by_ros(self) -> None:
+        """Such as by `rosnode kill`; it is heard at every end, when nobody listens any more."""
+        with contextlib.suppress(OSError):
+            self._channel.send(STOP)
+
+    def names(self) -> dict[str, dict[int, str]]:
+        """What the topics are called after remapping."""
+        return {
+            "subscribers": {number: topic.resolved_name for number, topic in self._subscribers.items()},
+            "publishers": {number: topic.resolved_name for number, topic in self._publishers.items()},
+        }
+
+    def publish(self, topic: int, payload: bytes) -> None:
+        """Publish a message; a connection whose queue is full loses its oldest one."""
+        message = self._classes[topic]()
+        message._buff = payload  # noqa: SLF001
+        with contextlib.suppress(self._rospy.ROSException):  # ROS has ended; on_shutdown has said so
+            self._publishers[topic].publish(message)
+
+    def stop(self) -> None:
+        """Take no more messages: every callback has handed its message over, or never will."""
+        for subscriber in self._subscribers.values():
+            subscriber.unregister()
+        self._is_taking = False
+        self._channel.send(DONE)
+
+    def spin(self) -> None:
+        """Wait: rospy works in threads of its own."""
+        self._ended.wait()
+
+    def close(self) -> None:
+        """Let leave what was published, and end the node."""
+        latest = time.monotonic() + _FLUSH_SECONDS
+        for publisher in self._publishers.values():
+            for connection in list(publisher.impl.connections):
+                _flush(connection, latest)
+        self._rospy.signal_shutdown("its hardware is gone")
+
+
+def _raw_class(rospy: Any, topic: dict[str, Any]) -> Any:
+    """A class whose messages are their bytes; peers see it as that of the topic."""
+    names = {"_type": topic["type"], "_md5sum": topic["signature"], "_full_text": topic["definition"], "__slots__": ()}
+    return type("RawMessage", (rospy.AnyMsg,), names)
+
+
+def _flush(connection: Any, latest: float) -> None:
+    """Wait until a connection's own thread has sent what it was given.
+
+    It takes all that is there at once, and sends it then. So when it has taken nothing twice, it has sent what came
+    before the first.
+    """
+    for _ in range(2):
+        try:
+            connection.write_data(b"")
+        except Exception:  # noqa: BLE001 - the peer is gone, and rospy says so by several types
+            return
+        while getattr(connection, "_queue", None) and not connection.done and time.monotonic() < latest:
+            time.sleep(0.005)
+
+
+class Ros2(Ros):
+    """A node of ROS 2 by rclpy, whose message packages must be installed: rmw describes types by their code."""
+
+    def __init__(self, config: dict[str, Any], arguments: list[str], channel: Channel) -> None:
+        super().__init__(config, channel)
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+        from rclpy.qos import QoSProfile, ReliabilityPolicy
+        from rclpy.signals import SignalHandlerOptions
+
+        self._rclpy = rclpy
+        types = {topic["type"]: _message_class(topic["type"]) for kind in _KINDS for topic in config[kind]}
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node(config["name"])
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._taken = 0
+        self._stops_at: float | None = None
+        reliability = ReliabilityPolicy.RELIABLE if config["is_reliable"] else ReliabilityPolicy.BEST_EFFORT
+        qos = QoSProfile(depth=config["depth"], reliability=reliability)
+        self._publishers = {
+            topic["number"]: self._node.create_publisher(types[topic["type"]], topic["name"], qos)
+            for topic in config["publishers"]
+        }
+        self._subscribers = {
+            topic["number"]: self._node.create_subscription(
+                types[topic["type"]], topic["name"], self._callback(topic["number"]), qos, raw=True
+            )
+            for topic in config["subscribers"]
+        }
+        self._check_hashes()
+
+    def _callback(self, topic: int) -> Any:
+        def taken(payload: bytes) -> None:
+            self._taken += 1
+            self.take(topic, payload)
+
+        return taken
+
+    def _check_hashes(self) -> None:
+        """Raise BridgeError for a type that is installed as another one than the hardware's. Older ROS 2 cannot say."""
+        info = {
+            "subscribers": self._node.get_subscriptions_info_by_topic,
+            "publishers": self._node.get_publishers_info_by_topic,
+        }
+        mine = (self._node.get_name(), self._node.get_namespace())
+        names = self.names()
+        for kind in _KINDS:
+            for topic in self._config[kind]:
+                for end in info[kind](names[kind][topic["number"]]):
+                    known = str(getattr(end, "topic_type_hash", topic["signature"]))
+                    if (end.node_name, end.node_namespace) == mine and known != topic["signature"]:
+                        raise BridgeError(
+                            "'{}' is installed as another message ({}) than that of the system ({})".format(
+                                topic["type"], known, topic["signature"]
+                            )
+                        )
+
+    def names(self) -> dict[str, dict[int, str]]:
+        """What the topics are called after remapping."""
+        return {
+            "subscribers": {number: topic.topic_name for number, topic in self._subscribers.items()},
+            "publishers": {number: topic.topic_name for number, topic in self._publishers.items()},
+        }
+
+    def publish(self, topic: int, payload: bytes) -> None:
+        """Publish a message."""
+        self._publishers[topic].publish(payload)
+
+    def stop(self) -> None:
+        """Have `spin` take what is already here, and no more."""
+        self._stops_at = time.monotonic() + _FLUSH_SECONDS
+        self._executor.wake()
+
+    def spin(self) -> None:
+        """Call the callbacks."""
+        while not self._ended.is_set():
+            taken = self._taken
+            self._executor.spin_once(timeout_sec=0.5 if self._stops_at is None else 0)
+            if self._stops_at is not None and (taken == self._taken or time.monotonic() > self._stops_at):
+                break
+        self._is_taking = False
+        if not self._ended.is_set():
+            self._channel.send(DONE)
+            self._ended.wait()
+
+    def end(self) -> None:
+        """Let `spin` return."""
+        super().end()
+        self._executor.wake()
+
+    def close(self) -> None:
+        """Let leave what was published, and end the node."""
+        from rclpy.duration import Duration
+
+        if self._config["is_reliable"]:
+            for publisher in self._publishers.values():
+                publisher.wait_for_all_acked(Duration(seconds=_FLUSH_SECONDS))
+        self._node.destroy_node()
+        self._rclpy.shutdown()
+
+
+_KINDS = ("subscribers", "publishers")
+_VERSIONS = {1: Ros1, 2: Ros2}
+
+
+def _message_class(name: str) -> Any:
+    import importlib
+
+    package, kind, message = name.split("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), message)
+    except (ImportError, AttributeError):
+        raise BridgeError(
+            f"the message '{name}' is not installed for {sys.executable}; ROS 2 needs its package built, and sourced"
+        ) from None
+
+
+def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
+    """Do what the engine asks for, until it closes its end."""
+    while True:
+        parcel = channel.receive()
+        if parcel is None:
+            break
+        if parcel.kind == MESSAGE:
+            ros.publish(parcel.topic, parcel.data)
+            if is_timed:
+                channel.send(PUBLISHED, parcel.topic, time_ns=time.monotonic_ns())
+        elif parcel.kind == STOP:
+            ros.stop()
+    ros.end()
+
+
+def main() -> int:
+    """Be the bridge."""
+    channel = Channel(socket.socket(fileno=int(sys.argv[1])))
+    first = channel.receive()
+    if first is None or first.kind != CONFIGURE:
+        return 2
+    config = json.loads(first.data)
+    # rospy waits for its master for ever; whoever gives up closes the other end.
+    ready = threading.Event()
+    threading.Thread(target=_give_up, args=(channel, ready), daemon=True).start()
+    try:
+        ros = _VERSIONS[config["ros"]](config, sys.argv[2:], channel)
+    except Exception as error:  # noqa: BLE001 - whatever ROS raises, it is said
+        channel.send(FAULT, data=str(error).encode())
+        return 1
+    channel.send(READY, data=json.dumps(ros.names()).encode())
+    ready.set()
+    server = threading.Thread(target=_serve, args=(ros, channel, config["is_timed"]), daemon=True)
+    server.start()
+    ros.spin()
+    ros.close()
+    channel.finish()
+    return 0
+
+
+def _give_up(channel: Channel, ready: threading.Event) -> None:
+    """End the process if the engine closes its end before ROS is there."""
+    while not ready.wait(0.2):
+        if channel.is_closed():
+            os._exit(0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

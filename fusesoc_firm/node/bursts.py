@@ -1,0 +1,143 @@
+"""Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, 'Bursts').
+
+    joiner = BurstJoiner(publishers=4, width=64)
+    for burst in bursts:                    # the bytes between two `tlast`, those that `tkeep` marks
+        if frame := joiner.push(burst):
+            deliver(frame.id, frame.payload)
+    joiner.close()
+
+Frames that nobody interrupted are bursts as well, so it serves a Manager without preemption, too. The same in C++ is
+`firm/bursts.hpp` in the folder `cpp` beside this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
+
+WIDTHS = (8, 16, 32, 64, 128, 256, 512)
+MOST_PUBLISHERS = 256
+_HEADER_BYTES = ID_BYTES + LENGTH_BYTES
+
+
+class BurstError(ValueError):
+    """A burst that no Manager sends. What was there of the frame it belongs to is dropped."""
+
+
+@dataclass(frozen=True)
+class JoinedFrame:
+    """A whole frame: the publisher it came from and its payload."""
+
+    id: int
+    payload: bytes
+
+
+class BurstJoiner:
+    """Joins bursts by id until the length that a frame announces is reached; one for each stream."""
+
+    def __init__(self, publishers: int, width: int, longest: int | None = None) -> None:
+        """`publishers` of the Manager (1 to 256), `width` of the stream in bits, the `longest` payload in bytes.
+
+        A frame that announces more than `longest` is refused when its header is there, before it takes the memory.
+        """
+        if not 1 <= publishers <= MOST_PUBLISHERS:
+            raise ValueError(f"publishers is {publishers}; legal: 1 to {MOST_PUBLISHERS}")
+        _check_width(width)
+        self._publishers = publishers
+        self._beat_bytes = width // 8
+        self._longest = longest
+        self._begun: dict[int, bytearray] = {}
+
+    @property
+    def unfinished(self) -> tuple[int, ...]:
+        """The ids of which a frame has begun and is not over, in ascending order."""
+        return tuple(sorted(self._begun))
+
+    def push(self, burst: bytes, tid: int | None = None) -> JoinedFrame | None:
+        """Take a burst; the frame that it completes, if it does.
+
+        `tid` is the stream's, where the transport has one; it must repeat the id. Raises `BurstError`.
+        """
+        identifier = self._id(burst, tid)
+        begun = self._begun.pop(identifier, None)
+        if begun is None:
+            frame = bytearray(burst)
+        else:
+            if len(burst) <= self._beat_bytes:
+                raise BurstError(f"the burst that resumes the frame of id {identifier} holds nothing but the id")
+            # Only these bytes were inserted; they are a beat, so that those behind it stay in their lanes.
+            frame = begun
+            frame += memoryview(burst)[self._beat_bytes :]
+        whole = self._frame_bytes(identifier, frame)
+        if whole == len(frame):
+            return JoinedFrame(identifier, bytes(memoryview(frame)[_HEADER_BYTES:]))
+        if len(burst) % self._beat_bytes:
+            raise BurstError(
+                f"a burst of id {identifier} ends within a beat: {len(burst)} bytes, {self._beat_bytes} a beat,"
+                f" and the frame is not over"
+            )
+        self._begun[identifier] = frame
+        return None
+
+    def close(self) -> None:
+        """Say that the stream is over. Raises `BurstError` if a frame is not."""
+        if not self._begun:
+            return
+        parts = ", ".join(f"{len(self._begun[identifier])} bytes of id {identifier}" for identifier in self.unfinished)
+        self._begun.clear()
+        raise BurstError(f"the stream ends within frames: {parts}")
+
+    def _id(self, burst: bytes, tid: int | None) -> int:
+        if not burst:
+            raise BurstError("the burst is empty")
+        identifier = burst[0]
+        if identifier >= self._publishers:
+            raise BurstError(f"the id is {identifier}, but the publishers are 0 to {self._publishers - 1}")
+        if tid is not None and tid != identifier:
+            raise BurstError(f"tid is {tid}, but the burst begins with id {identifier}")
+        return identifier
+
+    def _frame_bytes(self, identifier: int, frame: bytearray) -> int | None:
+        """The bytes of the whole frame; None while its header is not complete."""
+        if len(frame) < _HEADER_BYTES:
+            return None
+        length = int.from_bytes(frame[ID_BYTES:_HEADER_BYTES], "little")
+        if self._longest is not None and length > self._longest:
+            raise BurstError(
+                f"the frame of id {identifier} announces {length} bytes of payload; the longest has {self._longest}"
+            )
+        beyond = len(frame) - _HEADER_BYTES - length
+        if beyond > 0:
+            raise BurstError(f"the frame of id {identifier} is {beyond} bytes longer than it announces")
+        return _HEADER_BYTES + length
+
+
+def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
+    """The bursts of a frame that is sent in runs of so many beats each; the last run takes what is left.
+
+    What the Manager does to a frame, for tests and models of it. The bits of an extra beat that mean nothing are zero.
+    Raises `ValueError` if a run has no beat, or if the runs are more than the frame has beats.
+    """
+    _check_width(width)
+    beat_bytes = width // 8
+    bursts: list[bytes] = []
+    first = 0
+    for beats in runs:
+        last = first + beats * beat_bytes
+        if beats < 1 or last >= len(frame):
+            raise ValueError(f"run {len(bursts)} has {beats} beats; legal: 1 and more, fewer than are left")
+        bursts.append(_burst(frame, first, last, beat_bytes))
+        first = last
+    return [*bursts, _burst(frame, first, len(frame), beat_bytes)]
+
+
+def _burst(frame: bytes, first: int, last: int, beat_bytes: int) -> bytes:
+    inserted = frame[:ID_BYTES].ljust(beat_bytes, b"\0") if first else b""
+    return inserted + frame[first:last]
+
+
+def _check_width(width: int) -> None:
+    if width not in WIDTHS:
+        raise ValueError(f"width is {width}; legal: {', '.join(map(str, WIDTHS))}")

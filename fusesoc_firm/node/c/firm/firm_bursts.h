@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, "Bursts"): what fusesoc_firm/node/bursts.py does,
+ * with a buffer for each publisher. Both are tested with the same bursts. */
+#ifndef FIRM_BURSTS_H
+#define FIRM_BURSTS_H
+
+#include "firm_config.h"
+#include "firm_frame.h"
+
+typedef struct {
+    uint8_t frames[FIRM_PUBLISHERS][FIRM_HEADER_BYTES + FIRM_LONGEST_PAYLOAD];
+    size_t filled[FIRM_PUBLISHERS]; /* 0: no frame has begun */
+} firm_joiner_t;
+
+void firm_joiner_init(firm_joiner_t *joiner);
+
+/* Take a burst. FIRM_FRAME: `frame` of `frame_bytes` is whole, there until the next push of its id. `tid` is the
+ * stream's, or negative where the transport has none. Behind an error, what was there of the frame is dropped. */
+firm_status_t firm_joiner_push(firm_joiner_t *joiner, const uint8_t *burst, size_t size, int tid, const uint8_t **frame,
+                               size_t *frame_bytes);
+
+/* How many frames have begun and are not over; they are dropped. */
+unsigned firm_joiner_close(firm_joiner_t *joiner);
+
+#endif

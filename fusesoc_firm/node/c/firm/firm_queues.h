@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Frames to the hardware: a queue for each subscriber, and the least recently used one is next (the dissertation's section
+ * 6.3.3; docs/reference/host-queues.md). What fusesoc_firm/node/queues.py does by default, in a static array.
+ *
+ * A payload is copied once, outside of the lock, into a slot that becomes the frame's until it has been sent. */
+#ifndef FIRM_QUEUES_H
+#define FIRM_QUEUES_H
+
+#include <stdbool.h>
+
+#include "firm_config.h"
+#include "firm_frame.h"
+#include "firm_port.h"
+
+/* Beside those that wait, one for each frame that is being written, and one that is being sent. */
+#define FIRM_SLOTS (FIRM_SUBSCRIBERS * FIRM_QUEUE_DEPTH + FIRM_WRITERS + 1)
+
+typedef struct {
+    uint8_t frames[FIRM_SLOTS][FIRM_HEADER_BYTES + FIRM_LONGEST_PAYLOAD];
+    size_t sizes[FIRM_SLOTS];
+    uint16_t free[FIRM_SLOTS]; /* a stack */
+    unsigned free_count;
+    uint16_t waiting[FIRM_SUBSCRIBERS][FIRM_QUEUE_DEPTH]; /* rings */
+    unsigned first[FIRM_SUBSCRIBERS];
+    unsigned count[FIRM_SUBSCRIBERS];
+    uint64_t served_at[FIRM_SUBSCRIBERS]; /* 0: never */
+    uint64_t now;
+    uint32_t dropped[FIRM_SUBSCRIBERS];
+    firm_lock_t lock;
+} firm_queues_t;
+
+typedef char firm_slots_have_16_bits[FIRM_SLOTS <= 65535 ? 1 : -1];
+
+/* A frame that is to be sent; its slot is given back by firm_queues_release. */
+typedef struct {
+    unsigned subscriber;
+    const uint8_t *frame;
+    size_t size;
+    unsigned slot;
+} firm_next_t;
+
+void firm_queues_init(firm_queues_t *queues);
+
+/* Add a payload; a queue that is full drops its oldest. False for a subscriber or a size that there is not, and if more
+ * tasks write than FIRM_WRITERS. Not within an interrupt. */
+bool firm_queues_put(firm_queues_t *queues, unsigned subscriber, const uint8_t *payload, size_t size);
+
+/* The frame that is next; false if there is none. One task. */
+bool firm_queues_get(firm_queues_t *queues, firm_next_t *next);
+void firm_queues_release(firm_queues_t *queues, const firm_next_t *next);
+
+#endif

@@ -1,0 +1,224 @@
+"""A middleware as a node needs it, and ROS as one: a process of its own, under the Python that ROS is installed for."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Protocol
+
+from fusesoc_firm.node import bridge
+from fusesoc_firm.node.description import NodeDescription, NodeTopic
+from fusesoc_firm.node.options import ROS_ARGUMENTS
+
+# What the Python of each version of ROS can import.
+_MODULES = {1: "rospy", 2: "rclpy"}
+_END_SECONDS = 5.0
+
+
+class CarrierError(Exception):
+    """The middleware is not there, cannot do what is asked for, or has ended."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A message from the topic of this number, and when it came, in ns of the system's monotonic clock."""
+
+    topic: int
+    payload: bytes
+    time_ns: int
+
+
+@dataclass(frozen=True)
+class Published:
+    """A message of the topic of this number is published, at this time; they come in the order of `publish`."""
+
+    topic: int
+    time_ns: int
+
+
+class Carrier(Protocol):
+    """Topics of a middleware. They are numbered as in the description: subscribers and publishers apart."""
+
+    def receive(self) -> Iterator[Taken | Published]:
+        """What comes, until the carrier is closed or the middleware ends. Raises `CarrierError`."""
+
+    def publish(self, topic: int, payload: bytes) -> None:
+        """Publish a message; any thread. What comes after the end of the middleware is dropped."""
+
+    def stop(self) -> None:
+        """Take no more messages."""
+
+    def wait_until_stopped(self, timeout: float) -> bool:
+        """Wait until `receive` has given all that was taken before `stop`; whether it has."""
+
+    def close(self) -> None:
+        """End when all that was published has left."""
+
+
+@dataclass(frozen=True)
+class RosOptions:
+    """How a node is to be seen in ROS.
+
+    `arguments` are ROS's own: remappings and so on. `depth` is that of ROS's queues, in messages. `python` is the one
+    that ROS is installed for, None looks for it.
+    """
+
+    name: str
+    arguments: tuple[str, ...] = ()
+    depth: int = 10
+    is_reliable: bool = True
+    is_timed: bool = False
+    python: str | None = None
+
+
+class RosCarrier:
+    """A process that is a node of a running ROS; see `Carrier`."""
+
+    def __init__(self, ros: int, description: NodeDescription, options: RosOptions) -> None:
+        """Start it and wait until ROS knows it, or for `CarrierError`. ROS 1 waits for its master."""
+        self.title = f"ROS {ros}"
+        self._python = options.python or _python_of(ros)
+        mine, its = socket.socketpair()
+        arguments = [*ros_arguments(ros, options.arguments)]
+        # A session of its own: Ctrl-C is for us, and the node has to publish what is still in the hardware.
+        try:
+            self._process = subprocess.Popen(
+                [self._python, bridge.__file__, str(its.fileno()), *arguments],
+                pass_fds=[its.fileno()],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        except OSError as error:
+            mine.close()
+            raise CarrierError(
+                f"the Python of {self.title}, {self._python}, cannot be started: {error.strerror}"
+            ) from None
+        finally:
+            its.close()
+        self._channel = bridge.Channel(mine)
+        self._stopped = threading.Event()
+        self._is_closing = False
+        configuration = {
+            "ros": ros,
+            "name": options.name,
+            "depth": options.depth,
+            "is_reliable": options.is_reliable,
+            "is_timed": options.is_timed,
+            "subscribers": _numbered(ros, description.subscribers),
+            "publishers": _numbered(ros, description.publishers),
+        }
+        try:
+            self._channel.send(bridge.CONFIGURE, data=json.dumps(configuration).encode())
+            self.subscribers, self.publishers = self._wait_until_ready()
+        except BaseException:
+            self._end(0)
+            raise
+
+    def _wait_until_ready(self) -> tuple[dict[int, str], dict[int, str]]:
+        """The topics' names after remapping."""
+        parcel = self._channel.receive()
+        if parcel is None or parcel.kind == bridge.FAULT:
+            raise self._fault(parcel)
+        names = json.loads(parcel.data)
+        subscribers, publishers = (
+            {int(number): name for number, name in names[kind].items()} for kind in ("subscribers", "publishers")
+        )
+        return subscribers, publishers
+
+    def receive(self) -> Iterator[Taken | Published]:
+        """What comes, until the carrier is closed, or ROS asks the node to end. Raises `CarrierError`."""
+        try:
+            while parcel := self._channel.receive():
+                if parcel.kind == bridge.MESSAGE:
+                    if not self._stopped.is_set():
+                        yield Taken(parcel.topic, parcel.data, parcel.time_ns)
+                elif parcel.kind == bridge.PUBLISHED:
+                    yield Published(parcel.topic, parcel.time_ns)
+                elif parcel.kind == bridge.DONE:
+                    self._stopped.set()
+                elif parcel.kind == bridge.STOP:
+                    return
+                else:
+                    raise self._fault(parcel)
+            if not self._is_closing:
+                raise self._fault(None)
+        finally:
+            self._stopped.set()
+
+    def publish(self, topic: int, payload: bytes) -> None:
+        """Publish a message."""
+        self._send(bridge.MESSAGE, topic, payload)
+
+    def stop(self) -> None:
+        """Take no more messages."""
+        self._send(bridge.STOP)
+
+    def wait_until_stopped(self, timeout: float) -> bool:
+        """Wait until all that was taken is handed over; whether it is."""
+        return self._stopped.wait(timeout)
+
+    def close(self) -> None:
+        """End the process, when all that was published has left."""
+        self._end(_END_SECONDS)
+
+    def _send(self, kind: bytes, topic: int = 0, data: bytes = b"") -> None:
+        try:
+            self._channel.send(kind, topic, data)
+        except OSError:
+            # It has ended; `receive` says so.
+            return
+
+    def _end(self, seconds: float) -> None:
+        self._is_closing = True
+        self._channel.finish()
+        try:
+            self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._channel.close()
+
+    def _fault(self, parcel: bridge.Parcel | None) -> CarrierError:
+        if parcel is None:
+            return CarrierError(f"the process of {self.title} ({self._python}) has ended")
+        return CarrierError(f"{self.title}: {parcel.data.decode(errors='replace')}")
+
+
+def _numbered(ros: int, topics: Sequence[NodeTopic]) -> list[dict[str, object]]:
+    return [{"number": number, **asdict(topic)} for number, topic in enumerate(topics) if topic.ros == ros]
+
+
+def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
+    """ROS's own arguments as a version has them: NAME:=VALUE is for both, all behind `--ros-args` for ROS 2."""
+    words = iter(arguments)
+    if ros == 2:
+        yield ROS_ARGUMENTS
+    for word in words:
+        if word == ROS_ARGUMENTS:
+            yield from words if ros == 2 else ()
+            return
+        yield from ("-r", word) if ros == 2 else (word,)
+
+
+@cache
+def _python_of(ros: int) -> str:
+    """The first Python that can import what ROS installs for it. Raises `CarrierError`."""
+    module = _MODULES[ros]
+    found = [shutil.which("python3"), "/usr/bin/python3", sys.executable]
+    candidates = [path for path in dict.fromkeys(found) if path and Path(path).exists()]
+    for path in candidates:
+        # A find is not enough: a sourced ROS may be for another Python.
+        if not subprocess.run([path, "-c", f"import {module}"], capture_output=True, check=False).returncode:
+            return path
+    raise CarrierError(
+        f"no Python here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
+        f" source ROS's setup file, or name its Python by --ros-python"
+    )

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, "Bursts").
+//
+//     firm::BurstJoiner joiner(4, 64);                     // publishers, bits of the stream
+//     if (auto frame = joiner.push(bytes, size)) {         // the bytes between two tlast, those that tkeep marks
+//       deliver(frame->id, frame->payload);
+//     }
+//     joiner.close();
+//
+// Frames that nobody interrupted are bursts as well, so it serves a Manager without preemption, too. It does what
+// fusesoc_firm/node/bursts.py does, with the same messages; both are tested with the same bursts. C++17, no dependencies.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace firm {
+
+// A burst that no Manager sends. What was there of the frame it belongs to is dropped.
+class BurstError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// A whole frame: the publisher it came from and its payload.
+struct JoinedFrame {
+  std::uint8_t id;
+  std::vector<std::uint8_t> payload;
+};
+
+// Joins bursts by id until the length that a frame announces is reached; one for each stream.
+class BurstJoiner {
+ public:
+  // `publishers` of the Manager (1 to 256), `width` of the stream in bits, the `longest` payload in bytes: a frame that
+  // announces more is refused when its header is there, before it takes the memory. Throws std::invalid_argument.
+  BurstJoiner(unsigned publishers, unsigned width,
+              std::size_t longest = std::numeric_limits<std::size_t>::max())
+      : publishers_(publishers), beat_bytes_(width / 8), longest_(longest) {
+    if (publishers < 1 || publishers > 256) {
+      throw std::invalid_argument("publishers is " + std::to_string(publishers) + "; legal: 1 to 256");
+    }
+    if (width < 8 || width > 512 || (width & (width - 1)) != 0) {
+      throw std::invalid_argument("width is " + std::to_string(width) + "; legal: 8, 16, 32, 64, 128, 256, 512");
+    }
+  }
+
+  // Take a burst; the frame that it completes, if it does. `tid` is the stream's, where the transport has one; it must
+  // repeat the id. Throws BurstError.
+  std::optional<JoinedFrame> push(const std::uint8_t* burst, std::size_t size,
+                                  std::optional<std::uint8_t> tid = std::nullopt) {
+    const std::uint8_t id = checked_id(burst, size, tid);
+    std::vector<std::uint8_t> frame;
+    if (auto begun = begun_.find(id); begun != begun_.end()) {
+      frame = std::move(begun->second);
+      begun_.erase(begun);
+      if (size <= beat_bytes_) {
+        throw BurstError("the burst that resumes the frame of id " + std::to_string(id) + " holds nothing but the id");
+      }
+      // Only these bytes were inserted; they are a beat, so that those behind it stay in their lanes.
+      frame.insert(frame.end(), burst + beat_bytes_, burst + size);
+    } else {
+      frame.assign(burst, burst + size);
+    }
+    if (is_whole(id, frame)) {
+      frame.erase(frame.begin(), frame.begin() + kHeaderBytes);
+      return JoinedFrame{id, std::move(frame)};
+    }
+    if (size % beat_bytes_ != 0) {
+      throw BurstError("a burst of id " + std::to_string(id) + " ends within a beat: " + std::to_string(size) +
+                       " bytes, " + std::to_string(beat_bytes_) + " a beat, and the frame is not over");
+    }
+    begun_.emplace(id, std::move(frame));
+    return std::nullopt;
+  }
+
+  std::optional<JoinedFrame> push(const std::vector<std::uint8_t>& burst,
+                                  std::optional<std::uint8_t> tid = std::nullopt) {
+    return push(burst.data(), burst.size(), tid);
+  }
+
+  // The ids of which a frame has begun and is not over, in ascending order.
+  std::vector<std::uint8_t> unfinished() const {
+    std::vector<std::uint8_t> ids;
+    for (const auto& begun : begun_) ids.push_back(begun.first);
+    return ids;
+  }
+
+  // Say that the stream is over. Throws BurstError if a frame is not.
+  void close() {
+    std::string parts;
+    for (const auto& [id, frame] : begun_) {
+      if (!parts.empty()) parts += ", ";
+      parts += std::to_string(frame.size()) + " bytes of id " + std::to_string(id);
+    }
+    begun_.clear();
+    if (!parts.empty()) throw BurstError("the stream ends within frames: " + parts);
+  }
+
+ private:
+  static constexpr std::size_t kHeaderBytes = 5;  // id, and the length of the payload
+
+  std::uint8_t checked_id(const std::uint8_t* burst, std::size_t size, std::optional<std::uint8_t> tid) const {
+    if (size == 0) throw BurstError("the burst is empty");
+    const unsigned id = burst[0];
+    if (id >= publishers_) {
+      throw BurstError("the id is " + std::to_string(id) + ", but the publishers are 0 to " +
+                       std::to_string(publishers_ - 1));
+    }
+    if (tid && *tid != id) {
+      throw BurstError("tid is " + std::to_string(*tid) + ", but the burst begins with id " + std::to_string(id));
+    }
+    return burst[0];
+  }
+
+  bool is_whole(std::uint8_t id, const std::vector<std::uint8_t>& frame) const {
+    if (frame.size() < kHeaderBytes) return false;
+    std::uint64_t length = 0;
+    for (std::size_t place = kHeaderBytes - 1; place > 0; --place) length = length << 8 | frame[place];
+    if (length > longest_) {
+      throw BurstError("the frame of id " + std::to_string(id) + " announces " + std::to_string(length) +
+                       " bytes of payload; the longest has " + std::to_string(longest_));
+    }
+    const std::uint64_t received = frame.size() - kHeaderBytes;
+    if (received > length) {
+      throw BurstError("the frame of id " + std::to_string(id) + " is " + std::to_string(received - length) +
+                       " bytes longer than it announces");
+    }
+    return received == length;
+  }
+
+  unsigned publishers_;
+  std::size_t beat_bytes_;
+  std::size_t longest_;
+  std::map<std::uint8_t, std::vector<std::uint8_t>> begun_;
+};
+
+}  // namespace firm

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a driver in user space needs of AXI DMA under Linux: its registers and its interrupt by UIO, and memory that
+// processor and engine share by u-dma-buf (https://github.com/ikwzm/udmabuf). Which device tree this needs is in
+// docs/reference/node-library.md.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <firm/descriptor.hpp>
+#include <firm/transport.hpp>
+
+namespace firm {
+
+// The engine as its driver sees it; a test may have one of its own.
+class DmaDevice {
+ public:
+  virtual ~DmaDevice() = default;
+  virtual std::uint32_t read(std::size_t offset) = 0;
+  virtual void write(std::size_t offset, std::uint32_t value) = 0;
+  // Memory that both see, not cached, and the address of its first byte for the engine.
+  virtual std::uint8_t* memory() = 0;
+  virtual std::size_t memory_bytes() const = 0;
+  virtual std::uint32_t address() const = 0;
+  // Sleep until an interrupt of S2MM that has not been answered, until the time is over, or after end().
+  virtual void wait(const Deadline& deadline) = 0;
+  virtual void end() = 0;
+};
+
+// Memory of a device file.
+class Mapping {
+ public:
+  Mapping(const std::string& path, std::size_t size) : size_(size) {
+    file_ = Descriptor(::open(path.c_str(), O_RDWR | O_SYNC | O_CLOEXEC));
+    if (file_.get() < 0) fail_with_errno(path);
+    place_ = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, file_.get(), 0);
+    if (place_ == MAP_FAILED) fail_with_errno("mmap of " + path);
+  }
+  ~Mapping() { ::munmap(place_, size_); }
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+
+  int file() const { return file_.get(); }
+  void* place() const { return place_; }
+  std::size_t size() const { return size_; }
+
+ private:
+  std::size_t size_;
+  Descriptor file_;
+  void* place_ = nullptr;
+};
+
+// What devices tell by files of one line. Throws TransportError.
+inline std::uint64_t number_in(const std::string& path) {
+  std::ifstream file(path);
+  std::string text;
+  if (!(file >> text)) throw TransportError(path + " cannot be read: is its driver loaded?");
+  try {
+    return std::stoull(text, nullptr, 0);
+  } catch (const std::exception&) {
+    throw TransportError(path + " holds '" + text + "', which is no number");
+  }
+}
+
+class LinuxDmaDevice : public DmaDevice {
+ public:
+  // `uio` such as /dev/uio0, whose first map are the registers; `buffer` such as udmabuf0. Without an interrupt it is
+  // looked at every 50 us. All paths begin with `root`. Throws TransportError.
+  LinuxDmaDevice(const std::string& uio, const std::string& buffer, bool has_interrupt, const std::string& root = "")
+      : registers_(root + uio, register_bytes(uio, root)),
+        address_(checked_address(buffer, root)),
+        memory_(root + "/dev/" + buffer, static_cast<std::size_t>(number_in(folder(buffer, root) + "/size"))),
+        has_interrupt_(has_interrupt) {}
+
+  std::uint32_t read(std::size_t offset) override { return at(offset); }
+  void write(std::size_t offset, std::uint32_t value) override { at(offset) = value; }
+  std::uint8_t* memory() override { return static_cast<std::uint8_t*>(memory_.place()); }
+  std::size_t memory_bytes() const override { return memory_.size(); }
+  std::uint32_t address() const override { return address_; }
+
+  void wait(const Deadline& deadline) override {
+    if (!has_interrupt_) {
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+      return;
+    }
+    // The kernel has switched the interrupt off when it came.
+    const std::uint32_t on = 1;
+    if (::write(registers_.file(), &on, sizeof on) != sizeof on) fail_with_errno("the interrupt");
+    std::uint32_t count;
+    if (waiter_.wait(registers_.file(), POLLIN, deadline) &&
+        ::read(registers_.file(), &count, sizeof count) != sizeof count) {
+      fail_with_errno("the interrupt");
+    }
+  }
+
+  void end() override { waiter_.end(); }
+
+ private:
+  static std::size_t register_bytes(const std::string& uio, const std::string& root) {
+    const std::string name = uio.substr(uio.rfind('/') + 1);
+    return static_cast<std::size_t>(number_in(root + "/sys/class/uio/" + name + "/maps/map0/size"));
+  }
+
+  // Where u-dma-buf tells of a buffer; older releases call it otherwise.
+  static std::string folder(const std::string& buffer, const std::string& root) {
+    const std::string now = root + "/sys/class/u-dma-buf/" + buffer;
+    return ::access(now.c_str(), F_OK) == 0 ? now : root + "/sys/class/udmabuf/" + buffer;
+  }
+
+  static std::uint32_t checked_address(const std::string& buffer, const std::string& root) {
+    const std::string about = folder(buffer, root);
+    const std::uint64_t address = number_in(about + "/phys_addr"), size = number_in(about + "/size");
+    if (address + size > std::uint64_t{1} << 32) {
+      throw TransportError(buffer + " ends beyond the 4 GiB that the DMA engine reaches");
+    }
+    // Not cached, and not a device's memory either, which takes aligned accesses only.
+    if (!(std::ofstream(about + "/sync_mode") << 2 << std::flush)) {
+      throw TransportError(about + "/sync_mode cannot be written");
+    }
+    return static_cast<std::uint32_t>(address);
+  }
+
+  volatile std::uint32_t& at(std::size_t offset) const {
+    return static_cast<volatile std::uint32_t*>(registers_.place())[offset / sizeof(std::uint32_t)];
+  }
+
+  Mapping registers_;
+  std::uint32_t address_;
+  Mapping memory_;
+  bool has_interrupt_;
+  Waiter waiter_;
+};
+
+}  // namespace firm

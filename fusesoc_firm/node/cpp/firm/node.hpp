@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: Apache-2.0
+// A node's engine, whatever its middleware: payloads to the hardware, payloads from it (docs/reference/node-library.md).
+//
+//     firm::NodeConfiguration system;                       // its width, subscribers, publishers
+//     firm::Node node(system, "dma:/dev/uio0:udmabuf0", publish);   // called with publisher, payload, size
+//     std::thread engine([&] { status = node.run(); shut_the_middleware_down(); });
+//     node.put(subscriber, payload, size);                  // any thread, a middleware's callback
+//     node.stop(std::chrono::seconds(10));                  // what was put is sent, what comes back is published
+//     engine.join();
+//
+// Payloads are what the middleware has serialised; nothing here parses them. C++17, no dependencies but POSIX.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <ostream>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <firm/bursts.hpp>
+#include <firm/open_transport.hpp>
+#include <firm/queues.hpp>
+#include <firm/trace.hpp>
+#include <firm/transport.hpp>
+
+namespace firm {
+
+struct NodeConfiguration {
+  unsigned width = 8;  // bits of the system's streams
+  unsigned subscribers = 1;
+  unsigned publishers = 1;
+  std::size_t longest_payload = 1 << 26;    // bytes, in either direction
+  std::size_t queue_depth = 10;             // frames, for each subscriber
+  Overflow overflow = Overflow::kDropOldest;
+  std::function<std::unique_ptr<Policy>()> policy = nullptr;  // none: least recently used
+  unsigned restarts = 0;                    // how often a transport that failed is opened again
+  std::chrono::nanoseconds restart_delay = std::chrono::milliseconds(500);
+  // For so long nothing comes from hardware that does not tell when it is at rest: then all has come.
+  std::chrono::nanoseconds settling_time = std::chrono::milliseconds(200);
+  std::ostream* log = nullptr;    // one line for each fault
+  std::ostream* trace = nullptr;  // CSV, a line for each step of a message (firm/trace.hpp)
+};
+
+struct NodeStatistics {
+  std::uint64_t received = 0;   // payloads that were put
+  std::uint64_t dropped = 0;    // of these, for want of room in a queue
+  std::uint64_t sent = 0;       // frames that the transport has taken
+  std::uint64_t published = 0;  // payloads that came back
+  std::uint64_t errors = 0;     // pulses of frame_error and id_error, bytes lost, bursts that are none
+  std::uint64_t restarts = 0;   // of the transport
+};
+
+class Node {
+ public:
+  // Called by a thread of the node; the payload is gone when it returns. It must not stop the node.
+  using Publish = std::function<void(unsigned publisher, const std::uint8_t* payload, std::size_t size)>;
+  using Open = std::function<std::unique_ptr<Transport>(const TransportOptions&)>;
+
+  // `open` makes the transport, when the node runs and when it restarts. Throws std::invalid_argument.
+  Node(NodeConfiguration configuration, Open open, Publish publish)
+      : configuration_(checked(std::move(configuration))),
+        open_(std::move(open)),
+        publish_(std::move(publish)),
+        queues_(configuration_.subscribers, configuration_.queue_depth,
+                configuration_.policy ? configuration_.policy() : nullptr, configuration_.overflow),
+        trace_(configuration_.trace) {}
+
+  // The transport by its address (firm/open_transport.hpp).
+  Node(NodeConfiguration configuration, const std::string& address, Publish publish)
+      : Node(
+            std::move(configuration),
+            [address](const TransportOptions& options) { return open_transport(address, options); },
+            std::move(publish)) {}
+
+  // Take a payload for a subscriber; it is copied once. Whether it is in its queue now: it is not if the queue is full
+  // and drops the newest, or when the node stops. Waits for room if the queues block. Any thread. Throws
+  // std::out_of_range for a subscriber that there is not, and std::length_error for a payload that is too long.
+  bool put(unsigned subscriber, const std::uint8_t* payload, std::size_t size) {
+    if (subscriber >= configuration_.subscribers) {
+      throw std::out_of_range("subscriber is " + std::to_string(subscriber) + "; legal: 0 to " +
+                              std::to_string(configuration_.subscribers - 1));
+    }
+    if (size > configuration_.longest_payload) {
+      throw std::length_error("a payload for subscriber " + std::to_string(subscriber) + " has " +
+                              std::to_string(size) + " bytes; the longest has " +
+                              std::to_string(configuration_.longest_payload));
+    }
+    const std::uint64_t number = received_++;
+    trace_.write("received", subscriber, number, size);
+    try {
+      const bool is_kept =
+          queues_.put(subscriber, {number, pack_frame(static_cast<std::uint8_t>(subscriber), payload, size)});
+      if (is_kept) trace_.write("queued", subscriber, number, size);
+      return is_kept;
+    } catch (const ClosedError&) {
+      return false;
+    }
+  }
+
+  // Run until stop(), or until the transport has failed for good. The status of a process: 0, or 1 with error(). Once.
+  int run() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      has_begun_ = true;
+    }
+    std::optional<std::string> fault = session();
+    while (fault && may_restart()) {
+      log(*fault + "; the transport is opened again");
+      ++restarts_;
+      wait_before_restart();
+      fault = session();
+    }
+    // Nobody reads the queues any more: who waits for room in them must hear of it.
+    queues_.close();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (is_abandoned_) fault = "the time to stop is over, and not all was sent and received";
+    if (fault) log(error_ = *fault);
+    has_ended_ = true;
+    changed_.notify_all();
+    return fault ? 1 : 0;
+  }
+
+  // Take no more payloads, send what waits, publish what comes back, and end. What is not done in the time given is
+  // abandoned, and run() says so. Returns when run() is about to. Any thread but that of `publish`.
+  void stop(std::chrono::nanoseconds drain = std::chrono::seconds(10)) {
+    queues_.close();
+    std::unique_lock<std::mutex> lock(mutex_);
+    is_stopping_ = true;
+    changed_.notify_all();
+    if (changed_.wait_for(lock, drain, [this] { return has_ended_; })) return;
+    is_abandoned_ = true;
+    if (transport_) transport_->close();
+    changed_.wait(lock, [this] { return has_ended_ || !has_begun_; });
+  }
+
+  NodeStatistics statistics() const {
+    NodeStatistics statistics;
+    statistics.received = received_;
+    for (unsigned subscriber = 0; subscriber < configuration_.subscribers; ++subscriber) {
+      statistics.dropped += queues_.dropped(subscriber);
+    }
+    statistics.sent = sent_;
+    statistics.published = published_;
+    statistics.errors = errors_;
+    statistics.restarts = restarts_;
+    return statistics;
+  }
+
+  // Why run() gave 1.
+  std::string error() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return error_;
+  }
+
+ private:
+  struct Numbered {
+    std::uint64_t number;
+    Bytes frame;
+  };
+  // How long the sender does not see that the receiver has failed.
+  static constexpr std::chrono::milliseconds kGlance{50};
+
+  static NodeConfiguration checked(NodeConfiguration configuration) {
+    if (configuration.subscribers < 1 || configuration.subscribers > 256) {
+      throw std::invalid_argument("subscribers is " + std::to_string(configuration.subscribers) +
+                                  "; legal: 1 to 256");
+    }
+    BurstJoiner(configuration.publishers, configuration.width);
+    return configuration;
+  }
+
+  // --- a session: the life of one transport ---------------------------------------------------------------------------
+
+  // What went wrong; nothing if the node is done.
+  std::optional<std::string> session() {
+    std::optional<std::string> fault;
+    try {
+      const auto transport = open();
+      std::thread receiver([&] { receive_all(*transport); });
+      try {
+        send_all(*transport);
+        transport->finish();
+        settle(*transport);
+      } catch (const std::exception& error) {
+        fault = error.what();
+      }
+      transport->close();
+      receiver.join();
+      const std::lock_guard<std::mutex> lock(mutex_);
+      transport_ = nullptr;
+      // It saw the cause, the sender what followed.
+      if (receiver_fault_) fault = receiver_fault_;
+    } catch (const std::exception& error) {
+      fault = error.what();
+    }
+    return fault;
+  }
+
+  std::unique_ptr<Transport> open() {
+    TransportOptions options;
+    options.publishers = configuration_.publishers;
+    options.longest_payload = configuration_.longest_payload;
+    options.on_taken = [this](const Cycles& cycles) { trace_.taken(cycles); };
+    options.on_error = [this](const HardwareError& error) { note(error); };
+    trace_.forget_sent();
+    auto transport = open_(options);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    receiver_fault_.reset();
+    moved_ = steady_nanoseconds();
+    transport_ = transport.get();
+    if (is_abandoned_) transport->close();
+    return transport;
+  }
+
+  bool may_restart() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return restarts_ < configuration_.restarts && !is_abandoned_ && !has_publishing_failed_;
+  }
+
+  void wait_before_restart() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait_for(lock, configuration_.restart_delay, [this] { return is_stopping_; });
+  }
+
+  // Until the queues are closed and all is read. What could not be sent is the first thing that the next session sends.
+  void send_all(Transport& transport) {
+    while (!has_receiver_failed()) {
+      if (!unsent_) {
+        auto next = queues_.get(kGlance);
+        if (!next && queues_.is_drained()) return;
+        if (!next) continue;
+        unsent_ = std::move(next->item);
+      }
+      const Bytes& frame = unsent_->frame;
+      const unsigned subscriber = frame[0];
+      const std::size_t size = frame.size() - kFrameHeaderBytes;
+      trace_.sending(subscriber, unsent_->number, size);
+      transport.send(frame.data(), frame.size());
+      trace_.write("sent", subscriber, unsent_->number, size);
+      ++sent_;
+      moved_ = steady_nanoseconds();
+      unsent_.reset();
+    }
+  }
+
+  // Wait until all that was sent has had its effect.
+  void settle(const Transport& transport) {
+    while (!has_receiver_failed() && !is_abandoned()) {
+      const auto is_at_rest = transport.is_at_rest();
+      if (is_at_rest.value_or(steady_nanoseconds() - moved_ >= configuration_.settling_time.count())) return;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+
+  void receive_all(Transport& transport) {
+    BurstJoiner joiner(configuration_.publishers, configuration_.width, configuration_.longest_payload);
+    try {
+      while (const auto burst = transport.receive()) {
+        moved_ = steady_nanoseconds();
+        take(joiner, *burst);
+      }
+      joiner.close();
+    } catch (const BurstError& error) {
+      note(error);
+    } catch (const TransportError& error) {
+      fail_receiver(error.what(), false);
+    } catch (const std::exception& error) {
+      fail_receiver(std::string("a payload could not be published: ") + error.what(), true);
+    }
+  }
+
+  void take(BurstJoiner& joiner, const Burst& burst) {
+    const std::uint64_t number = published_;
+    if (!burst.data.empty()) trace_.write("burst", burst.data[0], number, burst.data.size(), burst.cycles);
+    std::optional<JoinedFrame> frame;
+    try {
+      frame = joiner.push(burst.data, burst.tid);
+    } catch (const BurstError& error) {
+      note(error);
+    }
+    if (!frame) return;
+    publish_(frame->id, frame->payload.data(), frame->payload.size());
+    ++published_;
+    trace_.write("published", frame->id, number, frame->payload.size());
+  }
+
+  // --- faults ---------------------------------------------------------------------------------------------------------
+
+  void fail_receiver(const std::string& reason, bool is_publishing) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    receiver_fault_ = reason;
+    has_publishing_failed_ = is_publishing;
+  }
+
+  bool has_receiver_failed() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return receiver_fault_.has_value();
+  }
+
+  bool is_abandoned() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return is_abandoned_;
+  }
+
+  void note(const BurstError& error) {
+    ++errors_;
+    log(error.what());
+  }
+
+  void note(const HardwareError& error) {
+    ++errors_;
+    const std::string where = error.cycle ? " in cycle " + std::to_string(*error.cycle) : "";
+    const std::string who = error.converter ? "converter " + std::to_string(*error.converter) : "the link or the Manager";
+    log(who + " reports an error" + where);
+  }
+
+  void log(const std::string& line) {
+    if (!configuration_.log) return;
+    const std::lock_guard<std::mutex> lock(log_mutex_);
+    *configuration_.log << line << std::endl;
+  }
+
+  const NodeConfiguration configuration_;
+  const Open open_;
+  const Publish publish_;
+  SubscriberQueues<Numbered> queues_;
+  Trace trace_;
+  std::optional<Numbered> unsent_;  // the sender's own
+
+  std::atomic<std::uint64_t> received_{0}, sent_{0}, published_{0}, errors_{0};
+  std::atomic<unsigned> restarts_{0};
+  std::atomic<std::int64_t> moved_{0};  // when something was sent or came, ns
+
+  std::mutex log_mutex_;
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable changed_;
+  Transport* transport_ = nullptr;  // while a session lasts
+  std::optional<std::string> receiver_fault_;
+  bool has_publishing_failed_ = false;
+  bool has_begun_ = false;
+  bool has_ended_ = false;
+  bool is_stopping_ = false;
+  bool is_abandoned_ = false;
+  std::string error_;
+};
+
+}  // namespace firm

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+// A simulator as hardware: a command that does what it is asked through a pipe (docs/reference/transports.md, "A simulator's pipe").
+//
+// A thread of its own asks: it hands over the frames that wait, lets the simulator run, and takes its reports. It sleeps
+// when nothing has moved for a while, and when nobody takes the bursts that have come: that is the back-pressure.
+#pragma once
+
+#include <algorithm>
+#include <condition_variable>
+#include <cstdio>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <firm/child_process.hpp>
+#include <firm/transport.hpp>
+
+namespace firm {
+
+struct PipeOptions {
+  std::size_t frames_in_flight = 2;       // sent, and not yet taken by the system
+  std::size_t bytes_waiting = 1 << 24;    // of bursts that have come, and not yet been received
+  // A run takes so long by the wall clock: a frame that comes in the meantime waits for its end.
+  std::chrono::nanoseconds run_time = std::chrono::milliseconds(1);
+  std::uint32_t cycles_to_rest = 100000;  // without a beat, after which the system is thought to have come to rest
+  Timeout idle_run = std::nullopt;        // how often a system at rest runs, for accelerators that send without being asked
+  std::chrono::nanoseconds patience = std::chrono::seconds(2);  // with a simulator that is to end
+};
+
+class PipeTransport : public Transport {
+ public:
+  // Starts `command`. Throws TransportError.
+  explicit PipeTransport(const std::string& command, TransportOptions options = {}, PipeOptions pipe = {})
+      : options_(std::move(options)), pipe_(pipe), child_(command, kRequests, kReports), buffer_(kBufferBytes) {
+    thread_ = std::thread([this] { run(); });
+  }
+
+  ~PipeTransport() override {
+    close();
+    thread_.join();
+  }
+
+  void send(const std::uint8_t* frame, std::size_t size) override {
+    Bytes copy(frame, frame + size);
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait(lock, [this] { return is_over_ || waiting_.size() + requested_ < pipe_.frames_in_flight; });
+    throw_if_over();
+    waiting_.push_back(std::move(copy));
+    is_at_rest_ = false;
+    changed_.notify_all();
+  }
+
+  // What had come before an error is received before the error is thrown.
+  std::optional<Burst> receive(Timeout timeout = std::nullopt) override {
+    std::unique_lock<std::mutex> lock(mutex_);
+    const auto is_ready = [this] { return is_over_ || !bursts_.empty(); };
+    if (timeout) {
+      changed_.wait_until(lock, std::chrono::steady_clock::now() + *timeout, is_ready);
+    } else {
+      changed_.wait(lock, is_ready);
+    }
+    if (is_closing_) return std::nullopt;
+    if (bursts_.empty()) {
+      if (is_over_) throw_if_over();
+      return std::nullopt;
+    }
+    std::optional<Burst> burst(std::move(bursts_.front()));
+    bursts_.pop_front();
+    bytes_waiting_ -= burst->data.size();
+    changed_.notify_all();
+    return burst;
+  }
+
+  std::optional<bool> is_at_rest() const override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return is_at_rest_ && waiting_.empty() && bursts_.empty();
+  }
+
+  void close() override {
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (std::exchange(is_closing_, true)) return;
+    is_over_ = true;
+    changed_.notify_all();
+    if (!changed_.wait_for(lock, pipe_.patience, [this] { return has_ended_; })) child_.kill();
+  }
+
+ private:
+  // What the simulator expects.
+  static constexpr int kRequests = 3;
+  static constexpr int kReports = 4;
+  static constexpr std::size_t kBufferBytes = 1 << 16;
+  static constexpr std::uint16_t kIdError = 65535;
+
+  void throw_if_over() const {
+    if (is_closing_) throw TransportError("the transport is closed");
+    if (is_over_) throw TransportError(error_);
+  }
+
+  // --- the thread -----------------------------------------------------------------------------------------------------
+
+  void run() {
+    const SigpipeHeld held;
+    std::string error;
+    try {
+      while (wait_for_work()) {
+        const auto begun = std::chrono::steady_clock::now();
+        const std::uint64_t before = cycle_;
+        if (!request()) fail_with_child();
+        while (take_report()) {
+        }
+        adapt(cycle_ - before, std::chrono::steady_clock::now() - begun);
+      }
+      const std::uint8_t quit = 'Q';
+      child_.write(&quit, 1);
+      child_.end_input();
+      child_.wait(pipe_.patience);
+    } catch (const std::exception& fault) {
+      error = fault.what();
+      child_.kill();
+      child_.wait();
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    error_ = error;
+    is_over_ = true;
+    has_ended_ = true;
+    changed_.notify_all();
+  }
+
+  // Sleep until the simulator is to run; false when the transport is closed.
+  bool wait_for_work() {
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait(lock, [this] { return is_closing_ || bytes_waiting_ < pipe_.bytes_waiting; });
+    const auto has_work = [this] { return is_closing_ || !is_at_rest_; };
+    if (pipe_.idle_run) {
+      changed_.wait_for(lock, *pipe_.idle_run, has_work);
+    } else {
+      changed_.wait(lock, has_work);
+    }
+    return !is_closing_;
+  }
+
+  // Hand over all frames, and let the simulator run; false if it reads no more.
+  bool request() {
+    std::deque<Bytes> frames;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      frames.swap(waiting_);
+      requested_ += frames.size();
+    }
+    if (!frames.empty()) busy_ = cycle_;
+    for (const auto& frame : frames) {
+      const auto header = with_number('F', static_cast<std::uint32_t>(frame.size()));
+      if (!child_.write(header.data(), header.size()) || !child_.write(frame.data(), frame.size())) return false;
+    }
+    const auto run = with_number('R', static_cast<std::uint32_t>(cycles_a_run_));
+    return child_.write(run.data(), run.size());
+  }
+
+  // The next run shall take as long as runs are to take, as far as the last one tells.
+  void adapt(std::uint64_t cycles, std::chrono::nanoseconds time) {
+    constexpr double kFewest = 16, kMost = 1 << 20;
+    if (cycles == 0 || time.count() <= 0) return;
+    const double wanted = static_cast<double>(cycles) * static_cast<double>(pipe_.run_time.count()) /
+                          static_cast<double>(time.count());
+    cycles_a_run_ = std::clamp(wanted, kFewest, kMost);
+  }
+
+  static Bytes with_number(char letter, std::uint32_t number) {
+    Bytes bytes{static_cast<std::uint8_t>(letter)};
+    for (unsigned shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::uint8_t>(number >> shift));
+    return bytes;
+  }
+
+  // Take a report; whether more are to come.
+  bool take_report() {
+    const std::uint64_t place = place_;
+    const auto letter = static_cast<std::uint8_t>(number(1));
+    switch (letter) {
+      case 'T':
+        take_taken();
+        return true;
+      case 'B':
+        take_burst();
+        return true;
+      case 'E':
+        take_error();
+        return true;
+      case 'S':
+        take_standing();
+        return false;
+      default:
+        break;
+    }
+    char text[96];
+    std::snprintf(text, sizeof text, "byte %llu of the simulator's reports is 0x%02x, which begins none: T, B, E, S",
+                  static_cast<unsigned long long>(place), letter);
+    throw TransportError(text);
+  }
+
+  void take_taken() {
+    const Cycles cycles = this->cycles();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (requested_ == 0) throw TransportError("the simulator reports a frame that it was not sent");
+      --requested_;
+      changed_.notify_all();
+    }
+    if (options_.on_taken) options_.on_taken(cycles);
+  }
+
+  void take_burst() {
+    Burst burst;
+    burst.tid = static_cast<std::uint8_t>(number(1));
+    burst.cycles = cycles();
+    const std::uint64_t size = number(4);
+    // A resumed burst has one beat more than is the frame's.
+    if (size == 0 || size > options_.longest_payload + kFrameHeaderBytes + kWidestBeat) {
+      throw TransportError("the simulator reports a burst of " + std::to_string(size) + " bytes; legal: 1 to " +
+                           std::to_string(options_.longest_payload + kFrameHeaderBytes + kWidestBeat));
+    }
+    burst.data.resize(static_cast<std::size_t>(size));
+    take(burst.data.data(), burst.data.size());
+    const std::lock_guard<std::mutex> lock(mutex_);
+    bytes_waiting_ += burst.data.size();
+    bursts_.push_back(std::move(burst));
+    changed_.notify_all();
+  }
+
+  void take_error() {
+    HardwareError error;
+    if (const auto converter = number(2); converter != kIdError) error.converter = static_cast<unsigned>(converter);
+    error.cycle = number(8);
+    if (options_.on_error) options_.on_error(error);
+  }
+
+  void take_standing() {
+    const std::uint64_t cycle = number(8), quiet = number(4);
+    if (cycle < cycle_) {
+      throw TransportError("the simulator stands at cycle " + std::to_string(cycle) + " and stood at " +
+                           std::to_string(cycle_) + " before");
+    }
+    cycle_ = cycle;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    // A frame that the system does not take for so long is no reason to go on.
+    is_at_rest_ = std::min(quiet, cycle - busy_) >= pipe_.cycles_to_rest && waiting_.empty();
+    changed_.notify_all();
+  }
+
+  Cycles cycles() {
+    const std::uint64_t first = number(8), last = number(8);
+    if (last < first) {
+      throw TransportError("the simulator reports beats from cycle " + std::to_string(first) + " to " +
+                           std::to_string(last));
+    }
+    return {first, last};
+  }
+
+  std::uint64_t number(std::size_t bytes) {
+    std::uint8_t digits[8];
+    take(digits, bytes);
+    std::uint64_t value = 0;
+    for (std::size_t place = bytes; place > 0; --place) value = value << 8 | digits[place - 1];
+    return value;
+  }
+
+  // So many bytes of the reports.
+  void take(std::uint8_t* bytes, std::size_t size) {
+    while (size > 0) {
+      if (read_ == filled_) {
+        read_ = 0;
+        filled_ = child_.read(buffer_.data(), buffer_.size());
+        if (filled_ == 0) fail_with_child();
+      }
+      const std::size_t count = std::min(size, filled_ - read_);
+      std::copy_n(buffer_.begin() + static_cast<std::ptrdiff_t>(read_), count, bytes);
+      read_ += count;
+      place_ += count;
+      bytes += count;
+      size -= count;
+    }
+  }
+
+  [[noreturn]] void fail_with_child() { throw TransportError("the simulator " + child_.wait(pipe_.patience)); }
+
+  static constexpr std::size_t kWidestBeat = 64;  // bytes
+
+  const TransportOptions options_;
+  const PipeOptions pipe_;
+
+  // The thread's own.
+  ChildProcess child_;
+  Bytes buffer_;
+  std::size_t read_ = 0;
+  std::size_t filled_ = 0;
+  std::uint64_t place_ = 0;  // bytes of reports so far
+  std::uint64_t cycle_ = 0;  // where the simulator stands
+  std::uint64_t busy_ = 0;   // where it stood when it got a frame last
+  double cycles_a_run_ = 1000;
+
+  mutable std::mutex mutex_;  // of what follows
+  std::condition_variable changed_;
+  std::deque<Bytes> waiting_;
+  std::size_t requested_ = 0;  // frames that the simulator has and the system does not
+  std::deque<Burst> bursts_;
+  std::size_t bytes_waiting_ = 0;
+  bool is_at_rest_ = false;
+  bool is_closing_ = false;
+  bool is_over_ = false;
+  bool has_ended_ = false;
+  std::string error_;
+
+  std::thread thread_;
+};
+
+}  // namespace firm

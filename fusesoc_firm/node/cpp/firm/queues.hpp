@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames to the hardware: a queue for each subscriber, and a policy that says which is next (the dissertation's section
+// 6.3.3, figure 6.4b; docs/reference/host-queues.md).
+//
+//     firm::SubscriberQueues<Frame> queues(3, 10);         // subscribers, frames in each; least recently used
+//     queues.put(subscriber, frame);                       // any thread, a middleware's callback
+//     while (auto next = queues.get()) send(next->item);   // the thread that owns the DMA, until close()
+//
+// It does what fusesoc_firm/node/queues.py does; both are tested with the same histories. C++17, no dependencies.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace firm {
+
+// Which subscriber goes next: the one whose first frame has the smallest key, of equal ones the lowest index.
+class Policy {
+ public:
+  virtual ~Policy() = default;
+  // The key of a subscriber whose first frame came at `arrival` (ns).
+  virtual std::int64_t key(std::size_t subscriber, std::int64_t arrival) const = 0;
+  // A subscriber's frame was handed out.
+  virtual void served(std::size_t) {}
+};
+
+// The lowest index first.
+class FixedPriority : public Policy {
+ public:
+  std::int64_t key(std::size_t subscriber, std::int64_t) const override {
+    return static_cast<std::int64_t>(subscriber);
+  }
+};
+
+// The next index behind the one served last, cyclic; index 0 at first.
+class RoundRobin : public Policy {
+ public:
+  explicit RoundRobin(std::size_t subscribers) : subscribers_(subscribers) {}
+  std::int64_t key(std::size_t subscriber, std::int64_t) const override {
+    return static_cast<std::int64_t>((subscriber + subscribers_ - first_) % subscribers_);
+  }
+  void served(std::size_t subscriber) override { first_ = (subscriber + 1) % subscribers_; }
+
+ private:
+  std::size_t subscribers_;
+  std::size_t first_ = 0;
+};
+
+// The one that was served the longest time ago (section 4.2.1); at first, the lowest index. A subscriber waits for at
+// most `subscribers` - 1 others.
+class LeastRecentlyUsed : public Policy {
+ public:
+  explicit LeastRecentlyUsed(std::size_t subscribers) : served_at_(subscribers, -1) {}
+  std::int64_t key(std::size_t subscriber, std::int64_t) const override { return served_at_[subscriber]; }
+  void served(std::size_t subscriber) override { served_at_[subscriber] = now_++; }
+
+ private:
+  std::vector<std::int64_t> served_at_;
+  std::int64_t now_ = 0;
+};
+
+// The one whose first frame has the earliest deadline: its arrival and the subscriber's relative deadline (ns).
+class EarliestDeadlineFirst : public Policy {
+ public:
+  explicit EarliestDeadlineFirst(std::vector<std::int64_t> deadlines) : deadlines_(std::move(deadlines)) {}
+  std::int64_t key(std::size_t subscriber, std::int64_t arrival) const override {
+    return arrival + deadlines_.at(subscriber);
+  }
+
+ private:
+  std::vector<std::int64_t> deadlines_;
+};
+
+// The one whose first frame has the least slack: the time until its deadline less the time of its transfer (ns). The key
+// is the latest time to start, which is the slack but for the present time, which is everybody's.
+class LeastSlackTime : public Policy {
+ public:
+  LeastSlackTime(std::vector<std::int64_t> deadlines, const std::vector<std::int64_t>& transfer_times)
+      : latest_starts_(std::move(deadlines)) {
+    if (latest_starts_.size() != transfer_times.size()) {
+      throw std::invalid_argument("there are not as many transfer times as deadlines");
+    }
+    for (std::size_t index = 0; index < transfer_times.size(); ++index) latest_starts_[index] -= transfer_times[index];
+  }
+  std::int64_t key(std::size_t subscriber, std::int64_t arrival) const override {
+    return arrival + latest_starts_.at(subscriber);
+  }
+
+ private:
+  std::vector<std::int64_t> latest_starts_;
+};
+
+// What put() does with a frame for a queue that is full: drop the queue's oldest as ROS' KEEP_LAST, drop the frame itself,
+// or wait until there is room.
+enum class Overflow { kDropOldest, kDropNewest, kBlock };
+
+// The queues are closed.
+class ClosedError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+inline std::int64_t steady_nanoseconds() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+      .count();
+}
+
+// Bounded queues, one a subscriber, read as one. Any number of threads may write and read.
+template <typename Item>
+class SubscriberQueues {
+ public:
+  struct Next {
+    std::size_t subscriber;
+    Item item;
+  };
+  using Timeout = std::optional<std::chrono::nanoseconds>;  // none: for ever
+  using Clock = std::function<std::int64_t()>;              // ns
+
+  // `capacity` frames each; no policy is least recently used. Throws std::invalid_argument.
+  SubscriberQueues(std::size_t subscribers, std::size_t capacity, std::unique_ptr<Policy> policy = nullptr,
+                   Overflow overflow = Overflow::kDropOldest, Clock clock = steady_nanoseconds)
+      : policy_(policy ? std::move(policy) : std::make_unique<LeastRecentlyUsed>(subscribers)),
+        capacity_(capacity),
+        overflow_(overflow),
+        clock_(std::move(clock)),
+        queues_(subscribers),
+        dropped_(subscribers, 0) {
+    if (subscribers < 1 || capacity < 1) {
+      throw std::invalid_argument("subscribers is " + std::to_string(subscribers) + ", capacity is " +
+                                  std::to_string(capacity) + "; legal: 1 and more");
+    }
+  }
+
+  // Add an item; whether it is in its queue now. It is not if it was the newest one to drop, or if there was no room for
+  // the time given. Throws ClosedError, also while it waits, and std::out_of_range for a subscriber that there is not.
+  bool put(std::size_t subscriber, Item item, Timeout timeout = std::nullopt) {
+    auto& queue = queues_.at(subscriber);
+    std::unique_lock<std::mutex> lock(mutex_);
+    if (overflow_ == Overflow::kBlock) {
+      wait_for(lock, timeout, [&] { return closed_ || queue.size() < capacity_; });
+    }
+    if (closed_) throw ClosedError("the queues are closed");
+    if (queue.size() == capacity_) {
+      if (overflow_ != Overflow::kBlock) ++dropped_[subscriber];
+      if (overflow_ != Overflow::kDropOldest) return false;
+      queue.pop_front();
+    }
+    queue.push_back({clock_(), std::move(item)});
+    changed_.notify_all();
+    return true;
+  }
+
+  // The subscriber that is next, and its first item. Nothing when the time is over, or when the queues are closed and all
+  // is read: is_drained() tells which.
+  std::optional<Next> get(Timeout timeout = std::nullopt) {
+    std::unique_lock<std::mutex> lock(mutex_);
+    wait_for(lock, timeout, [&] { return closed_ || first_waiting().has_value(); });
+    const auto subscriber = first_waiting();
+    if (!subscriber) return std::nullopt;
+    auto& queue = queues_[*subscriber];
+    std::optional<Next> next(Next{*subscriber, std::move(queue.front().item)});
+    queue.pop_front();
+    policy_->served(*subscriber);
+    changed_.notify_all();
+    return next;
+  }
+
+  // Take no more; what is there can still be read. Wakes everybody who waits.
+  void close() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
+
+  // Whether the queues are closed and all is read.
+  bool is_drained() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return closed_ && !first_waiting();
+  }
+
+  // How many items of a subscriber were dropped.
+  std::uint64_t dropped(std::size_t subscriber) const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return dropped_.at(subscriber);
+  }
+
+ private:
+  struct Waiting {
+    std::int64_t arrival;
+    Item item;
+  };
+
+  template <typename Condition>
+  void wait_for(std::unique_lock<std::mutex>& lock, Timeout timeout, Condition condition) {
+    if (timeout) {
+      changed_.wait_until(lock, std::chrono::steady_clock::now() + *timeout, condition);
+    } else {
+      changed_.wait(lock, condition);
+    }
+  }
+
+  std::optional<std::size_t> first_waiting() const {
+    std::optional<std::size_t> best;
+    std::int64_t best_key = 0;
+    for (std::size_t index = 0; index < queues_.size(); ++index) {
+      if (queues_[index].empty()) continue;
+      const std::int64_t key = policy_->key(index, queues_[index].front().arrival);
+      if (!best || key < best_key) {
+        best = index;
+        best_key = key;
+      }
+    }
+    return best;
+  }
+
+  std::unique_ptr<Policy> policy_;
+  std::size_t capacity_;
+  Overflow overflow_;
+  Clock clock_;
+  std::vector<std::deque<Waiting>> queues_;
+  std::vector<std::uint64_t> dropped_;
+  bool closed_ = false;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+};
+
+}  // namespace firm

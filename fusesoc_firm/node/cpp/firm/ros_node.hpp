@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: Apache-2.0
+// The main program of a system's node: command line, topics, signals, exit status. A generated node is a table and a call:
+//
+//     int main(int argc, char** argv) { return firm::run<firm::Ros1>(kSystem, argc, argv); }
+//
+// C++17; the middleware is a parameter, firm/ros1.hpp or firm/ros2.hpp.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstddef>
+#include <exception>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <firm/node.hpp>
+#include <firm/topic.hpp>
+
+namespace firm {
+
+// Where a message of software comes from or goes to: a topic, or a converter of the hardware.
+struct SoftwarePort {
+  std::string topic;
+  std::optional<unsigned> converter;
+};
+
+// The blocks in software; the places are the ids of their own.
+struct Software {
+  std::vector<SoftwarePort> inputs;
+  std::vector<SoftwarePort> outputs;
+};
+
+// What a node must know of a system: the bits of its streams, how many converters it has of either kind, how many messages
+// a queue holds unless the command line says so, the topics, and the software.
+struct System {
+  std::string name;
+  unsigned width;
+  unsigned subscriber_count;
+  unsigned publisher_count;
+  std::size_t queue_depth;
+  std::vector<Topic> subscribers;
+  std::vector<Topic> publishers;
+  Software software{};
+
+  bool has_software() const { return !software.inputs.empty(); }
+};
+
+// A command line that is none.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct NodeArguments {
+  std::string transport;
+  std::string software;
+  std::size_t depth;
+  Overflow overflow = Overflow::kDropOldest;
+  std::chrono::seconds drain{10};
+  bool restarts = false;
+  bool is_best_effort = false;
+  std::string trace;
+  bool wants_help = false;
+};
+
+// A whole number from 1 on. Throws UsageError.
+inline std::size_t positive_number(const std::string& option, const std::string& text) {
+  constexpr std::size_t kMostDigits = 9;
+  if (text.empty() || text.size() > kMostDigits || text.find_first_not_of("0123456789") != std::string::npos ||
+      std::stoul(text) == 0) {
+    throw UsageError(option + " is '" + text + "'; legal: 1 to 999999999");
+  }
+  return std::stoul(text);
+}
+
+// One of several words: what it stands for. Throws UsageError.
+template <typename Value>
+Value word_of(const std::string& option, const std::string& text, const std::map<std::string, Value>& words) {
+  if (const auto found = words.find(text); found != words.end()) return found->second;
+  std::string legal;
+  for (const auto& word : words) legal += (legal.empty() ? "" : ", ") + word.first;
+  throw UsageError(option + " is '" + text + "'; legal: " + legal);
+}
+
+// The arguments that ROS has left; `has_quality` says whether topics of this ROS have a quality of service. Throws
+// UsageError.
+inline NodeArguments parse_arguments(const System& system, bool has_quality, int argc, char** argv) {
+  NodeArguments arguments;
+  arguments.depth = system.queue_depth;
+  for (int index = 1; index < argc; ++index) {
+    const std::string option = argv[index];
+    const auto value = [&] {
+      if (++index == argc) throw UsageError(option + " needs a value");
+      return std::string(argv[index]);
+    };
+    if (option == "--help" || option == "-h") {
+      arguments.wants_help = true;
+      return arguments;
+    }
+    if (option == "--transport") {
+      arguments.transport = value();
+    } else if (option == "--software" && system.has_software()) {
+      arguments.software = value();
+    } else if (option == "--depth") {
+      arguments.depth = positive_number(option, value());
+    } else if (option == "--overflow") {
+      arguments.overflow = word_of<Overflow>(option, value(),
+                                             {{"drop_oldest", Overflow::kDropOldest},
+                                              {"drop_newest", Overflow::kDropNewest},
+                                              {"block", Overflow::kBlock}});
+    } else if (option == "--drain") {
+      arguments.drain = std::chrono::seconds(positive_number(option, value()));
+    } else if (option == "--restart") {
+      arguments.restarts = true;
+    } else if (option == "--trace") {
+      arguments.trace = value();
+    } else if (option == "--qos" && has_quality) {
+      arguments.is_best_effort = word_of<bool>(option, value(), {{"best_effort", true}, {"reliable", false}});
+    } else {
+      throw UsageError("'" + option + "' is no option");
+    }
+  }
+  if (arguments.transport.empty()) throw UsageError("--transport is missing");
+  if (arguments.software.empty() && system.has_software()) throw UsageError("--software is missing");
+  return arguments;
+}
+
+inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool has_quality) {
+  out << "The node of the system " << system.name << ": messages of its topics to the hardware, and back.\n\n"
+      << "usage: " << system.name << "_node --transport ADDRESS [OPTION ...] [ROS' own arguments]\n\n"
+      << "  --transport ADDRESS  the way to the hardware: pipe:COMMAND (a simulator), uart:DEVICE:BAUD[:rtscts],\n"
+      << "                       dma:UIO:BUFFER[:poll]\n";
+  if (system.has_software()) {
+    out << "  --software COMMAND   the blocks in software, such as\n"
+        << "                       'python3 -m fusesoc_firm.node.software_process SPECIFICATION'\n";
+  }
+  out << "  --depth N            messages that each queue holds, those of ROS too (" << system.queue_depth << ")\n"
+      << "  --overflow WORD      what a full queue does with a message: drop_oldest (the default), drop_newest, or\n"
+      << "                       block, which stops all topics\n"
+      << "  --drain SECONDS      how long the node works on what it has when it is to end (10)\n"
+      << "  --restart            open the transport again when it fails, as often as that happens\n"
+      << "  --trace FILE         write each step of each message to FILE, as CSV\n";
+  if (has_quality) out << "  --qos WORD           of all topics: reliable (the default) or best_effort\n";
+  out << "  --help               print this\n\n" << ros_arguments << "\n\ntopics to the hardware:\n";
+  for (const auto& topic : system.subscribers) out << "  " << topic.name << "  " << topic.type << "\n";
+  out << "topics from the hardware:\n";
+  for (const auto& topic : system.publishers) out << "  " << topic.name << "  " << topic.type << "\n";
+  out << "\nSIGINT and SIGTERM end it when all that was taken is through; a second one ends it at once.\n"
+      << "exit status: 0, 1 if the hardware or ROS failed, 2 for a wrong command line\n";
+}
+
+// Whether SIGINT or SIGTERM has come.
+inline volatile std::sig_atomic_t is_interrupted = 0;
+
+inline void handle_signals() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { is_interrupted = 1; };
+  // The second one does what it does to every program.
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+// An engine that runs in a thread of its own for as long as this lives.
+class RunningNode {
+ public:
+  RunningNode(Node& node, std::chrono::seconds drain) : node_(node), drain_(drain), thread_([this] { run(); }) {}
+  ~RunningNode() { stop(); }
+  RunningNode(const RunningNode&) = delete;
+  RunningNode& operator=(const RunningNode&) = delete;
+
+  bool has_ended() const { return has_ended_; }
+
+  // Let it finish what it has; the exit status.
+  int stop() {
+    node_.stop(drain_);
+    if (thread_.joinable()) thread_.join();
+    return status_;
+  }
+
+ private:
+  void run() {
+    status_ = node_.run();
+    has_ended_ = true;
+  }
+
+  Node& node_;
+  const std::chrono::seconds drain_;
+  int status_ = 0;
+  std::atomic<bool> has_ended_{false};
+  std::thread thread_;
+};
+
+// The hardware and, where the system has some, the software, each with an engine; and the ways between them and topics.
+class Engines {
+ public:
+  // `publish` are the topics of the system, by name. Throws std::invalid_argument.
+  Engines(const System& system, const NodeArguments& arguments, std::map<std::string, MessageHandler> publish,
+          std::ostream* trace)
+      : system_(system), publish_(std::move(publish)), from_hardware_(system.publisher_count) {
+    NodeConfiguration configuration;
+    configuration.width = system.width;
+    configuration.subscribers = system.subscriber_count;
+    configuration.publishers = system.publisher_count;
+    configuration.queue_depth = arguments.depth;
+    configuration.overflow = arguments.overflow;
+    configuration.restarts = arguments.restarts ? std::numeric_limits<unsigned>::max() : 0;
+    configuration.log = &std::cerr;
+    configuration.trace = trace;
+    hardware_ = std::make_unique<Node>(configuration, arguments.transport, by_id(from_hardware_));
+    for (const auto& topic : system.publishers) {
+      if (topic.id) from_hardware_.at(*topic.id) = publish_.at(topic.name);
+    }
+    if (!system.has_software()) return;
+
+    const auto& [inputs, outputs] = system.software;
+    configuration.width = 8;
+    configuration.subscribers = static_cast<unsigned>(inputs.size());
+    configuration.publishers = static_cast<unsigned>(outputs.size());
+    configuration.trace = nullptr;
+    software_ = std::make_unique<Node>(configuration, "software:" + arguments.software, by_id(from_software_));
+    for (unsigned id = 0; id < inputs.size(); ++id) {
+      if (inputs[id].converter) from_hardware_.at(*inputs[id].converter) = into(*software_, id);
+    }
+    for (const auto& output : outputs) {
+      from_software_.push_back(output.converter ? into(*hardware_, *output.converter) : publish_.at(output.topic));
+    }
+  }
+
+  // What takes the messages of a topic.
+  MessageHandler taker(const Topic& topic) {
+    std::vector<MessageHandler> takers;
+    if (topic.id) takers.push_back(into(*hardware_, *topic.id));
+    for (unsigned id = 0; id < system_.software.inputs.size(); ++id) {
+      if (system_.software.inputs[id].topic == topic.name) takers.push_back(into(*software_, id));
+    }
+    return [takers, name = topic.name](const std::uint8_t* payload, std::size_t size) {
+      try {
+        for (const auto& take : takers) take(payload, size);
+      } catch (const std::length_error& fault) {
+        std::cerr << name << ": " << fault.what() << std::endl;
+      }
+    };
+  }
+
+  Node& hardware() { return *hardware_; }
+  Node* software() { return software_.get(); }
+
+  // Wait, as long as there is something to do: of messages that go to and fro between hardware and software, neither
+  // knows whether there are more to come.
+  void settle(std::chrono::nanoseconds longest) const {
+    const auto end = std::chrono::steady_clock::now() + longest;
+    for (std::uint64_t before = 0, now = moved(); now != before && std::chrono::steady_clock::now() < end; now = moved()) {
+      before = now;
+      std::this_thread::sleep_for(kSilence);
+    }
+  }
+
+ private:
+  static constexpr std::chrono::seconds kSilence{1};
+
+  static Node::Publish by_id(const std::vector<MessageHandler>& handlers) {
+    return [&handlers](unsigned id, const std::uint8_t* payload, std::size_t size) { handlers.at(id)(payload, size); };
+  }
+
+  static MessageHandler into(Node& node, unsigned id) {
+    return [&node, id](const std::uint8_t* payload, std::size_t size) { node.put(id, payload, size); };
+  }
+
+  std::uint64_t moved() const {
+    const auto hardware = hardware_->statistics(), software = software_->statistics();
+    return hardware.sent + hardware.published + software.sent + software.published;
+  }
+
+  const System& system_;
+  const std::map<std::string, MessageHandler> publish_;
+  std::vector<MessageHandler> from_hardware_;
+  std::vector<MessageHandler> from_software_;
+  std::unique_ptr<Node> hardware_;
+  std::unique_ptr<Node> software_;
+};
+
+// What an engine has done, for people.
+inline void print_statistics(const std::string& name, const Node& node) {
+  const NodeStatistics counted = node.statistics();
+  std::cerr << name << ": " << counted.received << " received, " << counted.dropped << " dropped, " << counted.sent
+            << " sent, " << counted.published << " published, " << counted.errors << " errors, " << counted.restarts
+            << " restarts" << std::endl;
+}
+
+// Be the node until a signal, ROS, or the hardware ends it. The exit status.
+template <typename Ros>
+int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
+  std::ofstream trace;
+  if (!arguments.trace.empty()) {
+    trace.open(arguments.trace);
+    if (!trace) throw UsageError("cannot write '" + arguments.trace + "'");
+  }
+  if (!ros.start([] { return is_interrupted != 0; })) return 0;
+  std::map<std::string, MessageHandler> publish;
+  for (const auto& topic : system.publishers) publish[topic.name] = ros.advertise(topic, arguments.depth);
+  Engines engines(system, arguments, std::move(publish), arguments.trace.empty() ? nullptr : &trace);
+  for (const auto& topic : system.subscribers) ros.subscribe(topic, arguments.depth, engines.taker(topic));
+
+  RunningNode hardware(engines.hardware(), arguments.drain);
+  std::optional<RunningNode> software;
+  if (engines.software()) software.emplace(*engines.software(), arguments.drain);
+  const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
+  while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
+  }
+  // What ROS has for us already.
+  ros.spin(std::chrono::milliseconds(0));
+  ros.unsubscribe();
+  if (software && is_running()) engines.settle(arguments.drain);
+  int status = software ? software->stop() : 0;
+  status = std::max(status, hardware.stop());
+  ros.flush();
+  print_statistics(system.name + "_node", engines.hardware());
+  if (software) print_statistics("its software", *engines.software());
+  return status;
+}
+
+template <typename Ros>
+int run(const System& system, int argc, char** argv) {
+  try {
+    handle_signals();
+    Ros ros(argc, argv, system.name + "_node");
+    const NodeArguments arguments = parse_arguments(system, Ros::kHasQuality, argc, argv);
+    if (arguments.wants_help) {
+      print_help(std::cout, system, Ros::kArguments, Ros::kHasQuality);
+      return 0;
+    }
+    if constexpr (Ros::kHasQuality) {
+      if (arguments.is_best_effort) ros.be_best_effort();
+    }
+    return serve(ros, system, arguments);
+  } catch (const UsageError& fault) {
+    std::cerr << system.name << "_node: " << fault.what() << "; --help says more" << std::endl;
+    return 2;
+  } catch (const std::exception& fault) {
+    std::cerr << system.name << "_node: " << fault.what() << std::endl;
+    return 1;
+  }
+}
+
+}  // namespace firm

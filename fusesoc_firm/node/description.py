@@ -1,0 +1,142 @@
+"""What a node is told of its system: the topics, and which of them have a converter in the hardware.
+
+A message lies on the wire as its middleware serialised it, so a table of names and ids is all that is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.printer import closure_text
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.simulation.software import sent_elsewhere, taken_elsewhere, way_to
+from fusesoc_firm.system.derived.model import Converter, Topic
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import fail
+
+
+@dataclass(frozen=True)
+class NodeTopic:
+    """A topic of a node; `block` is the specification's, `id` that of the converter, None where only software is.
+
+    A relative `name` moves with the node's namespace. `signature` is that of the definition: ROS 1's MD5 sum, ROS 2's
+    hash. `definition` is its text with those of all messages within it; only ROS 1 announces it.
+    """
+
+    block: str
+    name: str
+    type: str
+    ros: int
+    signature: str
+    id: int | None = None
+    definition: str = ""
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A converter between hardware and software on this host: it has an id, and no topic."""
+
+    block: str
+    id: int
+
+
+@dataclass(frozen=True)
+class NodeDescription:
+    """A system as its node sees it.
+
+    The node takes messages from the topics of `subscribers`, and gives some to those of `publishers`. `entering` and
+    `leaving` are what software on this host sends to the hardware and gets from it. `sources` are the ids of the
+    subscribers that each of the hardware's publishers gets its message from. `longest_payload` is that of a publisher,
+    in bytes, None if it has no bound; `clock_hz` is None where the specification has no clock.
+    """
+
+    name: str
+    width: int
+    subscribers: tuple[NodeTopic, ...]
+    publishers: tuple[NodeTopic, ...]
+    sources: tuple[tuple[int, ...], ...]
+    entering: tuple[Crossing, ...] = ()
+    leaving: tuple[Crossing, ...] = ()
+    longest_payload: int | None = None
+    clock_hz: float | None = None
+
+    @property
+    def inputs(self) -> tuple[NodeTopic | Crossing, ...]:
+        """All that the hardware, or software, gets: topics come first, by their numbers."""
+        return (*self.subscribers, *self.entering)
+
+    @property
+    def outputs(self) -> tuple[NodeTopic | Crossing, ...]:
+        """All that comes out of the hardware, or of software."""
+        return (*self.publishers, *self.leaving)
+
+    @property
+    def versions(self) -> tuple[int, ...]:
+        """The versions of ROS that it has topics of."""
+        return tuple(sorted({topic.ros for topic in (*self.subscribers, *self.publishers)}))
+
+
+def describe(loaded: LoadedSystem) -> NodeDescription:
+    """The node of a system. Raises `InputError` for a middleware that is no ROS."""
+    system, software = loaded.system, loaded.system.software
+    here = {block.block for block in software.blocks if block.type.accelerator.sources}
+    subscribers, entering = _parted(system.subscribers, here)
+    publishers, leaving = _parted(system.publishers, here)
+    taken = (*subscribers, *software.subscribers, *sent_elsewhere(system))
+    given = (*publishers, *software.publishers, *taken_elsewhere(system))
+    lengths = [item.frame.payload_bytes if item.frame.is_fixed_size else None for item in system.publishers]
+    ids = {item.block: item.id for item in system.subscribers}
+    return NodeDescription(
+        system.name,
+        system.width,
+        tuple(_topic(item, loaded) for item in _once(taken)),
+        tuple(_topic(item, loaded) for item in _once(given)),
+        tuple(
+            tuple(sorted(ids[block] for block in way_to(item.block, system) if block in ids))
+            for item in system.publishers
+        ),
+        entering,
+        leaving,
+        max(length for length in lengths if length is not None) if None not in lengths else None,
+        None if system.clock is None else float(system.clock),
+    )
+
+
+def _parted(converters: Iterable[Converter], here: Collection[str]) -> tuple[list[Converter], tuple[Crossing, ...]]:
+    """Converters with topics, and those that software on this host has to do with."""
+    topics: list[Converter] = []
+    crossings: list[Crossing] = []
+    for item in converters:
+        if item.software and item.software.block in here:
+            crossings.append(Crossing(item.block, item.id))
+        else:
+            topics.append(item)
+    return topics, tuple(crossings)
+
+
+def _once(topics: Iterable[Topic]) -> list[Topic]:
+    """Each block's topic once, as a converter if there is one."""
+    found: dict[str, Topic] = {}
+    for topic in topics:
+        found.setdefault(topic.block, topic)
+    return [*found.values()]
+
+
+def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
+    frame = topic.frame
+    if frame.ros not in (ROS1, ROS2):
+        fail(f"'{topic.block}' is of {frame.ros.title}, which no node speaks", hint="a node speaks ROS 1 and ROS 2")
+    definitions = loaded.libraries[frame.ros].closure(frame.message)
+    is_first = frame.ros is ROS1
+    name = frame.message
+    return NodeTopic(
+        topic.block,
+        topic.ros_name,
+        str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
+        frame.ros.number,
+        signature(name, definitions),
+        topic.id if isinstance(topic, Converter) else None,
+        closure_text(name, definitions) if is_first else "",
+    )

@@ -1,0 +1,389 @@
+"""The node: messages from topics to the hardware as frames, and back; nothing on its way is parsed.
+
+    node = Node(description, open_transport, settings)
+    node.run({1: carrier})                 # until `node.stop()`, or until something is gone for good
+
+A message waits in the queue of its subscriber (section 6.3.3: one each, the least recently used one is next), is sent
+as a frame, and comes back as bursts that are joined. Where software is part of the system, its functions are called by
+the thread that brings the message: while one works, no more is taken from the hardware, which stops there, as at any
+accelerator that is not ready. What a function gives never waits, as it could wait for itself: where its queue to the
+hardware is full, a message is dropped and counted.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.node.bursts import BurstError, BurstJoiner, JoinedFrame
+from fusesoc_firm.node.carrier import Carrier, CarrierError, Published, Taken
+from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.queues import ClosedError, Overflow, SubscriberQueues
+from fusesoc_firm.node.software import NodeSoftware
+from fusesoc_firm.node.statistics import Statistics
+from fusesoc_firm.node.trace import Entry, Trace, converter_names
+from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
+
+# How long one waits before it looks whether it is to end.
+_POLL_SECONDS = 0.1
+# So often in a row a new transport may be gone before anything came from it.
+_MOST_RESTARTS = 5
+# So many lines on faults of the hardware; the others are counted.
+_MOST_REPORTS = 20
+
+
+class HardwareListener(Protocol):
+    """Hears what a transport has to say beside bursts; any thread may tell it."""
+
+    def taken(self, first_cycle: int, last_cycle: int) -> None:
+        """Simulated hardware took the next one of the frames sent, in these cycles of clk."""
+
+    def refused(self, converter: int | None) -> None:
+        """The hardware reports a fault of a converter, as `frame_error` counts them; None: of a frame's id."""
+
+
+OpenTransport = Callable[[HardwareListener], Transport]
+
+
+@dataclass(frozen=True)
+class NodeSettings:
+    """`depth` messages fit each queue; what a full one does is `overflow`.
+
+    At the end, what was received is processed: until the hardware has been silent for `settle` seconds, and does not
+    say that it still works, but for `drain` seconds at most. A transport that is gone is opened anew if it `restarts`.
+    `report` gets what people should read.
+    """
+
+    depth: int = 10
+    overflow: Overflow = Overflow.DROP_OLDEST
+    settle: float = 0.5
+    drain: float = 10.0
+    restarts: bool = False
+    report: Callable[[str], None] = print
+
+
+@dataclass(frozen=True)
+class _Message:
+    """A message in its queue."""
+
+    payload: bytes
+    entry: Entry | None
+
+
+class _Hardware:
+    """The transport, from the moment it is opened until it is gone."""
+
+    def __init__(self, transport: Transport, description: NodeDescription) -> None:
+        self.transport = transport
+        publishers = len(description.sources)
+        self.joiner = BurstJoiner(publishers, description.width, description.longest_payload)
+        self.first_cycles: dict[int, int] = {}
+        self.has_answered = False
+
+
+class Node:
+    """One run of a system's node; see above."""
+
+    def __init__(
+        self,
+        description: NodeDescription,
+        open_transport: OpenTransport,
+        settings: NodeSettings = NodeSettings(),
+        software: NodeSoftware | None = None,
+        trace: Trace | None = None,
+    ) -> None:
+        """Open the transport. Raises `TransportError`."""
+        self.statistics = Statistics.of(description)
+        self._description = description
+        self._open_transport = open_transport
+        self._settings = settings
+        self._software = software
+        self._trace = trace
+        self._report = _Reporter(settings.report)
+        self._inputs = description.inputs
+        self._numbers = {item.block: number for number, item in enumerate(self._inputs)}
+        self._topics = {topic.block: (number, topic) for number, topic in enumerate(description.publishers)}
+        self._subscriber_names, self._publisher_names = converter_names(description)
+        self._queues: SubscriberQueues[_Message] = SubscriberQueues(
+            len(self._inputs), settings.depth, overflow=settings.overflow
+        )
+        self._carriers: Mapping[int, Carrier] = {}
+        self._is_wanted_to_end = threading.Event()
+        self._drains = threading.Event()
+        self._is_over = threading.Event()
+        self._fault: TransportError | CarrierError | None = None
+        self._lock, self._restarting = threading.Lock(), threading.Lock()
+        self._offered = self._declined = self._handled = 0
+        self._failed_restarts = 0
+        self._last_traffic = time.monotonic()
+        self._hardware = _Hardware(open_transport(self), description)
+
+    # --- the run ---------------------------------------------------------------------------------------------------
+
+    def run(self, carriers: Mapping[int, Carrier]) -> bool:
+        """Work until `stop`, or a carrier ends; whether all that was received has been processed.
+
+        `carriers` have the topics of their version of ROS; they stay open. Raises `TransportError` or `CarrierError`
+        when one of them is gone for good.
+        """
+        self._carriers = carriers
+        takers = [self._start(partial(self._take, carrier)) for carrier in carriers.values()]
+        sender, receiver = self._start(self._send), self._start(self._receive)
+        self._is_wanted_to_end.wait()
+        latest = time.monotonic() + self._settings.drain
+        for carrier in carriers.values():
+            carrier.stop()
+        for carrier in carriers.values():
+            carrier.wait_until_stopped(_left(latest))
+        self._drains.set()
+        receiver.join(_left(latest))
+        self._queues.close()
+        self.close()
+        for thread in (sender, receiver, *takers):
+            # A taker's end is that of its carrier, which the caller closes.
+            thread.join(_POLL_SECONDS)
+        self._count_rest()
+        if self._fault:
+            raise self._fault
+        return self.statistics.unfinished == 0
+
+    def stop(self) -> None:
+        """Let `run` end; any thread, or a signal's handler."""
+        self._is_wanted_to_end.set()
+
+    def close(self) -> None:
+        """Close the transport; a second call does nothing."""
+        self._is_over.set()
+        self._hardware.transport.close()
+
+    def _start(self, work: Callable[[], None]) -> threading.Thread:
+        thread = threading.Thread(target=work, daemon=True)
+        thread.start()
+        return thread
+
+    def _fail(self, error: TransportError | CarrierError) -> None:
+        """End because of an error; that of something which is being closed does not count."""
+        with self._lock:
+            if not self._is_over.is_set():
+                self._fault = self._fault or error
+        self.stop()
+
+    def _count_rest(self) -> None:
+        for number, item in enumerate(self._inputs):
+            self.statistics.inputs[item.block].dropped += self._queues.dropped(number)
+        self.statistics.unfinished = self._waiting() + len(self._hardware.joiner.unfinished)
+
+    # --- from topics to the hardware -------------------------------------------------------------------------------
+
+    def _take(self, carrier: Carrier) -> None:
+        """What a carrier gives."""
+        try:
+            for event in carrier.receive():
+                if isinstance(event, Published):
+                    self._note_published(event)
+                else:
+                    self._take_message(event)
+        except CarrierError as error:
+            self._fail(error)
+        except ClosedError:
+            # The time to end is over.
+            return
+        self.stop()
+
+    def _take_message(self, taken: Taken) -> None:
+        self._put(taken.topic, taken.payload, taken.time_ns, None)
+
+    def _put(self, number: int, payload: bytes, received_ns: int, timeout: float | None) -> None:
+        """Add a message to a queue; where a full one is to be waited for, `timeout` seconds at most."""
+        item, entry = self._inputs[number], None
+        counts = self.statistics.inputs[item.block]
+        if self._trace and item.id is not None:
+            entry = Entry(item.id, len(payload), received_ns, time.monotonic_ns())
+        with self._lock:
+            counts.received += 1
+            self._offered += 1
+        is_there = self._queues.put(number, _Message(payload, entry), timeout)
+        if not is_there and self._settings.overflow is Overflow.BLOCK:
+            # Nobody else counts it.
+            with self._lock:
+                counts.dropped += 1
+                self._declined += 1
+
+    def _waiting(self) -> int:
+        """How many messages are in queues, or being sent."""
+        dropped = sum(self._queues.dropped(number) for number in range(len(self._inputs)))
+        with self._lock:
+            return self._offered - self._declined - self._handled - dropped
+
+    def _send(self) -> None:
+        for number, message in self._queues:
+            item = self._inputs[number]
+            if item.id is not None and not self._send_frame(item.id, message):
+                return
+            self._run_software(item.block, message.payload)
+            self.statistics.inputs[item.block].sent += 1
+            self._last_traffic = time.monotonic()
+            with self._lock:
+                self._handled += 1
+
+    def _send_frame(self, subscriber: int, message: _Message) -> bool:
+        """Send a frame to the hardware; False when it is gone for good."""
+        hardware = self._hardware
+        if self._trace and message.entry:
+            self._trace.sending(message.entry)
+        try:
+            hardware.transport.send(pack_frame(subscriber, message.payload))
+        except TransportError as error:
+            return self._begin_anew(hardware, error)
+        if self._trace and message.entry:
+            self._trace.sent(message.entry)
+        return True
+
+    def _run_software(self, block: str, payload: bytes) -> None:
+        """Let software have a message, and send what it makes of it on its way."""
+        if not self._software or block not in self._software.sources:
+            return
+        for name, made in self._software.take(block, payload):
+            if name in self._topics:
+                self._publish(name, made)
+            else:
+                self._put(self._numbers[name], made, time.monotonic_ns(), 0.0)
+
+    # --- from the hardware to topics -------------------------------------------------------------------------------
+
+    def _receive(self) -> None:
+        while not self._is_over.is_set():
+            hardware = self._hardware
+            try:
+                burst = hardware.transport.receive(_POLL_SECONDS)
+            except TransportResetError as reset:
+                self._forget(hardware.transport, str(reset))
+                continue
+            except TransportError as error:
+                if not self._begin_anew(hardware, error):
+                    return
+                continue
+            if burst is not None:
+                self._join(hardware, burst)
+                self._last_traffic = time.monotonic()
+            elif self._drains.is_set() and self._is_at_rest(hardware):
+                return
+
+    def _is_at_rest(self, hardware: _Hardware) -> bool:
+        """Whether nothing is on its way any more, as far as the transport can know it."""
+        if self._waiting() or hardware.joiner.unfinished:
+            return False
+        is_silent = time.monotonic() - self._last_traffic > self._settings.settle
+        return is_silent and hardware.transport.is_at_rest() is not False
+
+    def _join(self, hardware: _Hardware, burst: Burst) -> None:
+        try:
+            frame = hardware.joiner.push(burst.data, burst.tid)
+        except BurstError as error:
+            self.statistics.faults += 1
+            self._report(f"the hardware sends what no Manager does: {error}")
+            return
+        hardware.has_answered = True
+        first = None
+        if burst.first_cycle is not None and burst.data:
+            first = hardware.first_cycles.setdefault(burst.data[0], burst.first_cycle)
+        if frame:
+            hardware.first_cycles.pop(frame.id, None)
+            cycles = None if first is None or burst.last_cycle is None else (first, burst.last_cycle)
+            self._deliver(frame, cycles)
+
+    def _deliver(self, frame: JoinedFrame, cycles: tuple[int, int] | None) -> None:
+        block = self._publisher_names[frame.id]
+        self.statistics.outputs[block].frames += 1
+        if self._trace:
+            self._trace.came(frame.id, len(frame.payload), cycles, is_published=self._has_carrier(block))
+        if block in self._topics:
+            self._publish(block, frame.payload)
+        else:
+            self._run_software(block, frame.payload)
+
+    def _has_carrier(self, block: str) -> bool:
+        return block in self._topics and self._topics[block][1].ros in self._carriers
+
+    def _publish(self, block: str, payload: bytes) -> None:
+        if self._has_carrier(block):
+            number, topic = self._topics[block]
+            self._carriers[topic.ros].publish(number, payload)
+            self.statistics.outputs[block].published += 1
+
+    def _note_published(self, event: Published) -> None:
+        publisher = self._description.publishers[event.topic].id
+        if self._trace and publisher is not None:
+            self._trace.published(publisher, event.time_ns)
+
+    # --- what hardware says of itself ------------------------------------------------------------------------------
+
+    def taken(self, first_cycle: int, last_cycle: int) -> None:
+        """Simulated hardware took the next one of the frames sent; any thread."""
+        if self._trace:
+            self._trace.taken(first_cycle, last_cycle)
+
+    def refused(self, converter: int | None) -> None:
+        """The hardware reports a fault of a converter; any thread."""
+        if converter is not None and converter in self._subscriber_names:
+            block = self._subscriber_names[converter]
+            self.statistics.inputs[block].refused += 1
+            self._report(f"the hardware refused a message from '{block}': it is broken")
+            if self._trace:
+                self._trace.refused(converter)
+        else:
+            self.statistics.faults += 1
+            self._report("the hardware refused a frame: " + ("its id" if converter is None else "a publisher's"))
+
+    def _begin_anew(self, hardware: _Hardware, error: TransportError) -> bool:
+        """Open the transport anew if that is wanted; False if it is not, or does not help."""
+        with self._restarting:
+            if self._is_over.is_set():
+                return False
+            if hardware is not self._hardware:
+                # The other thread has done it.
+                return True
+            hardware.transport.close()
+            self._failed_restarts = 0 if hardware.has_answered else self._failed_restarts + 1
+            if not self._settings.restarts or self._failed_restarts > _MOST_RESTARTS:
+                self._fail(error)
+                return False
+            try:
+                self._forget(self._open_transport(self), str(error))
+            except TransportError as failed:
+                self._fail(failed)
+                return False
+            return True
+
+    def _forget(self, transport: Transport, why: str) -> None:
+        """Go on with hardware that begins at this moment."""
+        self._report(f"{why}; it is started anew, and what was in it is lost")
+        self.statistics.restarts += 1
+        if self._trace:
+            self._trace.forget()
+        self._hardware = _Hardware(transport, self._description)
+
+
+class _Reporter:
+    """Passes on what people should read, but not without end: a broken link can say the same for hours."""
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+        self._left = _MOST_REPORTS
+
+    def __call__(self, text: str) -> None:
+        if self._left > 0:
+            self._report(text)
+        elif self._left == 0:
+            self._report("from here on, more of this is only counted")
+        self._left -= 1
+
+
+def _left(latest: float) -> float:
+    """The seconds until a time, which may be over."""
+    return max(0.0, latest - time.monotonic())

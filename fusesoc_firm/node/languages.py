@@ -1,0 +1,49 @@
+"""What the node of a system is written in: a row and its writer for each language.
+
+A writer imports what it needs when it is called: the command line names the languages whatever it is asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fusesoc_firm.message.middleware import Middleware
+    from fusesoc_firm.request.request import CoreFolders
+    from fusesoc_firm.system.system_core import LoadedSystem
+
+
+@dataclass(frozen=True)
+class Place:
+    """The folder that a node is written to, the specification, and where messages are that it has to find again."""
+
+    folder: Path
+    specification: Path
+    paths: Sequence[Path]
+    core_folders: CoreFolders
+
+
+def _cpp(loaded: LoadedSystem, ros: Middleware | None, _: Place) -> Mapping[str, str]:
+    from fusesoc_firm.node.package import cpp_package
+
+    return cpp_package(loaded, ros)
+
+
+def _python(loaded: LoadedSystem, ros: Middleware | None, place: Place) -> Mapping[str, str]:
+    from fusesoc_firm.node.source import python_node
+    from fusesoc_firm.system.beside import sources_of
+
+    # The node runs where FuseSoC may not be.
+    own = place.core_folders(loaded.specification.message_cores)
+    sources = sources_of(place.specification, [*own, *place.paths], core_folders=place.core_folders)
+    return python_node(loaded, ros, place.specification, place.folder, sources.paths)
+
+
+LANGUAGES: Mapping[str, Callable[[LoadedSystem, Middleware | None, Place], Mapping[str, str]]] = {
+    "cpp": _cpp,
+    "python": _python,
+}
+"""The files of a node by path within its folder, of one version of ROS or of any: by the language's name."""

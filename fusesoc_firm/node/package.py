@@ -1,0 +1,187 @@
+"""The software node of a system in C++: a package of ROS that carries messages between topics and the hardware.
+
+It is a table of the system's topics beside the headers that do the work (`node/cpp`), so that it is built where nothing
+but ROS is installed: on the robot's own computer as here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.message.middleware import Middleware, middleware_of
+from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.node.software_process import software_ports
+from fusesoc_firm.request.request import GeneratedFile
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.quoting import lines_of
+from fusesoc_firm.text.render import render
+
+HEADERS = Path(__file__).resolve().parent / "cpp"
+# Messages in the queue of each subscriber, and in ROS' own.
+_QUEUE_DEPTH = 10
+_SOURCE_TEMPLATE = "node/node.cpp"
+_PACKAGE_TEMPLATE = "node/package.xml"
+
+
+@dataclass(frozen=True)
+class _Dialect:
+    """How the package of a version of ROS is written.
+
+    `header` and `middleware` are the carrier of bytes in C++; `build_tool`, `library` and `cmake` build it. Only ROS 2
+    asks an installed package for a message's type.
+    """
+
+    header: str
+    middleware: str
+    signature: str
+    build_tool: str
+    library: str
+    cmake: str
+    needs_messages: bool
+
+
+_DIALECTS = {
+    1: _Dialect("ros1.hpp", "Ros1", "MD5 sum", "catkin", "roscpp", "node/catkin.cmake", needs_messages=False),
+    2: _Dialect("ros2.hpp", "Ros2", "hash", "ament_cmake", "rcl", "node/ament.cmake", needs_messages=True),
+}
+
+
+def headers() -> list[Path]:
+    """The headers of nodes."""
+    return sorted(HEADERS.rglob("*.hpp"))
+
+
+def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str, str]:
+    """The files of the node in C++, by path within the package.
+
+    Raises `InputError` if the system's topics are not those of one version of ROS, or not of `ros` where it is given.
+    """
+    description = describe(loaded)
+    version = _only_version(description, ros)
+    dialect = _DIALECTS[version]
+    package = f"{description.name}_node"
+    packages = {topic.type.partition("/")[0] for topic in (*description.subscribers, *description.publishers)}
+    build = {
+        "package": package,
+        "name": description.name,
+        "build_tool": dialect.build_tool,
+        "library": dialect.library,
+        "message_packages": sorted(packages) if dialect.needs_messages else [],
+        "has_build_type": dialect.needs_messages,
+    }
+    return {
+        "package.xml": render(_PACKAGE_TEMPLATE, build),
+        "CMakeLists.txt": render(dialect.cmake, {"package": package}),
+        f"src/{package}.cpp": render(_SOURCE_TEMPLATE, _source(loaded, description, dialect)),
+        **_headers(dialect),
+    }
+
+
+def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
+    """The node as a part of the generated system; nothing for a system that no one node in C++ can serve."""
+    system = loaded.system
+    topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
+    spoken = {item.frame.ros.number for item in topics}
+    if len(spoken) != 1 or not spoken <= {*_DIALECTS}:
+        return {}
+    return {f"node/{path}": GeneratedFile(text, "user") for path, text in cpp_package(loaded).items()}
+
+
+def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
+    """The version of ROS that all topics have. Raises `InputError`."""
+    found = description.versions
+    if len(found) > 1:
+        titles = " and ".join(middleware_of(version).title for version in found)
+        fail(f"the topics of '{description.name}' are of {titles}, but a node in C++ speaks one of them")
+    if ros is not None and ros.number != found[0]:
+        title = middleware_of(found[0]).title
+        hint = "the hardware is made for the bytes of one version: 'middleware' of blocks and interfaces says which"
+        fail(f"the topics of '{description.name}' are of {title}, not of {ros.title}", hint=hint)
+    return found[0]
+
+
+def _headers(dialect: _Dialect) -> dict[str, str]:
+    """All but those for other versions of ROS."""
+    others = {item.header for item in _DIALECTS.values()} - {dialect.header}
+    return {
+        f"include/{path.relative_to(HEADERS)}": path.read_text(encoding="utf-8")
+        for path in headers()
+        if path.name not in others
+    }
+
+
+def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialect) -> dict[str, Any]:
+    """The table."""
+    return {
+        "name": description.name,
+        "ros": middleware_of(description.versions[0]).title,
+        "header": dialect.header,
+        "middleware": dialect.middleware,
+        "signature": dialect.signature,
+        "width": description.width,
+        "subscriber_count": len(loaded.system.subscribers),
+        "publisher_count": len(loaded.system.publishers),
+        "queue_depth": _QUEUE_DEPTH,
+        "definitions": [*_definitions(description)],
+        "subscribers": [_row(topic) for topic in description.subscribers],
+        "publishers": [_row(topic) for topic in description.publishers],
+        "software": _software(loaded, description),
+    }
+
+
+def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, Any] | None:
+    """Where the messages of the blocks in software come from and go to; None if there are no such blocks here."""
+    ports = software_ports(loaded.system)
+    if not ports.inputs:
+        return None
+    topics = {topic.block: topic.name for topic in (*description.subscribers, *description.publishers)}
+    leaving = {crossing.block: crossing.id for crossing in description.leaving}
+    entering = {crossing.block: crossing.id for crossing in description.entering}
+    return {
+        "inputs": [_port(topic.block, leaving, topics) for topic in ports.inputs],
+        "outputs": [_port(topic.block, entering, topics) for topic in ports.outputs],
+    }
+
+
+def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) -> dict[str, str]:
+    if block in converters:
+        return {"topic": "", "converter": str(converters[block])}
+    return {"topic": topics[block], "converter": "{}"}
+
+
+def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
+    """The text of each message's definition once; ROS 2 needs none."""
+    texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
+    for name, text in texts.items():
+        if text:
+            lines = lines_of(text)
+            yield {
+                "message": name,
+                "constant": _constant(name),
+                "lines": [
+                    {"text": line, "end": ";" if number == len(lines) else ""}
+                    for number, line in enumerate(lines, start=1)
+                ],
+            }
+
+
+def _constant(message: str) -> str:
+    """The name of a definition's text: `kGeometryMsgsQuaternion`."""
+    words = re.split("_+", identifier(message))
+    return "k" + "".join(f"{word[0].upper()}{word[1:]}" for word in words)
+
+
+def _row(topic: NodeTopic) -> dict[str, Any]:
+    return {
+        "id": "{}" if topic.id is None else str(topic.id),
+        "topic": topic.name,
+        "type": topic.type,
+        "signature": topic.signature,
+        "definition": {"constant": _constant(topic.type)} if topic.definition else None,
+    }

@@ -1,0 +1,119 @@
+"""A node from its options to its exit status; `firm live` and the generated node are this."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import FrameType
+
+from fusesoc_firm.node.carrier import CarrierError, RosCarrier, RosOptions
+from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.engine import Node, NodeSettings, OpenTransport
+from fusesoc_firm.node.options import ROS_ARGUMENTS
+from fusesoc_firm.node.queues import Overflow
+from fusesoc_firm.node.software import node_software
+from fusesoc_firm.node.trace import Trace
+from fusesoc_firm.node.transport.transport import TransportError
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import fail
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What a node is told when it is started. `versions` are those of ROS whose topics it has."""
+
+    versions: tuple[int, ...]
+    ros: RosOptions
+    settings: NodeSettings
+    trace: Path | None = None
+
+
+def run_options(
+    arguments: argparse.Namespace, rest: Sequence[str], description: NodeDescription, ros: int | None = None
+) -> RunOptions:
+    """The options that a command line means; `ros` is the one version wanted, if there is one. Raises `InputError`."""
+    if ros is not None and ros not in description.versions:
+        known = " and ".join(map(str, description.versions))
+        hint = "the hardware is made for the bytes of one version: 'middleware' of blocks and interfaces says which"
+        fail(f"system '{description.name}' has no topic of ROS {ros}, but of ROS {known}", hint=hint)
+    versions = description.versions if ros is None else (ros,)
+    if arguments.ros_args and 2 not in versions:
+        fail(f"'{ROS_ARGUMENTS}' is for ROS 2, and the topics are of ROS 1", hint="ROS 1 takes NAME:=VALUE as it is")
+    passed = [*rest, *([ROS_ARGUMENTS, *arguments.ros_args] if arguments.ros_args else ())]
+    return RunOptions(
+        versions,
+        RosOptions(
+            arguments.name or description.name,
+            tuple(passed),
+            arguments.queue,
+            arguments.qos == "reliable",
+            arguments.trace is not None,
+            arguments.ros_python,
+        ),
+        NodeSettings(arguments.queue, Overflow(arguments.overflow), drain=arguments.drain, restarts=arguments.restart),
+        arguments.trace,
+    )
+
+
+def run_node(
+    description: NodeDescription, open_transport: OpenTransport, options: RunOptions, loaded: LoadedSystem | None = None
+) -> None:
+    """Be the node until Ctrl-C, SIGTERM or ROS ends it; a second Ctrl-C ends it at once.
+
+    `loaded` is the system, where it has software. Raises `InputError` if ROS or the hardware is gone, or if what was
+    received could not be processed in time.
+    """
+    settings = replace(options.settings, report=_say)
+    try:
+        with ExitStack() as stack:
+            software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
+            trace = stack.enter_context(closing(Trace(options.trace, description))) if options.trace else None
+            node = Node(description, open_transport, settings, software, trace)
+            # What is left to be published leaves before the node says what it did.
+            stack.callback(lambda: _say(node.statistics.text()))
+            stack.callback(node.close)
+            carriers = {}
+            for ros in options.versions:
+                carriers[ros] = stack.enter_context(closing(RosCarrier(ros, description, options.ros)))
+                _say(_topics(carriers[ros], description))
+            with _stopped_by_signals(node):
+                is_complete = node.run(carriers)
+    except (TransportError, CarrierError) as error:
+        fail(str(error))
+    if not is_complete:
+        fail("not all that was received has been processed")
+
+
+def _topics(carrier: RosCarrier, description: NodeDescription) -> str:
+    """What a node takes and gives, once it is there."""
+    taken = [f"  {name} -> {description.subscribers[number].block}" for number, name in carrier.subscribers.items()]
+    given = [f"  {description.publishers[number].block} -> {name}" for number, name in carrier.publishers.items()]
+    return "\n".join([f"{description.name} is a node of {carrier.title}", *taken, *given])
+
+
+@contextmanager
+def _stopped_by_signals(node: Node) -> Iterator[None]:
+    """Within it, the first Ctrl-C or SIGTERM stops the node."""
+    known = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def stop(_: int, __: FrameType | None) -> None:
+        for number, handler in known.items():
+            signal.signal(number, handler)
+        node.stop()
+
+    for number in known:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number, handler in known.items():
+            signal.signal(number, handler)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

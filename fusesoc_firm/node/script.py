@@ -1,0 +1,40 @@
+"""What a generated node in Python calls (`firm system node --language python`)."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.node.options import add_node_options, remappings
+from fusesoc_firm.node.run import run_node, run_options
+from fusesoc_firm.node.transports import at_address
+from fusesoc_firm.system.beside import load_beside
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.tools.interrupts import accept_interrupts
+
+
+def main(description: NodeDescription, script: str = "", specification: str = "", paths: Sequence[str] = ()) -> None:
+    """Be the node, as the command line has it, and exit: 0 when it is asked to end, 1 for faults, 2 for a wrong line.
+
+    `specification` is that of a system with software, and `paths` hold its messages, both relative to the `script`.
+    """
+    accept_interrupts()
+    parser = argparse.ArgumentParser(description=f"The node of the system {description.name}.")
+    parser.add_argument("--transport", required=True, metavar="ADDRESS", help="the way to the hardware")
+    add_node_options(parser)
+    arguments, rest = parser.parse_known_args()
+    passed = remappings(rest, parser.error)
+    try:
+        folder = Path(script).resolve().parent
+        places = [folder / path for path in paths]
+        # The folders of cores are among them.
+        loaded = load_beside(folder / specification, places, core_folders=lambda _: ()) if specification else None
+        options = run_options(arguments, passed, description)
+        run_node(description, at_address(arguments.transport), options, loaded)
+    except InputError as error:
+        sys.exit(str(error))
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -1,0 +1,86 @@
+"""Software of a system in its node: payloads in, payloads out, the functions in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from threading import Lock
+
+from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.simulation.functions import Functions, Message, importable_sources
+from fusesoc_firm.simulation.software import sent_elsewhere, taken_elsewhere
+from fusesoc_firm.system.derived.model import End
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import InputError, fail
+
+
+@dataclass
+class NodeSoftware:
+    """The blocks of type ROS-SW that have sources.
+
+    A message comes from a block, a topic's or a converter's, and what is made of it goes to others. `report` hears of
+    each fault, and the rest goes on: the call that failed is lost, with its messages.
+    """
+
+    functions: Functions
+    report: Callable[[InputError], None]
+    sources: dict[str, tuple[End, Frame]]
+    sinks: dict[str, Frame]
+    faults: int = 0
+    _lock: Lock = field(default_factory=Lock)
+
+    def take(self, block: str, payload: bytes) -> list[tuple[str, bytes]]:
+        """Let a message in: what leaves because of it, each with the block that it goes to."""
+        end, frame = self.sources[block]
+        with self._lock:
+            return list(self._run(block, end, frame, payload))
+
+    def _run(self, block: str, end: End, frame: Frame, payload: bytes) -> Iterator[tuple[str, bytes]]:
+        step: Callable[[], list[tuple[str, Message]]]
+        step = lambda: self.functions.take(end, _decoded(block, frame, payload))  # noqa: E731
+        while True:
+            try:
+                for name, message in step():
+                    yield name, encode_used(self.sinks[name], message)
+            except InputError as error:
+                self.faults += 1
+                self.report(error)
+                step = self.functions.run
+            else:
+                return
+
+
+@contextmanager
+def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) -> Iterator[NodeSoftware | None]:
+    """The software of a system, which may import its sources within; None if it has none.
+
+    Raises `InputError`, also for a fault within a file.
+    """
+    system, software = loaded.system, loaded.system.software
+    if not any(block.type.accelerator.sources for block in software.blocks):
+        yield None
+        return
+    taken = taken_elsewhere(system)
+    with importable_sources([type_.accelerator for type_ in software.types], loaded.folder):
+        functions = Functions.of(software, loaded.folder, {end: topic.block for topic, end in taken.items()})
+        topics = (*system.subscribers, *system.publishers, *software.subscribers)
+        ends = {topic.block: (End(topic.block), topic.frame) for topic in topics}
+        ends |= {topic.block: (end, topic.frame) for topic, end in sent_elsewhere(system).items()}
+        # What hardware sends to software elsewhere is a topic, and none of ours takes it.
+        outside = {topic.block for topic in taken}
+        yield NodeSoftware(
+            functions,
+            report,
+            {block: found for block, found in ends.items() if found[0] in functions.ways and block not in outside},
+            {topic.block: topic.frame for topic in (*system.subscribers, *software.publishers, *taken)},
+        )
+
+
+def _decoded(block: str, frame: Frame, payload: bytes) -> Message:
+    try:
+        return decode(frame, payload)
+    except CodecError as error:
+        fail(f"a message from '{block}' is no {frame.message}: {error}")

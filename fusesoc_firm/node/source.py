@@ -1,0 +1,77 @@
+"""The node of a system as a Python file: its table, and a call of what does the work."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.quoting import lines_of, python_string
+from fusesoc_firm.text.render import render
+
+_TEMPLATE = "node/node.py"
+
+
+def python_node(
+    loaded: LoadedSystem, ros: Middleware | None, specification: Path, folder: Path, paths: Sequence[Path] = ()
+) -> dict[str, str]:
+    """The file, by its name in `folder`.
+
+    Where the system has software, the node looks its functions up by the specification, and messages in `paths`: both
+    are named as they lie from the folder. Raises `InputError` if the system has no topic of `ros`.
+    """
+    description = describe(loaded)
+    if ros is not None and ros.number not in description.versions:
+        fail(f"system '{description.name}' has no topic of {ros.title}")
+    has_software = any(block.type.accelerator.sources for block in loaded.system.software.blocks)
+    name = f"{description.name}_node.py"
+    call = "main(NODE)"
+    if has_software:
+        others = [os.path.relpath(path, folder) for path in paths]
+        call = f"main(NODE, __file__, {python_string(os.path.relpath(specification, folder))}, {others!r})"
+    configuration = {"file": name, "specification": shlex.quote(specification.name), "call": call}
+    return {name: render(_TEMPLATE, {**_table(description), **configuration})}
+
+
+def _table(description: NodeDescription) -> dict[str, Any]:
+    topics = (*description.subscribers, *description.publishers)
+    definitions = {topic.type: topic.definition for topic in topics if topic.definition}
+    return {
+        "name": description.name,
+        "width": description.width,
+        "definitions": [
+            {"message": name, "constant": _constant(name), "lines": lines_of(text)}
+            for name, text in definitions.items()
+        ],
+        "subscribers": [*map(_topic, description.subscribers)],
+        "publishers": [*map(_topic, description.publishers)],
+        "sources": repr(description.sources),
+        "entering": [{"block": str(item.block), "id": item.id} for item in description.entering],
+        "leaving": [{"block": str(item.block), "id": item.id} for item in description.leaving],
+        "longest_payload": repr(description.longest_payload),
+        "clock_hz": repr(description.clock_hz),
+    }
+
+
+def _topic(topic: NodeTopic) -> dict[str, Any]:
+    return {
+        "block": str(topic.block),
+        "topic": topic.name,
+        "type": topic.type,
+        "ros": topic.ros,
+        "signature": topic.signature,
+        "id": repr(topic.id),
+        "definition": {"constant": _constant(topic.type)} if topic.definition else None,
+    }
+
+
+def _constant(message: str) -> str:
+    """The name of a definition's text: `GEOMETRY_MSGS_QUATERNION`."""
+    return identifier(*message.split("/")).upper()

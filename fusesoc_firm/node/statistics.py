@@ -1,0 +1,76 @@
+"""What a node counts, and says when it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from fusesoc_firm.node.description import NodeDescription
+
+
+@dataclass
+class Input:
+    """Messages to the hardware, or to software: from a topic, or made by software."""
+
+    received: int = 0
+    dropped: int = 0
+    sent: int = 0
+    refused: int = 0
+    """by the hardware, which found their frames broken"""
+
+
+@dataclass
+class Output:
+    """Messages from the hardware or from software, to a topic or to software."""
+
+    frames: int = 0
+    published: int = 0
+
+
+@dataclass
+class Statistics:
+    """Counts of a run, by block. `faults` are the bursts that no Manager sends, and the pulses of `id_error`."""
+
+    inputs: dict[str, Input] = field(default_factory=dict)
+    outputs: dict[str, Output] = field(default_factory=dict)
+    faults: int = 0
+    software_faults: int = 0
+    restarts: int = 0
+    unfinished: int = 0
+    """messages that were still in queues, or frames of which a part had come, when the time to end was over"""
+
+    @classmethod
+    def of(cls, description: NodeDescription) -> Statistics:
+        """Nothing counted yet."""
+        return cls(
+            {item.block: Input() for item in description.inputs},
+            {item.block: Output() for item in description.outputs},
+        )
+
+    def text(self) -> str:
+        """A table for people."""
+        rows: list[tuple[str, ...]] = [("from", "received", "dropped", "sent", "refused")]
+        rows += [
+            (name, *map(str, (item.received, item.dropped, item.sent, item.refused)))
+            for name, item in self.inputs.items()
+        ]
+        rows.append(("to", "frames", "published", "", ""))
+        rows += [(name, str(item.frames), str(item.published), "", "") for name, item in self.outputs.items()]
+        notes = {
+            "faults on the way from the hardware": self.faults,
+            "faults of software": self.software_faults,
+            "restarts": self.restarts,
+            "messages unfinished at the end": self.unfinished,
+        }
+        return "\n".join([*_aligned(rows), *(f"{text}: {count}" for text, count in notes.items() if count)])
+
+
+def _aligned(rows: Iterable[tuple[str, ...]]) -> list[str]:
+    found = [*rows]
+    widths = [max(len(row[column]) for row in found) for column in range(len(found[0]))]
+    return [
+        "  ".join(
+            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        ).rstrip()
+        for row in found
+    ]

@@ -1,0 +1,203 @@
+"""The way of each message through a system: when it was where, in simulated time and on the wall's clock.
+
+    trace = Trace(path, description)
+    ...                                        # the node tells it what happens
+    trace.close()
+
+A row is a message from a subscriber to a publisher. A publisher's n-th message belongs to the n-th of each subscriber
+that its block gets something from, and the row is that of the one that came last: so it is for accelerators that answer
+every message with one. What a message went through as software is a row before, and one behind.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from threading import RLock
+from time import monotonic_ns
+
+from fusesoc_firm.node.description import NodeDescription
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.outputs import check_output
+
+WALL_TIMES = ("received_ns", "queued_ns", "sent_ns", "came_ns", "published_ns")
+CYCLES = ("first_beat_in_cycle", "last_beat_in_cycle", "first_beat_out_cycle", "last_beat_out_cycle")
+COLUMNS = (
+    *("message", "subscriber", "publisher", "bytes_in", "bytes_out"),
+    *WALL_TIMES,
+    *CYCLES,
+    *("input_cycles", "accelerator_cycles", "output_cycles", "hardware_ns"),
+)
+
+
+@dataclass
+class Entry:
+    """A message on its way to the hardware; times are those of the system's monotonic clock, in ns."""
+
+    subscriber: int
+    size: int
+    received_ns: int
+    queued_ns: int
+    sent_ns: int | None = None
+    cycles: tuple[int, int] | None = None
+    number: int = -1
+    is_answered: bool = False
+
+
+@dataclass
+class _Answer:
+    """A message that came out of the hardware, with the one that led to it."""
+
+    entry: Entry | None
+    publisher: int
+    size: int
+    cycles: tuple[int, int] | None
+    came_ns: int
+
+
+@dataclass
+class _Ways:
+    """What is on its way: to the hardware, in it towards each publisher, and to each topic."""
+
+    untaken: deque[Entry] = field(default_factory=deque)
+    pending: dict[tuple[int, int], deque[Entry]] = field(default_factory=dict)
+    unpublished: dict[int, deque[_Answer]] = field(default_factory=dict)
+
+
+class Trace:
+    """Writes the table; any thread may tell it something. Its times count from when it was made."""
+
+    def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
+        """Begin the file at `path`; `clock` gives ns. Raises `InputError`."""
+        check_output(path)
+        try:
+            self._file = path.open("w", newline="", encoding="utf-8")
+        except OSError as error:
+            fail(f"cannot write {path}: {error.strerror}")
+        self._rows = csv.writer(self._file, lineterminator="\n")
+        self._rows.writerow(COLUMNS)
+        self._description = description
+        self._subscribers, self._publishers = converter_names(description)
+        self._reached: dict[int, list[int]] = {}
+        for publisher, subscribers in enumerate(description.sources):
+            for subscriber in subscribers:
+                self._reached.setdefault(subscriber, []).append(publisher)
+        self._ways = _Ways()
+        self._numbers = count()
+        self._lock = RLock()
+        self._clock = clock
+        self._start = clock()
+
+    def sending(self, entry: Entry) -> None:
+        """A message is being sent to the hardware."""
+        with self._lock:
+            entry.number = next(self._numbers)
+            self._ways.untaken.append(entry)
+            for publisher in self._reached.get(entry.subscriber, ()):
+                self._ways.pending.setdefault((entry.subscriber, publisher), deque()).append(entry)
+
+    def sent(self, entry: Entry) -> None:
+        """The hardware, or a bounded buffer before it, has the message."""
+        entry.sent_ns = self._clock()
+
+    def taken(self, first_cycle: int, last_cycle: int) -> None:
+        """Simulated hardware took the next one of the messages sent."""
+        with self._lock:
+            if self._ways.untaken:
+                self._ways.untaken.popleft().cycles = (first_cycle, last_cycle)
+
+    def refused(self, subscriber: int) -> None:
+        """The hardware found a frame of a subscriber broken: no publisher answers it. It is the one taken last."""
+        with self._lock:
+            for publisher in self._reached.get(subscriber, ()):
+                queue = self._ways.pending.get((subscriber, publisher))
+                taken = [entry for entry in queue or () if entry.cycles] or [*(queue or ())][:1]
+                if queue and taken:
+                    queue.remove(taken[-1])
+
+    def came(self, publisher: int, size: int, cycles: tuple[int, int] | None, *, is_published: bool) -> None:
+        """A message came out of the hardware. It `is_published` later, or is for software."""
+        with self._lock:
+            answer = _Answer(self._cause(publisher), publisher, size, cycles, self._clock())
+            if is_published:
+                self._ways.unpublished.setdefault(publisher, deque()).append(answer)
+            else:
+                self._write(answer.entry, answer, None)
+
+    def published(self, publisher: int, time_ns: int) -> None:
+        """The middleware has published the next message of a publisher."""
+        with self._lock:
+            if answers := self._ways.unpublished.get(publisher):
+                answer = answers.popleft()
+                self._write(answer.entry, answer, time_ns)
+
+    def forget(self) -> None:
+        """The hardware began anew: what was in it is lost."""
+        with self._lock:
+            self._write_rest()
+            self._ways = _Ways()
+
+    def close(self) -> None:
+        """Write what got no answer, and end the file."""
+        with self._lock:
+            self._write_rest()
+            self._file.close()
+
+    def _cause(self, publisher: int) -> Entry | None:
+        queues = [self._ways.pending.get((source, publisher)) for source in self._description.sources[publisher]]
+        entries = [queue.popleft() for queue in queues if queue]
+        for entry in entries:
+            entry.is_answered = True
+        return max(entries, key=lambda entry: entry.number, default=None)
+
+    def _write_rest(self) -> None:
+        for answers in self._ways.unpublished.values():
+            for answer in answers:
+                self._write(answer.entry, answer, None)
+        rest = {entry.number: entry for queue in self._ways.pending.values() for entry in queue}
+        for _, entry in sorted(rest.items()):
+            if not entry.is_answered:
+                self._write(entry, None, None)
+
+    def _write(self, entry: Entry | None, answer: _Answer | None, published_ns: int | None) -> None:
+        came = answer.came_ns if answer else None
+        times = (entry.received_ns, entry.queued_ns, entry.sent_ns) if entry else (None,) * 3
+        inwards = (entry.cycles if entry else None) or (None, None)
+        outwards = (answer.cycles if answer else None) or (None, None)
+        self._rows.writerow(
+            (
+                entry.number if entry else None,
+                self._subscribers[entry.subscriber] if entry else None,
+                self._publishers[answer.publisher] if answer else None,
+                entry.size if entry else None,
+                answer.size if answer else None,
+                *(None if time is None else time - self._start for time in (*times, came, published_ns)),
+                *inwards,
+                *outwards,
+                *self._differences((*inwards, *outwards)),
+            )
+        )
+
+    def _differences(self, cycles: Iterable[int | None]) -> tuple[float | None, ...]:
+        """Cycles from beat to beat, and the time from the first one to the last one."""
+        first_in, last_in, first_out, last_out = cycles
+        whole = _minus(last_out, first_in)
+        clock = self._description.clock_hz
+        nanoseconds = None if whole is None or not clock else round(whole * 1e9 / clock, 3)
+        return _minus(last_in, first_in), _minus(first_out, last_in), _minus(last_out, first_out), nanoseconds
+
+
+def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:
+    """What the converters are called, by their ids: subscribers, publishers."""
+    return (
+        {item.id: item.block for item in description.inputs if item.id is not None},
+        {item.id: item.block for item in description.outputs if item.id is not None},
+    )
+
+
+def _minus(later: int | None, earlier: int | None) -> int | None:
+    return None if later is None or earlier is None else later - earlier

@@ -1,0 +1,1 @@
+"""How frames get between the host's software and hardware, simulated or not (docs/reference/transports.md)."""

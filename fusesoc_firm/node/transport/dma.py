@@ -1,0 +1,283 @@
+"""AXI DMA between memory and the system's streams, as the block design of a board with a processor has it.
+
+That is one with scatter and gather, 26 bits of length, 32 of address, and no realignment
+(docs/how-to/build-for-a-board.md). Each direction has a ring of descriptors with a buffer each: frames are copied
+into the buffers that are free, a burst comes into the next ones. What is longer than a buffer goes on in the next
+one. Registers and descriptors: PG021 (AXI DMA).
+
+Python has no barrier between memory and registers. It relies on the many instructions between a write to the one and a
+write to the other, which a program in C++ could not.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntFlag
+from types import TracebackType
+
+from fusesoc_firm.node.transport.dma_device import DmaDevice
+from fusesoc_firm.node.transport.transport import Burst, TransportError
+
+# The first registers of the channels, the one to the system and the one from it, and offsets from there.
+TO_SYSTEM, FROM_SYSTEM = 0x00, 0x30
+CONTROL, STATUS, FIRST_DESCRIPTOR, LAST_DESCRIPTOR = 0x00, 0x04, 0x08, 0x10
+_NAMES = {TO_SYSTEM: "MM2S", FROM_SYSTEM: "S2MM"}
+
+
+class Control(IntFlag):
+    """Bits of a channel's control register."""
+
+    RUN = 1 << 0
+    RESET = 1 << 2
+    INTERRUPT_ON_COMPLETE = 1 << 12
+    INTERRUPT_ON_ERROR = 1 << 14
+    ONE_FRAME_AN_INTERRUPT = 1 << 16
+
+
+class Status(IntFlag):
+    """Bits of a channel's status register."""
+
+    HALTED = 1 << 0
+    HAS_SCATTER_GATHER = 1 << 3
+    INTERRUPTS = 7 << 12
+
+
+_FAULTS = {
+    1 << 4: "DMAIntErr (internal)",
+    1 << 5: "DMASlvErr (memory's answer)",
+    1 << 6: "DMADecErr (address)",
+    1 << 8: "SGIntErr (descriptor)",
+    1 << 9: "SGSlvErr (memory's answer)",
+    1 << 10: "SGDecErr (address)",
+}
+
+# Words of a descriptor, and the bits of its control and status.
+DESCRIPTOR_BYTES = 64
+NEXT, BUFFER, DESCRIPTOR_CONTROL, DESCRIPTOR_STATUS = 0, 2, 6, 7
+LENGTH, END_OF_FRAME, START_OF_FRAME, COMPLETE = (1 << 26) - 1, 1 << 26, 1 << 27, 1 << 31
+# A buffer begins at a multiple of what the widest stream has.
+_ALIGNMENT = 64
+_RESET_SECONDS = 1.0
+_SHORTEST_PAUSE, _LONGEST_PAUSE = 5e-6, 500e-6
+
+
+@dataclass(frozen=True)
+class DmaBuffers:
+    """How many each direction has, and the bytes of each, a multiple of 64; 0: what the memory has room for."""
+
+    send: int = 16
+    receive: int = 16
+    size: int = 0
+
+
+class _Ring:
+    """The descriptors and buffers of one direction, used in turn."""
+
+    def __init__(self, device: DmaDevice, channel: int, count: int, places: tuple[int, int, int]) -> None:
+        """`places`: where in the memory the descriptors are, where the buffers, and the bytes of each buffer."""
+        self._device, self._channel, self._count = device, channel, count
+        self._descriptors, self._buffers, self.size = places
+        self._words = device.memory.cast("I")
+        for index in range(count):
+            for word in range(DESCRIPTOR_BYTES // 4):
+                self._set(index, word, 0)
+            self._set(index, NEXT, self._address(self.next(index)))
+            self._set(index, BUFFER, device.address + self._buffers + index * self.size)
+
+    def start(self, interrupts: int) -> None:
+        """The engine may run; it waits for descriptors."""
+        self._device.write(self._channel + FIRST_DESCRIPTOR, self._address(0))
+        self._device.write(self._channel + CONTROL, Control.RUN | Control.ONE_FRAME_AN_INTERRUPT | interrupts)
+
+    def next(self, index: int) -> int:
+        """The descriptor behind one."""
+        return (index + 1) % self._count
+
+    def buffer(self, index: int) -> memoryview:
+        """The buffer of a descriptor."""
+        first = self._buffers + index * self.size
+        return self._device.memory[first : first + self.size]
+
+    def hand_over(self, index: int, control: int) -> None:
+        """Give a descriptor to the engine, with what it is to do."""
+        self._set(index, DESCRIPTOR_CONTROL, control)
+        self._set(index, DESCRIPTOR_STATUS, 0)
+        self._device.write(self._channel + LAST_DESCRIPTOR, self._address(index))
+
+    def done(self, index: int) -> int | None:
+        """What the engine says of a descriptor; None if it is not done."""
+        status = self._words[self._place(index) + DESCRIPTOR_STATUS]
+        return status if status & COMPLETE else None
+
+    def _place(self, index: int) -> int:
+        return (self._descriptors + index * DESCRIPTOR_BYTES) // 4
+
+    def _address(self, index: int) -> int:
+        return self._device.address + self._descriptors + index * DESCRIPTOR_BYTES
+
+    def _set(self, index: int, word: int, value: int) -> None:
+        self._words[self._place(index) + word] = value
+
+
+class DmaTransport:
+    """A transport over AXI DMA."""
+
+    def __init__(self, device: DmaDevice, buffers: DmaBuffers | None = None, longest: int = 2**26) -> None:
+        """Reset the engine, and with it the system. No burst has more bytes than `longest`. Raises `TransportError`."""
+        self._device = device
+        self._longest = longest
+        self._buffers = buffers or DmaBuffers()
+        self._closing = threading.Event()
+        self._sending, self._receiving = threading.Lock(), threading.Lock()
+        size = self._buffer_bytes()
+        count = self._buffers.send + self._buffers.receive
+        first_buffer = count * DESCRIPTOR_BYTES
+        self._to_system = _Ring(device, TO_SYSTEM, self._buffers.send, (0, first_buffer, size))
+        self._from_system = _Ring(
+            device,
+            FROM_SYSTEM,
+            self._buffers.receive,
+            (self._buffers.send * DESCRIPTOR_BYTES, first_buffer + self._buffers.send * size, size),
+        )
+        # Of the sender: the descriptor to use next, the first that the engine has, and how many it has.
+        self._next_sent, self._first_sent, self._handed_over = 0, 0, 0
+        # Of the receiver: the descriptor that is filled next, and the burst of which a part has come.
+        self._next_received, self._burst = 0, bytearray()
+        self._start()
+
+    def send(self, frame: bytes) -> None:
+        """Send a whole frame; waits while all buffers are on their way. Raises `TransportError`."""
+        with self._sending:
+            rest, mark = memoryview(frame), START_OF_FRAME
+            while rest:
+                self._wait_for_room()
+                part = rest[: self._to_system.size]
+                rest = rest[len(part) :]
+                self._to_system.buffer(self._next_sent)[: len(part)] = part
+                self._to_system.hand_over(self._next_sent, len(part) | mark | (0 if rest else END_OF_FRAME))
+                self._next_sent = self._to_system.next(self._next_sent)
+                self._handed_over += 1
+                mark = 0
+
+    def receive(self, timeout: float | None = None) -> Burst | None:
+        """The next burst, as `Transport.receive` has it."""
+        end = None if timeout is None else time.monotonic() + timeout
+        with self._receiving:
+            while not self._closing.is_set():
+                if (status := self._from_system.done(self._next_received)) is not None:
+                    if self._take(status):
+                        burst, self._burst = bytes(self._burst), bytearray()
+                        return Burst(burst)
+                    continue
+                self._check(FROM_SYSTEM)
+                rest = None if end is None else end - time.monotonic()
+                if rest is not None and rest <= 0:
+                    break
+                # The interrupt is answered before it is looked for what came before it, so none is missed.
+                self._device.write(FROM_SYSTEM + STATUS, Status.INTERRUPTS)
+                if self._from_system.done(self._next_received) is None:
+                    self._device.wait(rest)
+        return None
+
+    def is_at_rest(self) -> None:
+        """Nothing: the hardware behind the engine may work at something."""
+
+    def close(self) -> None:
+        """Stop the engine, so that it does not write to memory that is somebody else's. A second call does nothing."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        self._device.end()
+        with self._receiving, self._sending:
+            self._reset()
+
+    def __enter__(self) -> DmaTransport:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _buffer_bytes(self) -> int:
+        """The size of each buffer. Raises `TransportError` if it, or the number of them, cannot be."""
+        count, size = self._buffers.send + self._buffers.receive, self._buffers.size
+        room = len(self._device.memory) - count * DESCRIPTOR_BYTES
+        most = min(max(0, room) // max(1, count), LENGTH) // _ALIGNMENT * _ALIGNMENT
+        size = size or most
+        if min(self._buffers.send, self._buffers.receive) < 2 or size % _ALIGNMENT or not 0 < size <= most:
+            raise TransportError(
+                f"the DMA has {self._buffers.send} and {self._buffers.receive} buffers of {size} bytes; legal: 2 and"
+                f" more, a multiple of {_ALIGNMENT}, and all within the memory's {len(self._device.memory)}"
+            )
+        return size
+
+    def _start(self) -> None:
+        if not self._reset():
+            raise TransportError("the DMA engine does not end its reset: has it a clock?")
+        if not self._device.read(TO_SYSTEM + STATUS) & Status.HAS_SCATTER_GATHER:
+            raise TransportError("the DMA engine has no scatter and gather, so it is none of a generated block design")
+        self._to_system.start(Control.INTERRUPT_ON_ERROR)
+        self._from_system.start(Control.INTERRUPT_ON_COMPLETE | Control.INTERRUPT_ON_ERROR)
+        if not all(_soon(self._runs(channel)) for channel in (TO_SYSTEM, FROM_SYSTEM)):
+            raise TransportError("the DMA engine does not start")
+        for index in range(self._buffers.receive):
+            self._from_system.hand_over(index, self._from_system.size)
+
+    def _runs(self, channel: int) -> Callable[[], bool]:
+        return lambda: not self._device.read(channel + STATUS) & Status.HALTED
+
+    def _reset(self) -> bool:
+        """Whether it has ended; a reset of one channel is of both."""
+        self._device.write(TO_SYSTEM + CONTROL, Control.RESET)
+        return _soon(lambda: not self._device.read(TO_SYSTEM + CONTROL) & Control.RESET)
+
+    def _wait_for_room(self) -> None:
+        pause = _SHORTEST_PAUSE
+        while True:
+            if self._closing.is_set():
+                raise TransportError("the transport is closed")
+            self._check(TO_SYSTEM)
+            while self._handed_over and self._to_system.done(self._first_sent) is not None:
+                self._first_sent = self._to_system.next(self._first_sent)
+                self._handed_over -= 1
+            if self._handed_over < self._buffers.send:
+                return
+            # There is an interrupt, but the one of UIO is the receiver's.
+            time.sleep(pause)
+            pause = min(2 * pause, _LONGEST_PAUSE)
+
+    def _take(self, status: int) -> bool:
+        """Add what a buffer holds; whether the burst is over."""
+        size = status & LENGTH
+        if size > self._from_system.size:
+            raise TransportError("the DMA engine wrote beyond a buffer")
+        if status & START_OF_FRAME:
+            self._burst.clear()
+        self._burst += self._from_system.buffer(self._next_received)[:size]
+        if len(self._burst) > self._longest:
+            raise TransportError(f"a burst is longer than {self._longest} bytes")
+        self._from_system.hand_over(self._next_received, self._from_system.size)
+        self._next_received = self._from_system.next(self._next_received)
+        return bool(status & END_OF_FRAME)
+
+    def _check(self, channel: int) -> None:
+        status = self._device.read(channel + STATUS)
+        found = [text for bit, text in _FAULTS.items() if status & bit]
+        if status & Status.HALTED and not found:
+            found = ["it has halted"]
+        if found and not self._closing.is_set():
+            raise TransportError(f"the DMA engine's {_NAMES[channel]}: {', '.join(found)}")
+
+
+def _soon(condition: Callable[[], bool]) -> bool:
+    """Whether it is so, or becomes so at once."""
+    end = time.monotonic() + _RESET_SECONDS
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(_SHORTEST_PAUSE)
+    return True

@@ -1,0 +1,59 @@
+"""A transport by its address, as it stands on a command line or in a launch file (docs/reference/transports.md).
+
+pipe:COMMAND                      a simulator
+uart:DEVICE:BAUD[:rtscts]         a serial line, with flow control by wires
+dma:UIO:BUFFER[:poll]             AXI DMA, such as dma:/dev/uio0:udmabuf0, without its interrupt
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+
+from fusesoc_firm.node.transport.dma import DmaTransport
+from fusesoc_firm.node.transport.dma_device import LinuxDmaDevice
+from fusesoc_firm.node.transport.simulator import Event, Pace, Simulator, SimulatorTransport
+from fusesoc_firm.node.transport.transport import Transport, TransportError
+from fusesoc_firm.node.transport.uart import UartTransport
+
+LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts], dma:UIO:BUFFER[:poll]"
+
+
+def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Event], None] | None = None) -> Transport:
+    """Open the transport with an address; `pace` and `observe` are for a simulator. Raises `TransportError`.
+
+    The command of a simulator is words as a shell has them, with quotes and without its other signs.
+    """
+    kind, _, rest = address.partition(":")
+    if kind == "pipe" and rest.strip():
+        command = _words(address, rest)
+        return SimulatorTransport(lambda: Simulator(command), pace, observe)
+    if kind == "uart":
+        device, second, has_flow_control = _device(rest, ":rtscts")
+        if device and second:
+            return UartTransport(device, _baud(second), has_flow_control=has_flow_control)
+    if kind == "dma":
+        uio, buffer, is_polled = _device(rest, ":poll")
+        if uio and buffer:
+            return DmaTransport(LinuxDmaDevice(uio, buffer, has_interrupt=not is_polled))
+    raise TransportError(f"the transport is '{address}'; legal: {LEGAL}")
+
+
+def _words(address: str, command: str) -> list[str]:
+    try:
+        return shlex.split(command)
+    except ValueError as error:
+        raise TransportError(f"the transport is '{address}', whose command is none: {error}") from None
+
+
+def _device(text: str, option: str) -> tuple[str, str, bool]:
+    """`FIRST:SECOND`, with an option or not. The names of devices may hold colons, so it is read from its end."""
+    has_option = text.endswith(option)
+    first, _, second = text.removesuffix(option).rpartition(":")
+    return first, second, has_option
+
+
+def _baud(text: str) -> int:
+    if not text.isdecimal() or len(text) > 9:
+        raise TransportError(f"the baud rate is '{text}', which is no number")
+    return int(text)

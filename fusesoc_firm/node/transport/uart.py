@@ -1,0 +1,204 @@
+"""Hardware at a serial line (cores/board, robot:board:firm_link): frames as they are, 8 bits, no parity, 1 stop bit.
+
+    with UartTransport("/dev/ttyUSB1") as transport:
+        transport.send(pack_frame(0, payload))
+        burst = transport.receive(timeout=1.0)          # a whole frame, since a link carries no parts of them
+
+A row of bytes has no marks. To the board a break is one: what follows begins a frame. From the board only silence is.
+The transport makes use of both when it is opened, and again when what comes cannot be a frame: a length that there is
+not, or a pause within it.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import termios
+import threading
+import time
+from types import TracebackType
+
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
+from fusesoc_firm.node.transport.transport import Burst, TransportError, TransportResetError
+
+DEFAULT_BAUD = 1_000_000
+"""The generic BAUD of the hardware unless a board sets it."""
+
+_HEADER_BYTES = ID_BYTES + LENGTH_BYTES
+_CHUNK_BYTES = 65536
+# What parts one frame from the next after bytes were lost; an adapter at the USB keeps some for milliseconds.
+_SILENT_SECONDS = 0.05
+# The line of a board that is never silent for so long cannot be understood.
+_MOST_SILENCE_SECONDS = 2.0
+# Within a frame from the board.
+_LONGEST_PAUSE_SECONDS = 0.2
+
+
+class UartTransport:
+    """A transport over a serial line."""
+
+    def __init__(
+        self, device: str, baud: int = DEFAULT_BAUD, *, has_flow_control: bool = False, longest: int = 2**26
+    ) -> None:
+        """Open `device`, with the wires RTS and CTS where it `has_flow_control`, else as fast as the line is.
+
+        No payload has more bytes than `longest`. Raises `TransportError`.
+        """
+        self._device = device
+        self._longest = longest
+        self._begun = bytearray()
+        self._receiving = threading.Lock()
+        self._sending = threading.Lock()
+        self._writing = threading.Lock()
+        self._cuts = 0
+        self._last_byte = 0.0  # when it came
+        self._is_closed = False
+        speed = getattr(termios, f"B{baud}", None)
+        if not speed:
+            raise TransportError(f"{baud} is no speed of a serial line; 115200, 1000000 and 2000000 are some")
+        try:
+            self._line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError as error:
+            raise TransportError(f"cannot open the serial line {device}: {error.strerror}") from None
+        # Closing wakes who waits.
+        self._wake, self._woken = os.pipe()
+        try:
+            _configure(self._line, speed, has_flow_control=has_flow_control)
+            self._cut()
+        except termios.error as error:
+            self.close()
+            raise TransportError(f"{device} is no serial line: {error.args[-1]}") from None
+
+    def send(self, frame: bytes) -> None:
+        """Send a whole frame; waits while the line is busy or held. Raises `TransportError`.
+
+        And `TransportResetError` if a break ends the frame.
+        """
+        rest = memoryview(frame)
+        with self._sending:
+            cuts = self._cuts
+            while rest:
+                if self._is_closed:
+                    raise TransportError("the transport is closed")
+                # A held line is looked at again, as a break may have come.
+                select.select([self._wake], [self._line], [], _LONGEST_PAUSE_SECONDS)
+                with self._writing:
+                    if self._cuts != cuts:
+                        raise TransportResetError(f"{self._device}: a break ended the frame that was on its way")
+                    rest = rest[self._write(rest) :]
+
+    def receive(self, timeout: float | None = None) -> Burst | None:
+        """The next frame as a burst. Raises `TransportError`, and `TransportResetError` where none can begin so."""
+        with self._receiving:
+            return self._receive(timeout)
+
+    def is_at_rest(self) -> None:
+        """Nothing: who is at the other end of a line may work at something."""
+
+    def close(self) -> None:
+        """Stop. A second call does nothing."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        os.close(self._woken)
+        # No descriptor is closed, and another file given its number, while a thread still uses it.
+        with self._receiving, self._sending:
+            os.close(self._line)
+            os.close(self._wake)
+
+    def __enter__(self) -> UartTransport:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _receive(self, timeout: float | None) -> Burst | None:
+        end = None if timeout is None else time.monotonic() + timeout
+        while not self._is_closed:
+            if frame := self._next_frame():
+                return Burst(frame)
+            rest = None if end is None else max(0.0, end - time.monotonic())
+            pause = self._last_byte + _LONGEST_PAUSE_SECONDS - time.monotonic() if self._begun else None
+            if self._is_readable(_least(rest, pause)):
+                self._begun += self._read()
+                self._last_byte = time.monotonic()
+            elif pause is not None and (rest is None or pause <= rest):
+                self._begin_anew("a frame stops before its end")
+            elif rest is not None:
+                return None
+        return None
+
+    def _cut(self) -> None:
+        """Send a break, and forget what came before it and what was to go."""
+        with self._writing:
+            self._cuts += 1
+            termios.tcflush(self._line, termios.TCOFLUSH)
+            termios.tcsendbreak(self._line, 0)
+        end = time.monotonic() + _MOST_SILENCE_SECONDS
+        while self._is_readable(_SILENT_SECONDS):
+            self._read()
+            if time.monotonic() > end:
+                raise TransportError(f"{self._device} is never silent, so no frame can be told from the next")
+        self._begun.clear()
+
+    def _begin_anew(self, why: str) -> None:
+        if self._is_closed:
+            return
+        self._cut()
+        raise TransportResetError(f"{self._device}: {why}; bytes were lost")
+
+    def _is_readable(self, seconds: float | None) -> bool:
+        return self._line in select.select([self._line, self._wake], [], [], seconds)[0]
+
+    def _next_frame(self) -> bytes | None:
+        """A frame that has come wholly; None while there is none."""
+        if len(self._begun) < _HEADER_BYTES:
+            return None
+        length = int.from_bytes(self._begun[ID_BYTES:_HEADER_BYTES], "little")
+        if length > self._longest:
+            self._begin_anew(f"a frame announces {length} bytes, more than {self._longest}")
+        end = _HEADER_BYTES + length
+        if len(self._begun) < end:
+            return None
+        frame = bytes(self._begun[:end])
+        del self._begun[:end]
+        return frame
+
+    def _read(self) -> bytes:
+        try:
+            data = os.read(self._line, _CHUNK_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError as error:
+            raise self._gone(error.strerror) from None
+        if not data:
+            raise self._gone("it was hung up")
+        return data
+
+    def _write(self, data: memoryview) -> int:
+        try:
+            return os.write(self._line, data[:_CHUNK_BYTES])
+        except BlockingIOError:
+            return 0
+        except OSError as error:
+            raise self._gone(error.strerror) from None
+
+    def _gone(self, reason: str | None) -> TransportError:
+        return TransportError("the transport is closed" if self._is_closed else f"{self._device} is gone: {reason}")
+
+
+def _configure(line: int, speed: int, *, has_flow_control: bool) -> None:
+    """Bytes as they are, at a speed."""
+    control = termios.CS8 | termios.CREAD | termios.CLOCAL
+    if has_flow_control:
+        control |= termios.CRTSCTS
+    special = termios.tcgetattr(line)[6]
+    # Of what comes, breaks are no bytes; nothing is echoed or waited for.
+    termios.tcsetattr(line, termios.TCSANOW, [termios.IGNBRK, 0, control, 0, speed, speed, special])
+
+
+def _least(*seconds: float | None) -> float | None:
+    """The shortest of some times, None being none."""
+    return min((max(0.0, item) for item in seconds if item is not None), default=None)

@@ -1,0 +1,182 @@
+"""The lock file of a system: which message definitions, cores and tools it uses, so that another build uses the same.
+
+What a core itself consists of is its author's to change and is not locked; all that it takes from elsewhere is. `firm`
+holds a core to its lock as a whole (`check_lock`), a generator its own request (`check_request`): that sees neither the
+cores beside it nor the programs of a target.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.building.cores import ProjectCore
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.request.request import LoadedRequest
+from fusesoc_firm.store.reads import Input
+from fusesoc_firm.text.diagnostics import Diagnostics, fail
+from fusesoc_firm.text.files import read_regular
+from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
+from fusesoc_firm.tools.programs import facts_of, installed_programs, packages
+
+Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
+"""By kind (`messages`, `cores`, `tools`) and name: facts by name."""
+
+_PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
+_HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
+_WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
+
+
+def lock_path(core: ProjectCore) -> Path:
+    """Where the lock file of a core is: beside its description."""
+    return core.files[0].with_suffix(".lock")
+
+
+def lock_of(
+    core: ProjectCore, depends: Iterable[ProjectCore], generated: Mapping[str, Sequence[LoadedRequest]]
+) -> Lock:
+    """What a core uses now: itself, and the cores that it `depends` on, with what each has `generated` by its name.
+
+    A message that two of them take from different places is listed for each.
+    """
+    depends = list(depends)
+    messages: dict[str, dict[str, str]] = {}
+    for item in (core, *depends):
+        for loaded in generated.get(item.vlnv, ()):
+            for label, facts in _messages(loaded).items():
+                if messages.setdefault(label, facts) != facts:
+                    messages[_of_request(label, loaded)] = facts
+    return {
+        "messages": dict(sorted(messages.items())),
+        "cores": {item.vlnv: {"sha256": _digest_of_core(item, generated.get(item.vlnv, ()))} for item in depends},
+        "tools": _tools(),
+    }
+
+
+def lock_text(lock: Lock) -> str:
+    """The lock file."""
+    data = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
+    return _HEAD + yaml_dump(data)
+
+
+def read_lock(path: Path) -> Lock:
+    """A lock file. Raises `InputError` if it cannot be read or is none."""
+    try:
+        data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
+        return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
+    except OSError as error:
+        fail(f"cannot read {path}: {error.strerror}", hint="firm lock writes it")
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
+        fail(f"{path} is no lock file", hint="firm lock writes it anew")
+
+
+def check_lock(locked: Lock, used: Lock) -> None:
+    """Raise `InputError` with everything in which what is used differs from what is locked.
+
+    A program that is installed and not locked is no difference: what was locked did without it.
+    """
+    faults = Diagnostics()
+    for difference in _differences(locked, used):
+        faults.error(difference)
+    faults.raise_if_any()
+
+
+def check_request(path: Path, loaded: LoadedRequest) -> None:
+    """Raise `InputError` with what a request uses that differs from a lock file: messages and packages."""
+    locked = read_lock(path)
+    faults = Diagnostics()
+    for label, now in _messages(loaded).items():
+        was = locked["messages"].get(_of_request(label, loaded), locked["messages"].get(label))
+        for difference in _difference("message", label, was, now):
+            faults.error(difference, hint=f"by {path}")
+    for name, now in packages(_PACKAGES).items():
+        if (was := locked["tools"].get(name)) is not None:
+            for difference in _difference("tool", name, was, now):
+                faults.error(difference, hint=f"by {path}")
+    faults.raise_if_any()
+
+
+def _differences(locked: Lock, used: Lock) -> Iterator[str]:
+    for kind, word in _WORDS.items():
+        for name in sorted(locked[kind].keys() | used[kind].keys()):
+            was, now = locked[kind].get(name), used[kind].get(name)
+            if now is None:
+                yield f"{word} {name} is locked, but not {'installed' if kind == 'tools' else 'used'}"
+            elif was is not None or kind != "tools":
+                yield from _difference(word, name, was, now)
+
+
+def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mapping[str, str]) -> Iterator[str]:
+    """In what a thing that is used differs from what is locked."""
+    if was is None:
+        yield f"{word} {name} is used, but not locked"
+        return
+    for fact in sorted(was.keys() | now.keys()):
+        if was.get(fact) != now.get(fact):
+            yield f"{word} {name}: {fact} is {now.get(fact)}, but {was.get(fact)} is locked"
+
+
+def _messages(loaded: LoadedRequest) -> dict[str, dict[str, str]]:
+    """The facts of each message that a request leads to."""
+    return {
+        f"{name} ({library.ros.title})": _message(name, library, loaded.request.files_root.resolve())
+        for library, definitions in loaded.definitions()
+        for name in definitions
+    }
+
+
+def _of_request(label: str, loaded: LoadedRequest) -> str:
+    return f"{label} of {loaded.request.vlnv}"
+
+
+def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[str, str]:
+    origin = library.origin(name)
+    # Told from the core's folder, it is the same in every copy of the project.
+    if Path(origin).is_absolute() and Path(origin).resolve().is_relative_to(folder):
+        origin = os.path.relpath(Path(origin).resolve(), folder)
+    return {
+        "source": origin,
+        "sha256": hashlib.sha256(library.content(name)).hexdigest(),
+        "signature": signature(name, library.closure(name)),
+    }
+
+
+def _digest_of_core(core: ProjectCore, generated: Sequence[LoadedRequest]) -> str:
+    """The digest of a core's files, and of what is generated for it is made of, by their names from its description."""
+    folder = core.files[0].parent
+    made_of = [item for loaded in generated for item in loaded.inputs]
+    return _digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
+
+
+def _digest_of(found: Mapping[str, str | None]) -> str:
+    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+
+
+def _named(item: Input, folder: Path) -> str:
+    """An input's name, told from a folder."""
+    if isinstance(item, Path):
+        return os.path.relpath(item.resolve(), folder)
+    return f"{os.path.relpath(item.path.resolve(), folder)}:{item.name}"
+
+
+def _digest(item: Input) -> str | None:
+    if not isinstance(item, Path):
+        return hashlib.sha256(item.content).hexdigest()
+    return hashlib.sha256(item.read_bytes()).hexdigest() if item.is_file() else None
+
+
+def _tools() -> dict[str, dict[str, str]]:
+    tools = packages(_PACKAGES)
+    for program, path in installed_programs():
+        # A program of the same version is the same program, on another machine too.
+        if facts := {name: fact for name, fact in facts_of(program, path).items() if name != "sha256"}:
+            tools[program] = facts
+    return dict(sorted(tools.items()))

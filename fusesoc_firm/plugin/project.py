@@ -1,0 +1,137 @@
+"""A project's cores and their calls of our generators: what an edit touches, what a core uses, where messages are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from fusesoc_firm.building.cores import (
+    ProjectCore,
+    affected,
+    changed_files,
+    core_graph,
+    dependencies,
+    project_cores,
+)
+from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES
+from fusesoc_firm.plugin.lock_file import Lock, check_lock, lock_of, lock_path, lock_text, read_lock
+from fusesoc_firm.request.calls import make_request
+from fusesoc_firm.request.core_reader import core_name
+from fusesoc_firm.request.message_core import folders
+from fusesoc_firm.request.request import GeneratorCall, LoadedRequest, Request
+from fusesoc_firm.store.own_code import PACKAGE, names
+from fusesoc_firm.text.diagnostics import InputError, SourceRef, fail
+from fusesoc_firm.text.outputs import shown, write
+
+
+def graph(core: str, target: str) -> str:
+    """What a target of a core depends on, in Graphviz's language. Raises `InputError`."""
+
+    def sources(call: GeneratorCall) -> list[str]:
+        request = _request(call)
+        # Told from here, files of one name in two cores are two.
+        return [] if request is None else [*map(shown, _input_files(request))]
+
+    return core_graph(core, target, sources)
+
+
+def affected_since(revision: str) -> dict[str, str]:
+    """The cores that the edits since a revision touch, each with the reason. Raises `InputError`."""
+    changed = dict.fromkeys(path.resolve() for path in changed_files(revision, Path.cwd()))
+    return affected(project_cores(), _touched(changed))
+
+
+def check_locked(core: str) -> Path:
+    """Raise `InputError` with everything in which a core, by its name, differs from its lock file, which is returned.
+
+    Where that file is missing, there is nothing to hold the core to, which is a fault, too.
+    """
+    found, depends = dependencies(core)
+    path = lock_path(found)
+    locked = read_lock(path)
+    check_lock(locked, _used(found, depends))
+    return path
+
+
+def write_lock(core: str) -> Path:
+    """Write the lock file of a core, by its name. Raises `InputError`."""
+    found, depends = dependencies(core)
+    path = lock_path(found)
+    write(path, lock_text(_used(found, depends)))
+    return path
+
+
+def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
+    """The folders of cores that carry messages, where these lie: there is no run that copies them."""
+    found: list[Path] = []
+    cores = {name: core for core in project_cores() for name in core.names}
+    for name, source in named.items():
+        core = cores.get(core_name(name))
+        requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []
+        if not requests:
+            fail(f"'{name}' is no core with messages that FuseSoC knows here", source)
+        found += [folder for request in requests if request for folder in folders(request)]
+    return tuple(found)
+
+
+def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
+    """What a core uses now."""
+    calls = {core.vlnv: [*_requests(core)]}
+    for item in depends:
+        # Of another one only part may be used here. Where that cannot be made, FuseSoC's run says so.
+        with suppress(InputError):
+            calls[item.vlnv] = [*_requests(item)]
+    return lock_of(core, depends, calls)
+
+
+def _requests(core: ProjectCore) -> Iterator[LoadedRequest]:
+    """What a core has generated, and what that leads to."""
+    for call in core.calls:
+        if call.generator != MESSAGES and (request := _request(call)):
+            yield GENERATORS[request.command].load(request)
+
+
+def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
+    """What tells by which of the changed files a core itself is touched."""
+
+    def touched(core: ProjectCore) -> str | None:
+        found = _first(changed, core.files)
+        # What is behind a generated core takes longer to tell.
+        for call in core.calls if changed and not found else ():
+            found = found or _first(changed, _files_behind(call, changed))
+        return shown(found) if found else None
+
+    return touched
+
+
+def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
+    return next((path for path in changed if path in files), None)
+
+
+def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
+    """All that a generated core is made of, our own files too."""
+    try:
+        request = _request(call)
+        if request is None:
+            return set()
+        files = set(_input_files(request))
+    except InputError:
+        # It cannot be made: whatever changed beside it, or in our own files, may be why.
+        roots = (Path(call.files_root).resolve(), PACKAGE)
+        return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
+    return files | {PACKAGE / name for name in names()}
+
+
+def _request(call: GeneratorCall) -> Request | None:
+    """The request that FuseSoC would make; None for a generator that is not ours."""
+    if call.generator not in GENERATORS:
+        return None
+    return make_request(call, GENERATORS[call.generator].parameters, message_folders)
+
+
+def _input_files(request: Request) -> list[Path]:
+    """The files that a request depends on, be it in part."""
+    inputs = GENERATORS[request.command].load(request).inputs
+    found = (item if isinstance(item, Path) else item.path for item in inputs)
+    return [*dict.fromkeys(path.resolve() for path in found)]

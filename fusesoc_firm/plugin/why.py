@@ -1,0 +1,240 @@
+"""Why a generated line is as it is: the lines of template, specification and messages that made it.
+
+The template's line and the scope in its context are followed while it is rendered again. The lines of the
+specification and of messages are found by names: of the blocks on the line or, if there are none, of the innermost
+scope with some, and of the fields within these blocks' messages or, in a file about a message, within that one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.converter.converter_core import order_of_request
+from fusesoc_firm.message.model import MessageName, nested_message
+from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.plugin.answer import read_request
+from fusesoc_firm.plugin.generators import GENERATORS
+from fusesoc_firm.request.calls import read_call
+from fusesoc_firm.request.request import GeneratedCore, Request
+from fusesoc_firm.request.requesting_core import find_requesting_core
+from fusesoc_firm.store.reads import Input
+from fusesoc_firm.system.system_core import load_requested
+from fusesoc_firm.system.written.specification import Specification
+from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.render import Rendering, TracedLine, recorded, traced_lines
+
+Message = tuple[MessageName, Definitions]
+
+_WORD = re.compile(r"[A-Za-z]\w*")
+_STEP = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
+# What stands between a block's name and a field's in the name of a signal.
+_SIDE = re.compile(r"(?:in|out)\d*_")
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A line of a generated file, and the places that made it."""
+
+    line: TracedLine
+    specification: tuple[SourceRef, ...]
+    messages: tuple[SourceRef, ...]
+
+
+@dataclass(frozen=True)
+class Names:
+    """The places of what a line may name: blocks, and the fields and constants of each block's messages and of all."""
+
+    blocks: Mapping[str, SourceRef]
+    fields: Mapping[str, Mapping[str, SourceRef]]
+    messages: Mapping[str, Mapping[str, SourceRef]]
+
+
+def why(path: Path) -> list[Reason]:
+    """Why each line of a generated file of a build is as it is. Raises `InputError`."""
+    call, name = call_file(path)
+    command = _generator(call)
+    request = read_request(command, call, GENERATORS[command])
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        fail(f"{path} is no text that can be read: {error}")
+    loaded = GENERATORS[command].load(request)
+    rendering = rendering_of(loaded.generate, name, text, loaded.inputs)
+    return reasons(rendering, _names(request))
+
+
+def _generator(path: Path) -> str:
+    """The generator that a call is for. FuseSoC's file does not say it, but the core that makes the call does."""
+    call = read_call(path)
+    generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
+    if generator not in GENERATORS:
+        fail(
+            f"no core in {call.files_root} has a generator of ours make {call.vlnv} any more",
+            hint="generate it again with fusesoc run --setup",
+        )
+    return generator
+
+
+def _names(request: Request) -> Names:
+    """What a line of a generated core may name."""
+    if request.command == "far":
+        loaded = load_requested(request)
+        return names_of(loaded.specification, loaded.messages())
+    return names_of(None, [(wanted.message, wanted.definitions) for wanted in order_of_request(request).messages])
+
+
+def rendering_of(
+    generate: Callable[[], GeneratedCore], name: str, text: str, inputs: Iterable[Input] = ()
+) -> Rendering:
+    """What the file `name` of a generated core, which is made of `inputs`, is made of.
+
+    Raises `InputError` if no template made it, or not this `text`.
+    """
+    with recorded() as renderings:
+        core = generate()
+    if name not in core.files:
+        fail(f"'{name}' is none of the generated core's files", hint=f"these are {', '.join(core.files)}")
+    content = core.files[name].content
+    made = content if isinstance(content, str) else content.decode(errors="replace")
+    if made != text:
+        fail(f"'{name}' is not what would be generated now", hint="generate it again with fusesoc run --setup")
+    if made not in renderings:
+        copied = [
+            str(item)
+            for item in inputs
+            if isinstance(item, Path) and item.is_file() and item.read_bytes() == text.encode()
+        ]
+        fail(f"'{name}' is of no template", hint=f"it is a copy of {copied[0]}" if copied else "it is data")
+    return renderings[made]
+
+
+def reasons(rendering: Rendering, names: Names) -> list[Reason]:
+    """Why each line is as it is."""
+    lines = traced_lines(rendering)
+    text = "\n".join(line.text for line in lines)
+    # The file's own messages, for fields without a block before them.
+    own: dict[str, SourceRef] = {}
+    for message, fields in names.messages.items():
+        if re.search(rf"\b{re.escape(message)}\b", text):
+            own |= fields
+    return [_reason(line, rendering.context, names, own) for line in lines]
+
+
+def names_of(specification: Specification | None, messages: Iterable[Message]) -> Names:
+    """The names in a specification and in messages, each of them given with all definitions within it."""
+    fields = {str(name): dict(_fields(name, definitions)) for name, definitions in messages}
+    blocks: dict[str, SourceRef] = {}
+    of_blocks: dict[str, dict[str, SourceRef]] = {}
+    for block in specification.blocks if specification else ():
+        if block.name and block.name.source:
+            word = identifier(block.name).lower()
+            blocks[word] = block.name.source
+            of_blocks[word] = {
+                field: place
+                for message in _messages(block.name, specification)
+                for field, place in fields.get(message, {}).items()
+            }
+    return Names(blocks, of_blocks, fields)
+
+
+def _messages(name: str, specification: Specification | None) -> Iterator[str]:
+    """The messages of a block, as the specification names them."""
+    assert specification is not None
+    types = {str(item.name): item for item in specification.accelerators}
+    for block in specification.blocks:
+        if block.name == name and block.message:
+            yield str(block.message)
+        elif block.name == name and block.type and (type_ := types.get(str(block.type))):
+            yield from (str(side.message) for side in (*type_.interface.input, *type_.interface.output))
+
+
+def _fields(
+    name: MessageName, definitions: Definitions, above: tuple[str, ...] = ()
+) -> Iterator[tuple[str, SourceRef]]:
+    """What a port of each field is called, those within it too, and each constant, with its place."""
+    definition = definitions[name]
+    for constant in definition.constants:
+        yield constant.name.lower(), constant.source
+    for field in definition.fields:
+        path = (*above, field.name)
+        yield identifier(*path).lower(), field.source
+        if nested := nested_message(field.type):
+            yield from _fields(nested, definitions, path)
+
+
+def _reason(line: TracedLine, context: Mapping[str, object], names: Names, own: Mapping[str, SourceRef]) -> Reason:
+    words = _words(line.text)
+    blocks: dict[SourceRef, None] = {}
+    fields: dict[SourceRef, None] = {}
+    for word in words:
+        if block := _block(word, names.blocks):
+            blocks[names.blocks[block]] = None
+            rest = _SIDE.sub("", word[len(block) + 1 :], count=1)
+            if place := _longest(rest, names.fields[block]):
+                fields[place] = None
+    if not blocks:
+        blocks = dict.fromkeys(_scope_blocks(line.scope, context, names))
+        fields = {place: None for word in words if (place := own.get(word))}
+    return Reason(line, tuple(blocks), tuple(fields))
+
+
+def _scope_blocks(scope: str, context: Mapping[str, object], names: Names) -> list[SourceRef]:
+    """The places of the blocks that are named in the innermost scope with any; the whole file's is of none."""
+    data: object = context
+    found: list[SourceRef] = []
+    for key, number in _STEP.findall(scope):
+        assert isinstance(data, Mapping)
+        data = data[key]
+        if number:
+            assert isinstance(data, Sequence)
+            data = data[int(number)]
+        values = data.values() if isinstance(data, Mapping) else [data]
+        words = [word for value in values if isinstance(value, str) for word in _words(value)]
+        blocks = dict.fromkeys(block for word in words if (block := _block(word, names.blocks)))
+        found = [names.blocks[block] for block in blocks] or found
+    return found
+
+
+def _words(text: str) -> list[str]:
+    return [*dict.fromkeys(word.lower() for word in _WORD.findall(text))]
+
+
+def _block(word: str, blocks: Iterable[str]) -> str | None:
+    """The block whose signal or instance a word is."""
+    bare = word.removeprefix("u_")
+    found = [block for block in blocks if bare == block or bare.startswith(f"{block}_")]
+    return max(found, key=len, default=None)
+
+
+def _longest(word: str, fields: Mapping[str, SourceRef]) -> SourceRef | None:
+    """The place of the field that a word begins with: what follows may be `_length`, `_axis_tdata` and the like."""
+    found = [field for field in fields if word == field or word.startswith(f"{field}_")]
+    return fields[max(found, key=len)] if found else None
+
+
+def call_file(path: Path) -> tuple[Path, str]:
+    """FuseSoC's call of the generator that made a file, and the file's name in the generated core.
+
+    The file lies below `generator_cache`, or is its copy below `src`. Raises `InputError` if there is no such call.
+    """
+    path = path.absolute()
+    places = [(folder, place) for folder in path.parents for place in (folder, *_caches(folder))]
+    found = ((call, folder) for folder, place in places for call in sorted(place.glob("*_input.yml")))
+    call, folder = next(found, (None, path))
+    if call is None:
+        fail(
+            f"no generator made {path}",
+            hint="what one made lies in a build, below 'generator_cache' or in the folder of a core <core>-<instance>",
+        )
+    return call, path.relative_to(folder).as_posix()
+
+
+def _caches(folder: Path) -> list[Path]:
+    """Where FuseSoC has the core of which `folder` is the copy."""
+    if folder.parent.name != "src":
+        return []
+    return sorted((folder.parent.parent / "generator_cache").glob(f"{folder.name}-*"))

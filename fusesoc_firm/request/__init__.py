@@ -1,0 +1,1 @@
+"""A generator call's parameters, and the core that answers it."""

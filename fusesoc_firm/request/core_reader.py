@@ -1,0 +1,75 @@
+"""A `.core` file: what it says, and where. Whoever looks into one reads it here.
+
+FuseSoC's own reading of it, with the cores that it depends on and for the flags of a target, is `building`'s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.yaml_text import LARGE, YamlText, data_of, read_yaml
+
+
+@dataclass(frozen=True)
+class CoreFile:
+    """A `.core` file that has been read."""
+
+    path: Path
+    text: YamlText
+
+    @cached_property
+    def data(self) -> Mapping[str, Any]:
+        """What it says, with what YAML inherits; nothing where it is no mapping. Raises `InputError`."""
+        try:
+            data = data_of(self.text.root)
+        except yaml.YAMLError as error:
+            fail(f"cannot read {self.path}: {error}")
+        return data if isinstance(data, dict) else {}
+
+    def section(self, name: str) -> dict[str, dict[str, Any]]:
+        """The items of a section by name, those that say nothing too. Raises `InputError`."""
+        section = self.data.get(name)
+        items = section.items() if isinstance(section, dict) else ()
+        return {str(key): item if isinstance(item, dict) else {} for key, item in items}
+
+    def parameters(self, instance: str) -> dict[str, Any]:
+        """Those that the core gives to a generator for an instance. Raises `InputError`."""
+        parameters = self.section("generate").get(instance, {}).get("parameters")
+        return parameters if isinstance(parameters, dict) else {}
+
+    def item(self, *keys: str) -> tuple[yaml.Node, yaml.Node] | None:
+        """The key and value nodes of an item of mappings within each other, as written; None where there is none."""
+        node, found = self.text.root, None
+        for key in keys:
+            pairs = node.value if isinstance(node, yaml.MappingNode) else ()
+            if (found := next((pair for pair in pairs if pair[0].value == key), None)) is None:
+                return None
+            node = found[1]
+        return found
+
+    def source(self, node: yaml.Node) -> SourceRef:
+        """The place of a node."""
+        return self.text.source(node)
+
+
+def read_core(path: Path) -> CoreFile:
+    """Read a `.core` file. Raises `InputError`, at the place of the fault, if it cannot be read or is no YAML."""
+    return CoreFile(path, read_yaml(path, bounds=LARGE))
+
+
+@lru_cache(maxsize=8)
+def read_core_once(path: Path, _changed: int) -> CoreFile:
+    """The same for a process that makes many of a core's instances."""
+    return read_core(path)
+
+
+def core_name(vlnv: str) -> str:
+    """The name of a core without its version."""
+    return ":".join(vlnv.split(":")[:3])

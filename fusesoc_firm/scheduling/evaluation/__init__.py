@@ -1,0 +1,1 @@
+"""The dissertation's evaluation (section 4.3), reproduced: workloads, simulation, metrics, tables."""

@@ -1,0 +1,37 @@
+"""The combined schedulers of section 4.3.5: two schedulers of half the accelerators each below an LRU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from fusesoc_firm.scheduling.models import Combined, Generics, make_model
+
+COMBINED_REQUESTERS = 256
+"""The accelerators of figure 4.18 and of table 4.5."""
+
+BASELINES: Mapping[str, str] = MappingProxyType({"LOEDF256": "edf_latency", "LST256": "lst"})
+"""What they are compared with: the name in table 4.5, and the policy."""
+
+COMBINATIONS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "(LOEDF128+LOEDF128)+LRU2": ("edf_latency", "edf_latency"),
+        "(LOEDF128+LST128)+LRU2": ("edf_latency", "lst"),
+        "(LST128+LST128)+LRU2": ("lst", "lst"),
+        "(LST128+LOEDF128)+LRU2": ("lst", "edf_latency"),
+    }
+)
+"""The policies of the lower and of the upper half of the accelerators, by the name in table 4.5."""
+
+TOP = "lru"
+"""The policy that chooses between the halves."""
+
+
+def combined(policies: tuple[str, str], generics: Generics) -> Combined:
+    """The model of a combination, whose two halves have the requesters in their order."""
+    half = generics.requesters // 2
+    parts = (slice(0, half), slice(half, None))
+    groups = [make_model(policy, generics.part(part)) for policy, part in zip(policies, parts, strict=True)]
+    return Combined(groups, make_model(TOP, Generics(np.ones((generics.batch, 2), np.int64))))

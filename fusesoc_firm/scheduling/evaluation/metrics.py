@@ -1,0 +1,126 @@
+"""The metrics of section 4.3, of each set and over the sets of a data set.
+
+The dissertation says how each is defined, not how it is brought together. Here the minimum, the average and the maximum
+are taken over the tasks of a set, then the mean of each over the sets: so tables 4.3 and 4.4 have fractions in all
+three columns, and the models of the fixed priorities and of LRU come to their values with it.
+
+The response time is that of every granted task, though equation 4.4 speaks of completed transactions: the maxima of
+table 4.3 come out only with those that the simulation's end cut short (docs/explanation/scheduler-evaluation.md).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fusesoc_firm.scheduling.evaluation.simulation import Trace
+from fusesoc_firm.scheduling.evaluation.workloads import Times
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """All metrics of section 4.3, an element a set, shape (B,); NaN where a set has no task to measure.
+
+    Times are in cycles.
+    """
+
+    granted: Values
+    """Accelerators that got the grant at least once (figure 4.6)."""
+    finished: Values
+    """Accelerators that completed at least one transaction (figure 4.6)."""
+    completed: Values
+    """Tasks that were completed."""
+    preemptions: Values
+    """Preemptions an accelerator for each of its completed transactions, averaged over the accelerators that completed
+    one (figure 4.7)."""
+    response_min: Values
+    response_avg: Values
+    response_max: Values
+    """Response time g - a (equation 4.3) of granted tasks, completed or not (table 4.3)."""
+    lateness_min: Values
+    lateness_avg: Values
+    lateness_max: Values
+    """Lateness f - d of completed transactions (equation 4.5; table 4.4); the deadline is implicit."""
+    utilisation: Values
+    """Channel utilisation (equation 4.6): cycles with a beat, of all cycles, in percent."""
+    utilisation_requested: Values
+    """The same of the cycles in which somebody asked, in percent."""
+
+    def means(self) -> dict[str, float]:
+        """The mean of each metric over the sets, leaving out those without a value; NaN if none has one."""
+        return {each.name: _mean(getattr(self, each.name)) for each in fields(self)}
+
+
+METRICS = tuple(each.name for each in fields(Metrics))
+
+
+def measure(trace: Trace) -> Metrics:
+    """The metrics of a simulation."""
+    tasks, sets, requesters = trace.tasks, trace.workload.sets, trace.workload.requesters
+    done = tasks.is_finished
+    of_set, of_requester = tasks.set[done], tasks.requester[done]
+    deadline = tasks.arrival[done] + trace.workload.deadlines[of_set, of_requester]
+    response = _Spread(tasks.set, tasks.grant - tasks.arrival, sets)
+    lateness = _Spread(of_set, tasks.finish[done] - deadline, sets)
+    completed = np.bincount(of_set * requesters + of_requester, minlength=sets * requesters).reshape(sets, requesters)
+    return Metrics(
+        granted=_distinct(tasks.set, tasks.requester, sets, requesters),
+        finished=_distinct(of_set, of_requester, sets, requesters),
+        completed=completed.sum(axis=1).astype(float),
+        preemptions=_preemptions(trace, completed),
+        response_min=response.minimum,
+        response_avg=response.average,
+        response_max=response.maximum,
+        lateness_min=lateness.minimum,
+        lateness_avg=lateness.average,
+        lateness_max=lateness.maximum,
+        utilisation=100 * trace.busy / trace.cycles,
+        utilisation_requested=_ratio(100 * trace.busy, trace.requested),
+    )
+
+
+class _Spread:
+    """Minimum, average and maximum of the values of each set."""
+
+    def __init__(self, of_set: Times, values: Times, sets: int) -> None:
+        counts = np.bincount(of_set, minlength=sets)
+        self.average = _ratio(np.bincount(of_set, weights=values, minlength=sets), counts)
+        lowest = np.full(sets, np.inf)
+        highest = np.full(sets, -np.inf)
+        np.minimum.at(lowest, of_set, values)
+        np.maximum.at(highest, of_set, values)
+        self.minimum = np.where(counts > 0, lowest, np.nan)
+        self.maximum = np.where(counts > 0, highest, np.nan)
+
+
+def _distinct(of_set: Times, of_requester: Times, sets: int, requesters: int) -> Values:
+    """How many requesters of each set occur."""
+    found = np.zeros((sets, requesters), np.bool_)
+    found[of_set, of_requester] = True
+    return np.asarray(found.sum(axis=1), float)
+
+
+def _preemptions(trace: Trace, completed: Times) -> Values:
+    """Those of unfinished tasks count too, in the accelerators that completed another one."""
+    tasks = trace.tasks
+    found = np.zeros(completed.shape)
+    np.add.at(found, (tasks.set, tasks.requester), tasks.preemptions)
+    each = np.where(completed > 0, found / np.maximum(completed, 1), 0.0)
+    return _ratio(each.sum(axis=1), (completed > 0).sum(axis=1))
+
+
+def _ratio(numerator: Any, denominator: Any) -> Values:
+    """Element by element; NaN over 0."""
+    ratio: Values = np.where(denominator > 0, numerator / np.maximum(denominator, 1), np.nan)
+    return ratio
+
+
+def _mean(values: Values) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if known.size else math.nan

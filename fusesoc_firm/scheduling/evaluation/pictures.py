@@ -1,0 +1,95 @@
+"""Figures as pictures, with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.scheduling.evaluation.timeline import Timeline
+from fusesoc_firm.scheduling.tables import Figure, Panel
+
+SUFFIXES = ("png", "svg")
+
+_PANEL_INCHES = (6.0, 4.0)
+_TIMELINE_INCHES = (9.0, 3.0)
+_MARKERS = "osv^DPX"
+# Without the date and the random names that matplotlib puts into a file, the same values give the same bytes.
+_SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
+_METADATA = {"png": {"Software": None}, "svg": {"Date": None}}
+
+
+def are_possible() -> bool:
+    """Whether matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
+def draw_figure(figure: Figure, folder: Path) -> None:
+    """Draw a figure, ours in full lines and the dissertation's in dashed ones."""
+    plots = _plots()
+    columns = min(2, len(figure.panels))
+    rows = -(-len(figure.panels) // columns)
+    size = (_PANEL_INCHES[0] * columns, _PANEL_INCHES[1] * rows)
+    drawing, axes = plots.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
+    drawing.suptitle(f"Figure {figure.number}: {figure.title}")
+    draw_panel = _draw_lines if len(figure.requesters) > 1 else _draw_bars
+    for panel, axis in zip(figure.panels, axes.flat, strict=False):
+        draw_panel(axis, figure, panel)
+    for axis in axes.flat[len(figure.panels) :]:
+        axis.set_visible(False)
+    _save(drawing, folder / figure.file_name)
+
+
+def draw_timeline(timeline: Timeline, folder: Path) -> None:
+    """Draw requests as thin bars, and the grant as thick ones over them."""
+    plots = _plots()
+    drawing, axis = plots.subplots(figsize=_TIMELINE_INCHES, layout="constrained")
+    axis.set_title(f"Figure {timeline.number}: {timeline.title}")
+    for index, bits in enumerate(timeline.requests):
+        served = [bit and timeline.granted[cycle] == index for cycle, bit in enumerate(bits)]
+        for cycles, height, colour in ((bits, 0.3, "C7"), (served, 0.7, f"C{index}")):
+            spans = [(cycle, 1) for cycle, is_high in enumerate(cycles) if is_high]
+            axis.broken_barh(spans, (index - height / 2, height), color=colour, linewidth=0)
+    axis.set_yticks(range(len(timeline.requests)), [f"Acc{index}" for index in range(len(timeline.requests))])
+    axis.invert_yaxis()
+    axis.set_xlabel("clock cycle; thin: request, thick: granted")
+    _save(drawing, folder / timeline.file_name)
+
+
+def _plots() -> Any:
+    matplotlib: Any = import_module("matplotlib")
+    matplotlib.use("Agg")
+    matplotlib.rcParams.update(_SETTINGS)
+    return import_module("matplotlib.pyplot")
+
+
+def _draw_bars(axis: Any, figure: Figure, panel: Panel) -> None:
+    """Of a single number of accelerators: a bar for each scheduler."""
+    heights = [values[0] for values in panel.series.values()]
+    axis.barh(list(panel.series), heights)
+    axis.invert_yaxis()
+    axis.set_title(f"{panel.title}, {figure.requesters[0]} accelerators")
+    axis.set_xlabel(figure.unit)
+    axis.grid(visible=True, axis="x", alpha=0.3)
+
+
+def _draw_lines(axis: Any, figure: Figure, panel: Panel) -> None:
+    places = range(len(figure.requesters))
+    for index, (name, values) in enumerate(panel.series.items()):
+        style = {"color": f"C{index}", "marker": _MARKERS[index % len(_MARKERS)], "markersize": 4}
+        axis.plot(places, values, label=name, **style)
+        if name in panel.dissertation:
+            axis.plot(places, panel.dissertation[name], linestyle="--", alpha=0.5, **style)
+    axis.set_title(f"{panel.title}; dashed: dissertation" if panel.dissertation else panel.title)
+    axis.set_xticks(places, [str(number) for number in figure.requesters])
+    axis.set_xlabel("accelerators")
+    axis.set_ylabel(figure.unit)
+    axis.grid(visible=True, alpha=0.3)
+    axis.legend()
+
+
+def _save(drawing: Any, path: Path) -> None:
+    for suffix in SUFFIXES:
+        drawing.savefig(path.with_suffix(f".{suffix}"), metadata=_METADATA[suffix])
+    _plots().close(drawing)

@@ -1,0 +1,1 @@
+"""The stimuli, reference answers and simulators of a system."""

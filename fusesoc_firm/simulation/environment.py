@@ -1,0 +1,40 @@
+"""What stands at a system's pins in its simulation: VHDL of the user's, such as motors behind a PWM output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+
+from fusesoc_firm.request.request import GeneratedFile
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.written.specification import SOURCE_SUFFIXES
+from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.naming import identifier
+
+
+def environment_files(
+    paths: Mapping[Path, SourceRef | None], system: DerivedSystem
+) -> dict[PurePosixPath, GeneratedFile]:
+    """The files of the environment as those of the simulation's core, in their order.
+
+    The last one is called after the entity that the test bench instantiates. Raises `InputError` for a file that cannot
+    be one of them.
+    """
+    taken = {
+        system.entity,
+        f"{system.entity}_tb",
+        f"{system.entity}_live",
+        *(item.entity for item in system.accelerator_types),
+    }
+    files: dict[PurePosixPath, GeneratedFile] = {}
+    for path, source in paths.items():
+        if not any(block.type.accelerator.pins for block in system.accelerators):
+            fail(f"system '{system.name}' has no pins, so there is no place for an environment", source)
+        if not path.is_file():
+            fail(f"there is no file '{path}'", source, "the paths of 'environment' are relative to the core")
+        if path.suffix.lower() not in SOURCE_SUFFIXES["VHDL"] or identifier(path.stem) != path.stem:
+            fail(f"'{path.name}' is not the name of a VHDL entity's file", source, "such as motors.vhd")
+        if path.stem.lower() in {entity.lower() for entity in taken}:
+            fail(f"the system has an entity '{path.stem}' already; the environment needs another name", source)
+        files[PurePosixPath("environment", path.name)] = GeneratedFile(path.read_bytes(), "vhdlSource-93")
+    return files

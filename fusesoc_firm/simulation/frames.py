@@ -1,0 +1,75 @@
+"""The simulated host's two files: stimuli and expected frames as text (docs/reference/simulation-host.md)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
+from typing import Any
+
+from fusesoc_firm.frame.codec import pack_frame, used_bytes
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
+from fusesoc_firm.simulation.reference import Response
+from fusesoc_firm.simulation.stimuli import Stimulus
+from fusesoc_firm.system.derived.model import Converter, Topic
+
+_BYTES_A_LINE = 32
+_LABEL_WIDTH = 160
+
+
+def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter]) -> str:
+    """The stimulus file."""
+    ids = {item.block: item.id for item in subscribers}
+    lines: list[str] = []
+    for stimulus in stimuli:
+        lines.append(f"> {_label(stimulus.subscriber, stimulus.message)}")
+        lines += _hex_lines(pack_frame(ids[stimulus.subscriber.block], stimulus.payload), None)
+    return "\n".join(lines) + "\n"
+
+
+def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]) -> str:
+    """The expected file; padding may hold any byte."""
+    ids = {item.block: item.id for item in publishers}
+    lines: list[str] = []
+    for response in responses:
+        publisher = response.publisher
+        cause = "" if response.cause is None else f"@{response.cause} "
+        lines.append(f"< {cause}{_label(publisher, response.message)}")
+        used = b"\1" * (ID_BYTES + LENGTH_BYTES) + used_bytes(publisher.frame, response.payload)
+        lines += _hex_lines(pack_frame(ids[publisher.block], response.payload), used)
+    return "\n".join(lines) + "\n"
+
+
+def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:
+    """The frame's bytes in hex; one that is not used is written as `..`."""
+    digits = [f"{byte:02x}" if used is None or used[index] else ".." for index, byte in enumerate(frame)]
+    for first in range(0, len(digits), _BYTES_A_LINE):
+        yield "  " + " ".join(digits[first : first + _BYTES_A_LINE])
+
+
+def _label(topic: Topic, message: dict[str, Any]) -> str:
+    """Block, type and values on one line of plain ASCII, cut where it gets long."""
+    values = " ".join(f"{name}={value}" for name, value in _values(message))
+    label = f"{topic.block} {topic.frame.message} {values}".encode("ascii", "replace").decode()
+    return label if len(label) <= _LABEL_WIDTH else label[: _LABEL_WIDTH - 3] + "..."
+
+
+def _values(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _values(inner, f"{name}.{key}" if name else key)
+    else:
+        yield name, _shown(value)
+
+
+def _shown(value: Any) -> str:
+    """A value without blanks, but for those of its texts, which are in quotes; of arrays no more than a label holds."""
+    match value:
+        case str():
+            return json.dumps(value, ensure_ascii=False)
+        case Mapping():
+            return f"{{{','.join(f'{name}={_shown(inner)}' for name, inner in value.items())}}}"
+        case list() | bytes():
+            return f"[{','.join(map(_shown, islice(value, _LABEL_WIDTH)))}]"
+        case _:
+            return str(value)

@@ -1,0 +1,101 @@
+"""Compiles the C++ of an HLS accelerator to the shared library that simulation calls."""
+
+from __future__ import annotations
+
+import platform
+import re
+import subprocess
+import tempfile
+from pathlib import Path
+
+from fusesoc_firm.request.request import GeneratedFile
+from fusesoc_firm.system.derived.kernel import kernel_entity, library_name, prototype
+from fusesoc_firm.system.derived.model import AcceleratorType
+from fusesoc_firm.system.hardware.hls import KERNEL_TEMPLATE, SHIM_TEMPLATE, kernel_configuration
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.render import render
+
+_COMPILER = "g++"
+# Results must not depend on the processor (no contraction to fused operations), nor the file on its build (no
+# build id, no symbols that name temporary files).
+_FLAGS = (
+    "-std=c++17",
+    "-O2",
+    "-ffp-contract=off",
+    "-fPIC",
+    "-shared",
+    "-s",
+    "-Wl,--build-id=none",
+    # A function that is nowhere defined is found here, not when the simulator loads the library.
+    "-Wl,-z,defs",
+    # Names the files that were included; those of the system are left out.
+    "-MMD",
+    "-Wno-unknown-pragmas",
+)
+# A file in a rule of make, and what is escaped in its name.
+_WORD = re.compile(r"(?:\\ |\S)+")
+_ESCAPED = re.compile(r"\\([ #])|\$(?=\$)")
+_CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
+
+
+def toolchain() -> dict[str, str]:
+    """Versions of the compiler and of the C library, without which the library may not be loaded elsewhere."""
+    try:
+        shown = subprocess.run([_COMPILER, "--version"], capture_output=True, text=True, check=False).stdout
+    except FileNotFoundError:
+        shown = ""
+    return {_COMPILER: shown.partition("\n")[0], "libc": " ".join(platform.libc_ver())}
+
+
+def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:
+    """The simulated kernel, and the library that it calls out of the simulator's work folder. Raises `InputError`."""
+    configuration = kernel_configuration(accelerator)
+    library = library_name(accelerator)
+    shim = render(SHIM_TEMPLATE, configuration)
+    return {
+        f"{kernel_entity(accelerator)}.vhd": GeneratedFile(render(KERNEL_TEMPLATE, configuration), "vhdlSource-93"),
+        library: GeneratedFile(_compile(accelerator, folder, shim), "user", copyto=library),
+    }
+
+
+def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
+    """The library's bytes: the same for the same sources, wherever they lie."""
+    first, *others = accelerator.accelerator.sources
+    name = accelerator.accelerator.name
+    units = [str((folder / source).resolve()) for source in others if Path(source).suffix in _CPP_SUFFIXES]
+    above = (folder / first).resolve().parent
+    with tempfile.TemporaryDirectory() as temporary:
+        place = Path(temporary)
+        (place / "kernel.cpp").write_text(shim, encoding="utf-8")
+        # An `assert` puts the name of its file into the library.
+        options = ["-I", str(above), f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
+        command = [_COMPILER, *_FLAGS, "kernel.cpp", *units, *options]
+        try:
+            result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
+        except FileNotFoundError:
+            fail(f"'{_COMPILER}' is needed to simulate '{name}' and is not installed")
+        if result.returncode:
+            fail(
+                f"the C++ of '{name}' does not compile:\n{result.stderr.rstrip()}",
+                first.source,
+                f"expected: {prototype(accelerator)}",
+            )
+        _check_included(accelerator, folder, place)
+        return (place / "kernel.so").read_bytes()
+
+
+def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> None:
+    """Every included file must be a source: a change of one that is not would never be noticed."""
+    sources = {(folder / source).resolve() for source in accelerator.accelerator.sources}
+    included = {
+        (place / _ESCAPED.sub(r"\1", word)).resolve()
+        for rules in place.glob("*.d")
+        for word in _WORD.findall(rules.read_text(encoding="utf-8").replace("\\\n", " "))[1:]
+    }
+    missing = sorted(str(path) for path in included - sources if not path.is_relative_to(place.resolve()))
+    if missing:
+        fail(
+            f"'{accelerator.accelerator.name}' includes {', '.join(missing)}",
+            accelerator.accelerator.sources[0].source,
+            "list it under 'sources', too, so that a change of it is noticed",
+        )

@@ -1,0 +1,90 @@
+"""The reference that a simulation is compared with: a Python file of the user with a function `respond`.
+
+    def respond(subscriber: str, message: dict) -> list[tuple[str, dict]]:
+
+It gets each message sent, with the name of the subscriber's block, and returns the messages that the system must
+send for it, each with the name of its publisher's block. It is called in the order of the stimuli and may keep state.
+What goes to an accelerator in software it returns, too (`software`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.frame.codec import CodecError, decode
+from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.simulation.stimuli import Stimulus
+from fusesoc_firm.simulation.user_code import UserFunction, load_function
+from fusesoc_firm.system.derived.model import Topic
+from fusesoc_firm.text.diagnostics import nearest
+
+_ANSWER = "it returns a list of (publisher, message), the message a mapping of fields"
+
+
+@dataclass(frozen=True)
+class Response:
+    """A message that the system must send: its payload, and the same decoded.
+
+    `cause` is the number, from 0, of the stimulus that it answers, None if no single one is known.
+    """
+
+    publisher: Topic
+    payload: bytes
+    message: dict[str, Any]
+    cause: int | None
+
+
+def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topic]) -> list[Response]:
+    """What the model in `path` answers to all stimuli. Raises `InputError`, also for a fault within the model.
+
+    It may answer in the name of each of `publishers`.
+    """
+    model = _Model(load_function(path, "respond", "the model", "subscriber, message", _ANSWER))
+    known = {publisher.block: publisher for publisher in publishers}
+    found: list[Response] = []
+    for cause, stimulus in enumerate(stimuli):
+        when = f"message {cause} to '{stimulus.subscriber.block}'"
+        found += [model.response(item, cause, when, known) for item in model.answer(stimulus, when)]
+    return found
+
+
+@dataclass(frozen=True)
+class _Model:
+    """The user's function. `when`, everywhere, is the message that it was asked for."""
+
+    respond: UserFunction
+
+    def answer(self, stimulus: Stimulus, when: str) -> list[object]:
+        """What `respond` returns, as a list."""
+        with self.respond.guarded(when):
+            # A copy, as the message itself is what the report shows.
+            answer: object = self.respond.call(stimulus.subscriber.block, deepcopy(stimulus.message))
+            # A generator runs the user's code only here.
+            items = list(answer) if isinstance(answer, Iterable) and not isinstance(answer, str | Mapping) else None
+        if items is None:
+            self.respond.fail(f"for {when}, 'respond' returned {answer!r}, which is not a list", _ANSWER)
+        return items
+
+    def response(self, item: object, cause: int, when: str, known: Mapping[str, Topic]) -> Response:
+        """An item of an answer."""
+        if not isinstance(item, tuple | list) or len(item) != 2:
+            self.respond.fail(f"for {when}, 'respond' returned {item!r} in its list", _ANSWER)
+        block, message = item
+        if not isinstance(block, str) or block not in known:
+            self.respond.fail(
+                f"for {when}, 'respond' gave a message to {block!r}, not a publisher", nearest(str(block), known)
+            )
+        if not isinstance(message, Mapping):
+            self.respond.fail(
+                f"for {when}, 'respond' gave {message!r} to '{block}', which is not a mapping of fields", _ANSWER
+            )
+        publisher = known[block]
+        try:
+            payload = encode_used(publisher.frame, message)
+        except CodecError as error:
+            self.respond.fail(f"for {when}, what 'respond' gave to '{block}' does not fit: {error}")
+        return Response(publisher, payload, decode(publisher.frame, payload), cause)

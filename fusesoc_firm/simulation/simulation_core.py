@@ -1,0 +1,182 @@
+"""The simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels.
+
+A live one has no frames, but a test bench that does what another program requests over a pipe
+(docs/reference/transports.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+
+from fusesoc_firm.converter.converter_core import VHDL
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
+from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
+from fusesoc_firm.simulation.environment import environment_files
+from fusesoc_firm.simulation.frames import expected_text, stimulus_text
+from fusesoc_firm.simulation.kernel import kernel_files
+from fusesoc_firm.simulation.reference import Response, responses
+from fusesoc_firm.simulation.software import answered, stimulated, traffic
+from fusesoc_firm.simulation.stimuli import read_stimuli
+from fusesoc_firm.store.reads import Input
+from fusesoc_firm.system import system_core
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.hardware.configuration import TEST_BENCH_TEMPLATE, Configuration, test_bench_configuration
+from fusesoc_firm.system.hardware.verilog_bench import (
+    ENVIRONMENT_TEMPLATE,
+    VERILOG_BENCH_TEMPLATE,
+    translated_unit,
+    verilog_bench_configuration,
+)
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import SourceRef, fail
+from fusesoc_firm.text.render import render
+from fusesoc_firm.tools.simulators import SIMULATORS, fitting
+
+# A test bench is nothing that synthesis, or a translation to Verilog, should see.
+_BENCH_TAGS = ("simulation",)
+
+
+def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
+    """What the system depends on, the stimuli, the model, the environment, and what else code of the user reads."""
+    found = [*live_inputs(request, loaded), *_files(request)]
+    return [*found, *_stimuli_files(_path(request, "stimuli")), _path(request, "model")]
+
+
+def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
+    """The core; it belongs beside the one that the same specification gives as a system. Raises `InputError`."""
+    system = loaded.system
+    _check_simulator(system, str(request.parameters["simulator"]), "sim")
+    stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
+    answers = responses(_path(request, "model"), stimuli, answered(system))
+    found = traffic(system, loaded.folder, stimuli, answers)
+    seed, stall_percent = request.parameters["seed"], request.parameters["stall_percent"]
+    assert isinstance(seed, int)
+    assert isinstance(stall_percent, int)
+    environment = environment_files(_environment(request), system)
+    configuration = test_bench_configuration(system, seed, stall_percent, _entity(environment), is_live=False)
+    files = _surroundings(loaded, environment)
+    if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
+        files |= _vhdl_bench(configuration)
+    else:
+        frames = max(len(found.stimuli), len(found.responses))
+        files |= _verilog_bench(configuration, system, frames, _beats(found.responses, system.width))
+    files |= {
+        "stimulus.txt": GeneratedFile(stimulus_text(found.stimuli, system.subscribers), "user", copyto="stimulus.txt"),
+        "expected.txt": GeneratedFile(expected_text(found.responses, system.publishers), "user", copyto="expected.txt"),
+    }
+    return GeneratedCore(f"Simulation of system {system.name}", files)
+
+
+def live_inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
+    """What the system depends on, and the environment."""
+    return [*system_core.inputs(request, loaded), *_environment(request)]
+
+
+def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
+    """The core of a live simulation. Seed and rate of stalls are given where it is started. Raises `InputError`."""
+    system = loaded.system
+    _check_simulator(system, str(request.parameters["simulator"]), "live")
+    environment = environment_files(_environment(request), system)
+    configuration = test_bench_configuration(system, 1, 0, _entity(environment), is_live=True)
+    files = _surroundings(loaded, environment)
+    if SIMULATORS[str(request.parameters["simulator"])].reads_vhdl:
+        files |= _vhdl_bench(configuration)
+    else:
+        files |= _verilog_bench(configuration, system)
+    return GeneratedCore(f"Live simulation of system {system.name}", files)
+
+
+def _surroundings(loaded: LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile]) -> dict[str, GeneratedFile]:
+    """What every test bench of a system needs: kernels that can be simulated, and the environment."""
+    files: dict[str, GeneratedFile] = {}
+    for kernel in loaded.system.kernels:
+        files |= kernel_files(kernel, loaded.folder)
+    return files | {str(path): file for path, file in environment.items()}
+
+
+def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
+    """The entity of the environment's files."""
+    return [*environment][-1].stem if environment else None
+
+
+def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None:
+    """Fail if an accelerator is written in what the simulator does not understand, or the host's end of a link is.
+
+    A user is pointed to the `target` of the default one.
+    """
+    known = SIMULATORS[simulator]
+    if not known.reads_vhdl and system.clocks:
+        fail(
+            f"{simulator} cannot simulate a system of several clocks",
+            hint=f"the clocks beside the host's are made in VHDL: --target={target}",
+        )
+    if not known.reads_vhdl and system.link:
+        fail(
+            f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",
+            hint=f"the host's end of a link is written in VHDL: --target={target}",
+        )
+    for type_ in system.accelerator_types:
+        accelerator = type_.accelerator
+        if known.reads_vhdl and accelerator.type == "Verilog":
+            others = " or ".join(f"'{name}'" for name in fitting(has_verilog=True)).replace("'", "'simulator: ", 1)
+            hint = f"{others} link it with the Verilog that GHDL makes of the VHDL"
+            message = f"{known.title} simulates no Verilog, which '{accelerator.name}' is written in"
+            fail(message, accelerator.name.source, hint)
+        if not known.calls_functions and accelerator.type == "HLS":
+            hint = f"only GHDL calls a C++ function from within a simulation: --target={target}"
+            fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
+
+
+def _vhdl_bench(configuration: Configuration) -> dict[str, GeneratedFile]:
+    text = render(TEST_BENCH_TEMPLATE, configuration)
+    return {f"{configuration['bench']}.vhd": GeneratedFile(text, VHDL, tags=_BENCH_TAGS)}
+
+
+def _verilog_bench(
+    configuration: Configuration, system: DerivedSystem, frames: int = 0, beats: int = 0
+) -> dict[str, GeneratedFile]:
+    """The bench, and the entity that holds system and environment if there is one."""
+    has_environment = configuration["environment"] is not None
+    bench = verilog_bench_configuration(configuration, system, frames, beats, has_environment=has_environment)
+    files = {
+        f"{configuration['bench']}.v": GeneratedFile(
+            render(VERILOG_BENCH_TEMPLATE, bench), "verilogSource-2005", tags=_BENCH_TAGS
+        )
+    }
+    if has_environment:
+        unit = translated_unit(system, has_environment=True)
+        files[f"{unit}.vhd"] = GeneratedFile(render(ENVIRONMENT_TEMPLATE, configuration), VHDL)
+    return files
+
+
+def _beats(expected: list[Response], width: int) -> int:
+    """The beats of all frames that are expected; so many can wait for the ends of their frames at most."""
+    lanes = width // 8
+    return sum(-(-(ID_BYTES + LENGTH_BYTES + len(response.payload)) // lanes) for response in expected) or 1
+
+
+def _path(request: Request, parameter: str) -> Path:
+    value = request.parameters[parameter]
+    if value is None:
+        fail(f"{request.name}: product 'simulation' needs the parameter '{parameter}'")
+    return request.files_root / str(value)
+
+
+def _stimuli_files(path: Path) -> list[Path]:
+    """The files of stimuli, of which a bag may be a folder."""
+    if path.is_file():
+        return [path]
+    # A call that the store answers does without what the import of rosbags' readers costs.
+    from fusesoc_firm.message.bags import bag_files
+
+    return bag_files(path)
+
+
+def _environment(request: Request) -> dict[Path, SourceRef | None]:
+    """The files of the environment, each with its place in the requesting core."""
+    return {request.files_root / file: source for file, source in request.listed("environment").items()}
+
+
+def _files(request: Request) -> list[Path]:
+    return [request.files_root / file for file in request.listed("files")]

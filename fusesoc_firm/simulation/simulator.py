@@ -1,0 +1,197 @@
+"""From a specification to a simulator that can be started: built by FuseSoC, and by Edalize's makefile.
+
+    built = build_simulator(Path("robot.yaml"))
+    with Simulator(built.command(seed=7), built.folder) as simulator:           # node/transport/simulator.py
+        ...
+
+Which core describes the system is looked up beside the specification. Where none does, one is written for it, in the
+folder of the build. A second call builds what has changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.request.core_reader import CoreFile, read_core
+from fusesoc_firm.request.request import CoreFolders, no_core_folders
+from fusesoc_firm.store.layout import default_root
+from fusesoc_firm.system.beside import core_of, load_beside
+from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
+from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.text.file_lock import locked
+from fusesoc_firm.text.files import write_if_changed
+from fusesoc_firm.tools.library_path import library_root
+from fusesoc_firm.tools.programs import missing, simulation_programs, ways
+from fusesoc_firm.tools.simulators import Live, default_simulator, fitting
+
+_SHOWN_LINES = 20
+
+
+@dataclass(frozen=True)
+class CoreSources:
+    """What a core that is written for a specification is to say beside it; one that is there says so itself."""
+
+    paths: Sequence[Path] = ()
+    distro: str = ""
+    depend: Sequence[str] = ()
+    environment: Sequence[Path] = ()
+    core_folders: CoreFolders = no_core_folders
+
+
+@dataclass(frozen=True)
+class BuiltSimulator:
+    """A simulator and the folder it must be started in."""
+
+    tool: str
+    folder: Path
+    words: tuple[str, ...] = field(repr=False)
+
+    def command(self, *, seed: int = 1, stall_percent: int = 0) -> list[str]:
+        """What starts it in `folder`; the streams stall in `stall_percent` of the cycles, as `seed` has it."""
+        mark = _live(self.tool).parameter
+        return [*self.words, f"{mark}SEED={seed}", f"{mark}STALL_PERCENT={stall_percent}"]
+
+    def script(self, *, seed: int = 1, stall_percent: int = 0) -> Path:
+        """A program that starts it from any folder."""
+        path = self.folder / f"run-simulator-seed{seed}-stall{stall_percent}"
+        command = shlex.join(self.command(seed=seed, stall_percent=stall_percent))
+        text = "#!/bin/sh\n# The simulated system at the end of a pipe: descriptors 3 and 4.\n"
+        write_if_changed(path, f"{text}cd {shlex.quote(str(self.folder))} && exec {command}\n".encode())
+        path.chmod(0o755)
+        return path
+
+
+def build_simulator(
+    spec: Path, tool: str | None = None, *, build_root: Path | None = None, sources: CoreSources | None = None
+) -> BuiltSimulator:
+    """Build a simulator of the system of a specification, or what of it has changed. Raises `InputError`.
+
+    `build_root` is shared by all systems and tools; its default is a folder of the user's cache. `sources` count where
+    no core beside the specification names it.
+    """
+    tool = tool or default_simulator(is_live=True)
+    _live(tool)
+    if not spec.is_file():
+        fail(f"there is no specification '{spec}'")
+    if absent := missing(dict.fromkeys([*simulation_programs(tool), "make"])):
+        fail(f"not installed: {' '.join(absent)}", hint="; ".join(ways(program) for program in absent))
+    spec = spec.resolve()
+    folder = _build_folder(spec, tool, build_root or Path(default_root()) / "simulators")
+    with locked(folder):
+        core = core_of(spec) or _write_core(spec, folder / "core", sources or CoreSources())
+        work = folder / "work"
+        is_new = not work.exists()
+        try:
+            _build(spec, core, tool, work)
+        except InputError:
+            if is_new:
+                raise
+            # A library may know files that are gone.
+            shutil.rmtree(work)
+            _build(spec, core, tool, work)
+        return BuiltSimulator(tool, work, tuple(_words(work, tool)))
+
+
+def _write_core(spec: Path, folder: Path, sources: CoreSources) -> CoreFile:
+    """A core for a specification that has none."""
+    paths = [path.absolute() for path in sources.paths]
+    loaded = load_beside(spec, paths, sources.distro or None, core_folders=sources.core_folders)
+    system = loaded.system
+    options = CoreOptions(
+        name=f"robot:live:{system.name}:0",
+        depend=[*sources.depend, *loaded.specification.message_cores],
+        environment=[str(path.absolute()) for path in sources.environment],
+        paths=list(map(str, paths)),
+        distro=sources.distro,
+    )
+    core = folder / f"{_short_name(spec)}.core"
+    write_if_changed(core, new_core(system, str(spec), options))
+    return read_core(core)
+
+
+def _build_folder(spec: Path, tool: str, root: Path) -> Path:
+    """A folder of its own for each specification and tool; the name of its file helps people."""
+    digest = hashlib.sha256(str(spec).encode()).hexdigest()[:12]
+    folder = root.absolute() / f"{_short_name(spec)}-{digest}-{tool}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        fail(f"cannot write {folder}: {error.strerror}")
+    return folder
+
+
+def _short_name(spec: Path) -> str:
+    """What a specification's file is called, without the characters that make and simulators do not take in a path."""
+    return re.sub(r"[^A-Za-z0-9_.+-]", "_", spec.stem).lstrip("-")[:60]
+
+
+def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
+    """Have FuseSoC set the target up, and make what it says."""
+    targets, target = core.section("targets"), "live" if tool == default_simulator(is_live=True) else f"live_{tool}"
+    if target not in targets:
+        fail(f"{core.path} has no target '{target}'", hint=f"firm system core {spec}")
+    made_with = targets[target].get("flow_options", {}).get("tool", tool)
+    if made_with != tool:
+        fail(f"{core.path}: target '{target}' is for {made_with}", hint=f"--tool {made_with}")
+    command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
+    command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, core.data.get("name", "")]
+    _run(spec, list(map(str, command)), _project_folder(spec))
+    if step := _live(tool).made_by:
+        _run(spec, ["make", step], work)
+
+
+def _project_folder(spec: Path) -> Path:
+    """Where FuseSoC finds the configuration of the user's project: above the specification, else where we are."""
+    return next((folder for folder in spec.parents if (folder / "fusesoc.conf").is_file()), Path.cwd())
+
+
+def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
+    """Run a step of the build; what it printed."""
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env={name: value for name, value in os.environ.items() if name != "EDALIZE_LAUNCHER"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    if done.returncode:
+        lines = [line for line in done.stdout.splitlines() if not line.startswith("INFO:")]
+        shown = "\n".join(lines[-_SHOWN_LINES:])
+        fail(f"the simulator of {spec} cannot be built, {shlex.join(command)} in {folder} fails:\n{shown}")
+    return done.stdout
+
+
+def _flow(work: Path) -> Any:
+    """What FuseSoC says about the build."""
+    return yaml.safe_load(next(work.glob("*.eda.yml")).read_text(encoding="utf-8"))
+
+
+def _words(work: Path, tool: str) -> list[str]:
+    """What starts the simulator in its folder."""
+    if not (start := _live(tool).started_by):
+        return [str(work / f"V{_flow(work)['toplevel']}")]
+    steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).split("\n")
+    return shlex.split([line for line in steps if line.startswith(start)][-1])
+
+
+def _live(tool: str) -> Live:
+    """How the tool simulates live. Raises `InputError` if it does not."""
+    if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
+        fail(f"there is no simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
+    return live

@@ -1,0 +1,191 @@
+"""The software of a system in its simulation: the user's functions, run while the simulation is generated.
+
+What hardware sends to a block in software is what the model says. What such a block sends to hardware becomes a
+stimulus, behind the one that led to it. What it sends to a publisher never meets the hardware, and is compared here.
+
+A block without sources stands for software elsewhere: the stimuli hold what it sends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.frame.codec import decode
+from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.values import shown
+from fusesoc_firm.simulation.functions import Functions, Message, importable_sources
+from fusesoc_firm.simulation.reference import Response
+from fusesoc_firm.simulation.stimuli import Stimulus
+from fusesoc_firm.system.derived.model import AcceleratorType, Converter, DerivedSystem, End, MessageSide, Topic
+from fusesoc_firm.text.diagnostics import Diagnostics, fail
+
+
+@dataclass(frozen=True)
+class Traffic:
+    """All that the hardware is sent, in this order, and all that it must send, in the order of each publisher."""
+
+    stimuli: list[Stimulus] = field(default_factory=list)
+    responses: list[Response] = field(default_factory=list)
+
+
+def stimulated(system: DerivedSystem) -> list[Topic]:
+    """What stimuli may hold: all that enters the system, but for what its own software sends."""
+    converters = [item for item in system.subscribers if item.software is None]
+    blocks = {item.block for item in converters}
+    topics = [item for item in system.software.subscribers if item.block not in blocks]
+    return [*converters, *topics, *sent_elsewhere(system)]
+
+
+def answered(system: DerivedSystem) -> list[Topic]:
+    """What a model may say: all that leaves hardware or software, and what goes to accelerators within."""
+    found: dict[str, Topic] = {item.block: item for item in (*system.publishers, *system.software.publishers)}
+    for block in (*system.accelerators, *system.software.blocks):
+        for side in block.type.inputs:
+            name = system.names[End(block.block, side.prefix)]
+            found.setdefault(name, Topic(name, side.frame))
+    return [*found.values()]
+
+
+def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> Traffic:
+    """What goes to the hardware and comes back if its software, whose sources lie in `folder`, does its part.
+
+    Raises `InputError` for what is missing in stimuli or model, and for what software does wrong.
+    """
+    _check_complete(system, stimuli, responses)
+    caused: dict[int | None, list[Response]] = {}
+    for response in responses:
+        caused.setdefault(response.cause, []).append(response)
+    with importable_sources([type_.accelerator for type_ in system.software.types], folder):
+        run = _Run(system, Functions.of(system.software, folder))
+        for number, stimulus in enumerate(stimuli):
+            run.take(stimulus, caused.get(number, ()))
+    _check_published(system, run.published, responses)
+    return run.traffic
+
+
+def sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
+    """The outputs of software that is not here."""
+    return _elsewhere(system, lambda type_: type_.outputs)
+
+
+def taken_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
+    """The inputs of software that is not here."""
+    return _elsewhere(system, lambda type_: type_.inputs)
+
+
+def _elsewhere(system: DerivedSystem, sides: Callable[[AcceleratorType], Iterable[MessageSide]]) -> dict[Topic, End]:
+    return {
+        Topic(system.names[end], side.frame): end
+        for block in system.software.blocks
+        if not block.type.accelerator.sources
+        for side in sides(block.type)
+        for end in (End(block.block, side.prefix),)
+    }
+
+
+def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> None:
+    """Raise `InputError` if stimuli or model leave out all that somebody waits for."""
+    faults = Diagnostics()
+    sent = {stimulus.subscriber.block for stimulus in stimuli}
+    for topic, end in sent_elsewhere(system).items():
+        if topic.block not in sent:
+            hint = f"'{end.block}' has no sources, so what it sends must be among them"
+            faults.error(f"the stimuli hold no message of '{topic.block}'", hint=hint)
+    said = {response.publisher.block for response in responses}
+    here = {block.block for block in system.software.blocks if block.type.accelerator.sources}
+    for publisher in system.publishers:
+        if publisher.software and publisher.software.block in here and publisher.block not in said:
+            message = f"the model says nothing of what goes from hardware to '{publisher.software.block}'"
+            faults.error(message, hint=f"'respond' returns it among the others: ('{publisher.block}', message)")
+    faults.raise_if_any()
+
+
+@dataclass
+class _Run:
+    """A run of the software: the hardware's traffic so far, and what went from software to publishers."""
+
+    system: DerivedSystem
+    functions: Functions
+    traffic: Traffic = field(default_factory=Traffic)
+    published: dict[str, list[Message]] = field(default_factory=dict)
+
+    @cached_property
+    def _subscribers(self) -> dict[str, Converter]:
+        return {item.block: item for item in self.system.subscribers}
+
+    @cached_property
+    def _ends(self) -> dict[str, End]:
+        return {topic.block: end for topic, end in sent_elsewhere(self.system).items()}
+
+    @cached_property
+    def _ways(self) -> dict[str, set[str]]:
+        return {item.block: way_to(item.block, self.system) for item in self.system.publishers}
+
+    def take(self, stimulus: Stimulus, responses: Sequence[Response]) -> None:
+        """Send a message, and have software answer it and what the hardware sends for it."""
+        block = stimulus.subscriber.block
+        if block in self._subscribers and block not in self._ends:
+            self.traffic.stimuli.append(stimulus)
+        self._give(self._ends.get(block, End(block)), stimulus.message)
+        sent = [response for response in responses if response.publisher.block in self._ways]
+        for response in sent:
+            self._give(End(response.publisher.block), decode(response.publisher.frame, response.payload))
+        for response in sent:
+            self.traffic.responses.append(replace(response, cause=self._cause(response.publisher.block)))
+
+    def _give(self, source: End, message: Message) -> None:
+        for name, given in self.functions.take(source, message):
+            if subscriber := self._subscribers.get(name):
+                payload = encode_used(subscriber.frame, given)
+                self.traffic.stimuli.append(Stimulus(subscriber, payload, decode(subscriber.frame, payload)))
+            else:
+                self.published.setdefault(name, []).append(given)
+
+    def _cause(self, publisher: str) -> int | None:
+        """The last message so far on the way to a publisher."""
+        stimuli = self.traffic.stimuli
+        way = self._ways[publisher]
+        numbers = (number for number in reversed(range(len(stimuli))) if stimuli[number].subscriber.block in way)
+        return next(numbers, None)
+
+
+def way_to(publisher: str, system: DerivedSystem) -> set[str]:
+    """The blocks in hardware that a publisher's message comes from."""
+    found: set[str] = set()
+    new = {publisher}
+    while new:
+        new = {item.source.block for item in system.connections for end in item.sinks if end.block in new} - found
+        found |= new
+    return found
+
+
+def _check_published(system: DerivedSystem, published: dict[str, list[Message]], responses: Sequence[Response]) -> None:
+    """Compare what software sends to publishers with what the model says."""
+    for topic in system.software.publishers:
+        wanted = [response for response in responses if response.publisher.block == topic.block]
+        found = published.get(topic.block, [])
+        for number, (message, response) in enumerate(zip(found, wanted, strict=False)):
+            payload = encode_used(topic.frame, message)
+            if payload != response.payload:
+                sent, said = decode(topic.frame, payload), decode(topic.frame, response.payload)
+                name, *values = next(_differences(sent, said, ""), ("it", sent, said))
+                one, other = map(shown, values)
+                fail(f"message {number} from software to '{topic.block}': {name} is {one}, but {other} by the model")
+        if len(found) != len(wanted):
+            fail(f"software sends {len(found)} messages to '{topic.block}', but {len(wanted)} by the model")
+
+
+def _differences(one: Any, other: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
+    """The values in which two messages differ, each with its path."""
+    if isinstance(one, Mapping):
+        for name, value in one.items():
+            yield from _differences(value, other[name], f"{path}.{name}" if path else name)
+    elif isinstance(one, list | bytes) and len(one) == len(other):
+        for number, pair in enumerate(zip(one, other, strict=True)):
+            yield from _differences(*pair, f"{path}[{number}]")
+    elif one != other:
+        yield f"'{path}'", one, other

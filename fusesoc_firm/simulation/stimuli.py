@@ -1,0 +1,94 @@
+"""Messages to send to a system, out of a YAML file or a recorded bag.
+
+A YAML file is a list; each item names the subscriber's block and gives its message:
+
+    - QuaternionToEuler_sub: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
+
+Fields that the subscriber has no port for may be left out; they are sent as their defaults, zero or empty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.frame.codec import decode, encode
+from fusesoc_firm.frame.defaults import completed
+from fusesoc_firm.simulation.yaml_message import read_message
+from fusesoc_firm.system.derived.model import Topic
+from fusesoc_firm.text.diagnostics import Diagnostics, fail, nearest
+from fusesoc_firm.text.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
+
+_YAML_SUFFIXES = (".yaml", ".yml")
+# Subscribers that are named where there is no file.
+_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """A message for a subscriber: its payload as the middleware serialises it, and the same decoded."""
+
+    subscriber: Topic
+    payload: bytes
+    message: dict[str, Any]
+
+
+def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
+    """All messages of a file or bag, in its order. Raises `InputError`; a file without a message is one, too."""
+    if not path.exists():
+        fields = "{<field>: <value>, ...}"
+        items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
+        fail(f"there are no stimuli at {path}", hint=f"a bag, or a YAML file with a list of messages: {items}")
+    if path.suffix in _YAML_SUFFIXES:
+        stimuli = _from_yaml(path, subscribers)
+    else:
+        # A call that the store answers does without what the import of rosbags' readers costs.
+        from fusesoc_firm.bags.routes import read_bag
+        from fusesoc_firm.message.bags import BAGS
+
+        hint = f"stimuli are YAML (.yaml, .yml) or a bag; {BAGS}"
+        stimuli = [Stimulus(*recorded) for recorded in read_bag(path, subscribers, hint)]
+    if not stimuli:
+        names = ", ".join(subscriber.block for subscriber in subscribers)
+        fail(f"{path} holds no message for {names}")
+    return stimuli
+
+
+def _from_yaml(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
+    faults = Diagnostics()
+    text = read_yaml(path, faults=faults, bounds=LARGE)
+    known = {subscriber.block: subscriber for subscriber in subscribers}
+    if isinstance(text.root, yaml.SequenceNode):
+        stimuli = [_item(text, node, known, faults) for node in text.root.value]
+    else:
+        stimuli = []
+        if text.root is not None and not is_null(text.root):
+            faults.error(
+                f"stimuli are a list, not {kind(text.root)}",
+                text.source(text.root),
+                "an item is '- <subscriber>: {<field>: <value>, ...}'",
+            )
+    faults.raise_if_any()
+    return [stimulus for stimulus in stimuli if stimulus is not None]
+
+
+def _item(text: YamlText, node: yaml.Node, known: dict[str, Topic], faults: Diagnostics) -> Stimulus | None:
+    """One item of the list; None, with its faults noted, if it is no message."""
+    if not isinstance(node, yaml.MappingNode) or len(node.value) != 1:
+        faults.error("a stimulus is one block with its message: '- <subscriber>: {...}'", text.source(node))
+        return None
+    key, value = node.value[0]
+    subscriber = known.get(key.value) if isinstance(key, yaml.ScalarNode) else None
+    if subscriber is None:
+        faults.error(f"no subscriber is called {kind(key)}", text.source(key), nearest(str(key.value), known))
+        return None
+    before = len(faults.found)
+    message = read_message(text, value, subscriber.frame, faults)
+    if len(faults.found) > before:
+        return None
+    payload = encode(subscriber.frame, completed(subscriber.frame, message))
+    return Stimulus(subscriber, payload, decode(subscriber.frame, payload))

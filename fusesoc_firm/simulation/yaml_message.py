@@ -1,0 +1,200 @@
+"""A message written in YAML: its values as the message's types want them, each fault at its own place.
+
+The types of the message decide what a value is, not YAML: `1e-3` is text to PyYAML, and `1` an integer, but both are
+right for a float64.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.frame.model import Data, DataKind, Fixed, Frame, Loop, Path, all_nodes
+from fusesoc_firm.frame.values import CodecError, check_bound, units_of
+from fusesoc_firm.message.wire import WireType
+from fusesoc_firm.text.diagnostics import Diagnostics, nearest
+from fusesoc_firm.text.yaml_text import YamlText, is_null, items, kind
+
+_SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
+
+
+@dataclass
+class _Branch:
+    """A field: each of its elements is a value of `type`, a `text`, or a message of `fields`.
+
+    An array of fixed size has `count` elements, one of variable size is an `array`. It must be given if `is_used`, or
+    if any of its `fields` is.
+    """
+
+    count: int | None = None
+    array: Data | Loop | None = None
+    type: WireType | None = None
+    text: Data | None = None
+    fields: dict[str, _Branch] = field(default_factory=dict)
+    is_used: bool = False
+
+    def at(self, path: Path) -> _Branch:
+        """The field that a path leads to."""
+        branch = self
+        for step in path:
+            branch = branch.fields.setdefault(step.name, _Branch(step.count))
+        return branch
+
+    @property
+    def is_needed(self) -> bool:
+        """Whether somebody has a port for it or for something in it."""
+        return self.is_used or any(branch.is_needed for branch in self.fields.values())
+
+
+def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnostics) -> dict[str, Any]:
+    """The message of `frame` that a node holds; what does not fit is noted and left out.
+
+    Fields that are not used may be missing.
+    """
+    if is_null(node) and not frame.names:
+        return {}
+    reader = _Reader(text, faults, str(frame.message))
+    return reader.message(node, _tree(frame), "")
+
+
+def _tree(frame: Frame) -> _Branch:
+    root = _Branch()
+    for node in all_nodes(frame.nodes):
+        match node:
+            case Fixed(fields=fields):
+                for leaf in fields:
+                    branch = root.at(leaf.path)
+                    branch.type, branch.is_used = leaf.type, leaf.is_used
+            case Data(kind=DataKind.ARRAY):
+                branch = root.at(node.path)
+                branch.array, branch.type, branch.is_used = node, node.element, node.is_used
+            case Data():
+                branch = root.at(node.path)
+                branch.text, branch.is_used = node, node.is_used
+            case Loop():
+                branch = root.at(node.path)
+                branch.count, branch.array, branch.is_used = node.count, node, node.is_used
+    return root
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads one message; `name` is what it is called in faults of the whole."""
+
+    text: YamlText
+    faults: Diagnostics
+    name: str
+
+    def message(self, node: yaml.Node, branch: _Branch, path: str) -> dict[str, Any]:
+        """A message at `path`, which is empty for the whole."""
+        what = f"'{path}'" if path else f"a {self.name}"
+        if not isinstance(node, yaml.MappingNode):
+            fields = ", ".join(branch.fields)
+            self._error(f"{what} is a mapping of its fields, not {kind(node)}", node, f"its fields: {fields}")
+            return {}
+        found: dict[str, Any] = {}
+        hints = []
+        for key, key_node, value in items(self.text, node, self.faults):
+            if key in branch.fields:
+                found[str(key)] = self._field(value, branch.fields[key], f"{path}.{key}" if path else str(key))
+            else:
+                hints.append(nearest(key, branch.fields))
+                self._error(f"{what} has no field '{key}'", key_node, hints[-1])
+        needed = [name for name, field in branch.fields.items() if field.is_needed]
+        missing = [name for name in needed if name not in found and f"did you mean '{name}'?" not in hints]
+        if missing:
+            self._error(f"{what} needs a value for {', '.join(missing)}", node)
+        return found
+
+    def _field(self, node: yaml.Node, branch: _Branch, path: str) -> Any:
+        if branch.count is None and branch.array is None:
+            return self._element(node, branch, path)
+        size = "" if branch.count is None else f" of {branch.count}"
+        if not isinstance(node, yaml.SequenceNode):
+            self._error(f"'{path}' is a list{size}, not {kind(node)}", node)
+            return None
+        if branch.count is not None and len(node.value) != branch.count:
+            self._error(f"'{path}' is a list{size}, not of {len(node.value)}", node)
+        elif branch.array is not None:
+            self._check_bound(branch.array, len(node.value), node)
+        return [self._element(item, branch, f"{path}[{number}]") for number, item in enumerate(node.value)]
+
+    def _element(self, node: yaml.Node, branch: _Branch, path: str) -> Any:
+        if branch.text is not None:
+            return self._text(node, branch.text, path)
+        if branch.type is None:
+            return self.message(node, branch, path)
+        if not isinstance(node, yaml.ScalarNode) or is_null(node) or node.style:
+            self._error(f"'{path}' is a {branch.type.name}, not {kind(node)}", node)
+            return None
+        try:
+            return _value(str(node.value), branch.type)
+        except ValueError as error:
+            self._error(f"'{path}' is a {branch.type.name}, not '{node.value}'", node, str(error))
+            return None
+
+    def _text(self, node: yaml.Node, text: Data, path: str) -> str | None:
+        if not isinstance(node, yaml.ScalarNode) or is_null(node):
+            self._error(f"'{path}' is a {text.kind.value}, not {kind(node)}", node, "an empty one is ''")
+            return None
+        self._check_bound(text, len(units_of(text, node.value)) // text.element.size, node)
+        return str(node.value)
+
+    def _check_bound(self, part: Data | Loop, count: int, node: yaml.Node) -> None:
+        try:
+            check_bound(part, count)
+        except CodecError as error:
+            self._error(str(error), node)
+
+    def _error(self, message: str, node: yaml.Node, hint: str = "") -> None:
+        self.faults.error(message, self.text.source(node), hint)
+
+
+def _value(text: str, type_: WireType) -> bool | int | float:
+    """The value of a word. Raises `ValueError` that says what is legal."""
+    if type_.code == "?":
+        return _boolean(text)
+    return _float(text, type_) if type_.code in "fd" else _integer(text, type_)
+
+
+def _boolean(text: str) -> bool:
+    words: Mapping[str, bool] = {"true": True, "false": False}
+    if text.lower() not in words:
+        raise ValueError("legal here: true, false")
+    return words[text.lower()]
+
+
+def _integer(text: str, type_: WireType) -> int:
+    is_signed = type_.code.islower()
+    bits = 8 * type_.size
+    least, most = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if is_signed else (0, 2**bits - 1)
+    legal = f"legal here: {least} to {most}"
+    try:
+        # Not `017`, which is 15 to YAML and 17 to most people.
+        value = int(text, 0)
+    except ValueError:
+        raise ValueError(legal) from None
+    if not least <= value <= most:
+        raise ValueError(legal)
+    return value
+
+
+def _float(text: str, type_: WireType) -> float:
+    if special := _SPECIAL_FLOAT.fullmatch(text):
+        return float("".join(special.groups()))
+    try:
+        value = float(text)
+        is_too_large = math.isinf(struct.unpack(f"<{type_.code}", struct.pack(f"<{type_.code}", value))[0])
+    except ValueError:
+        raise ValueError("a number such as 1, -0.5, 1e-3, .inf, .nan") from None
+    except OverflowError:
+        is_too_large = True
+    if is_too_large:
+        raise ValueError("it is too large; infinity is written .inf")
+    return value

@@ -1,0 +1,200 @@
+"""What lies in the store, and how: `store` says what is kept there, `plugin.recall` answers from it in a hurry.
+
+    <root>/v4/<first two digits>/<key>.entry                 generated files
+    <root>/v4/<first two digits>/<digest of a call>.call     what decided the answer to a call, and its key
+    <root>/v4/<first two digits>/<key>.lock                  held while an entry is made
+
+Each but the lock is a line with the SHA-256 of the rest, and appears by one rename: it is whole, or not there. An entry
+goes on with a line of JSON (what was asked for, names, lengths) and the contents; the others are JSON.
+
+Whoever may write to the store can write files with right digests. So a file of another form is as damaged as one of
+which the digest is wrong: data of other types, names that lead out of the folder where the files are to be written.
+
+Of Python's library no more is imported than that needs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping
+from errno import EFBIG
+
+from fusesoc_firm.store import shared_files
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
+LAYOUT = "v4"
+ENTRY, CALL, LOCK = ".entry", ".call", ".lock"
+KEPT = (ENTRY, CALL)
+"""The endings of what is kept; what is used less goes first."""
+
+# Of plain data, and of all else. They are read at once, so there is a bound.
+_MOST_PLAIN_BYTES = 2**24
+_MOST_BYTES = 2**30
+# What file systems allow.
+_LONGEST_NAME_BYTES, _LONGEST_PATH_BYTES = 255, 4000
+_DIGITS = frozenset("0123456789abcdef")
+_DIGEST_DIGITS = 64
+_FACT_PARTS, _FILE_PARTS = 3, 2
+# Of the note of a call.
+_WORDS = ("name", "core", "marks")
+
+
+def default_root(environment: Mapping[str, str] = os.environ) -> str:
+    """FUSESOC_FIRM_CACHE, else `fusesoc_firm` in XDG_CACHE_HOME, else in ~/.cache; absolute."""
+    if chosen := environment.get("FUSESOC_FIRM_CACHE"):
+        return os.path.abspath(os.path.expanduser(chosen))
+    base = environment.get("XDG_CACHE_HOME") or "~/.cache"
+    return os.path.join(os.path.abspath(os.path.expanduser(base)), "fusesoc_firm")
+
+
+def place(digest: str, suffix: str) -> str:
+    """The name, in a store, of what belongs to a digest."""
+    return f"{LAYOUT}/{digest[:2]}/{digest}{suffix}"
+
+
+def write(root: str, name: str, data: bytes) -> None:
+    """Keep data with its digest. Raises `OSError`."""
+    whole = digest(data).encode() + b"\n" + data
+    if len(whole) > _most(name):
+        raise OSError(EFBIG, os.strerror(EFBIG))
+    shared_files.write_whole(root, name, whole)
+
+
+def write_json(root: str, name: str, data: object) -> None:
+    """Keep plain data. Raises `OSError`."""
+    write(root, name, json.dumps(data).encode())
+
+
+def write_entry(root: str, name: str, about: Mapping[str, str], files: Mapping[str, bytes]) -> None:
+    """Keep generated files, and what was asked for. Raises `OSError`."""
+    header = {"about": dict(about), "files": [[path, len(content)] for path, content in files.items()]}
+    write(root, name, b"".join([json.dumps(header).encode(), b"\n", *files.values()]))
+
+
+def read_note(root: str, name: str) -> dict[str, Any] | None:
+    """The note of a call: `key`, `facts`, `name`, `core` and `marks`; None if it is missing or damaged."""
+    note = _plain(_read(root, name))
+    if not isinstance(note, dict) or not {"key", "facts", *_WORDS} <= note.keys():
+        return None
+    is_good = _is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and _are_facts(note["facts"])
+    return note if is_good else None
+
+
+def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] | None:
+    """What was asked for, and the files in the order they were made; None if the entry is missing or damaged."""
+    line, _, contents = (_read(root, name) or b"").partition(b"\n")
+    header = _plain(line)
+    about = header.get("about") if isinstance(header, dict) else None
+    if not isinstance(header, dict) or not isinstance(about, dict) or not _are_printable([*about.values()]):
+        return None
+    lengths = _lengths(header.get("files"))
+    if lengths is None or sum(lengths.values()) != len(contents):
+        return None
+    files, start = {}, 0
+    for path, length in lengths.items():
+        files[path] = contents[start : start + length]
+        start += length
+    return about, files
+
+
+def is_whole(root: str, name: str) -> bool:
+    """Whether something that is kept is undamaged."""
+    reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, CALL: read_note}
+    return reads[name[name.rindex(".") :]](root, name) is not None
+
+
+def mark_used(root: str, *names: str) -> None:
+    """Note that these were used now, as far as the store can be written."""
+    for name in names:
+        try:
+            shared_files.mark_used(root, name)
+        except OSError:
+            # What can only be read is used all the same.
+            return
+
+
+def digest_of(data: object) -> str:
+    """The SHA-256 of plain data."""
+    return digest(json.dumps(data, sort_keys=True).encode())
+
+
+def digest(data: bytes) -> str:
+    """The SHA-256 of bytes."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def _read(root: str, name: str) -> bytes | None:
+    """What was kept under its digest; None if it is missing or damaged."""
+    found = shared_files.read(root, name, _most(name))
+    if found is None:
+        return None
+    said, _, data = found.partition(b"\n")
+    return data if digest(data).encode() == said else None
+
+
+def _most(name: str) -> int:
+    return _MOST_BYTES if name.endswith(ENTRY) else _MOST_PLAIN_BYTES
+
+
+def _plain(data: bytes | None) -> object:
+    """The data that JSON means; None if it is none, or is nested too deep."""
+    if not data or len(data) > _MOST_PLAIN_BYTES:
+        return None
+    try:
+        return json.loads(data)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _are_texts(values: list[object]) -> bool:
+    return all(isinstance(value, str) for value in values)
+
+
+def _are_printable(values: list[object]) -> bool:
+    return all(isinstance(value, str) and value.isprintable() for value in values)
+
+
+def _is_digest(text: object) -> bool:
+    return isinstance(text, str) and len(text) == _DIGEST_DIGITS and _DIGITS.issuperset(text)
+
+
+def _are_facts(facts: object) -> bool:
+    """Whether these are kinds, names and states."""
+    return isinstance(facts, list) and all(
+        isinstance(fact, list) and len(fact) == _FACT_PARTS and _are_texts(fact[:2]) for fact in facts
+    )
+
+
+def _lengths(listed: object) -> dict[str, int] | None:
+    """The length of each file by its path; None if one of them is illegal."""
+    lengths: dict[str, int] = {}
+    for item in listed if isinstance(listed, list) else [None]:
+        if not isinstance(item, list) or len(item) != _FILE_PARTS or type(item[1]) is not int or item[1] < 0:
+            return None
+        if not _is_path(item[0]) or item[0] in lengths:
+            return None
+        lengths[item[0]] = item[1]
+    return lengths if lengths.keys().isdisjoint(_folders(lengths)) else None
+
+
+def _is_path(path: object) -> bool:
+    """Whether a path leads to a file below the folder that it is relative to, without a detour."""
+    if not isinstance(path, str):
+        return False
+    try:
+        parts = [os.fsencode(part) for part in path.split("/")]
+    except UnicodeEncodeError:
+        return False
+    return sum(map(len, parts)) <= _LONGEST_PATH_BYTES and not any(
+        part in (b"", b".", b"..") or b"\0" in part or len(part) > _LONGEST_NAME_BYTES for part in parts
+    )
+
+
+def _folders(paths: Iterable[str]) -> set[str]:
+    """The folders above all of these."""
+    return {path[:place] for path in paths for place, letter in enumerate(path) if letter == "/"}

@@ -1,0 +1,72 @@
+"""The state of this package's own files, on which all that is generated depends, and of what it imports.
+
+An answer from the store waits for this module, so it imports only what that takes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from functools import lru_cache
+from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parents[1]
+IMPORTED = ("chevron", "numpy", "pyyaml", "rosbags")
+"""What generated text can depend on beside our own code."""
+
+# Modules, templates and data. In the other folders lie cores and pages, as files or as links.
+_COUNTED = (".py", ".mustache", ".yaml", ".csv")
+_LEFT_OUT = ("__pycache__", "demos", "docs", "library")
+# A file can be edited twice within what its times tell apart.
+_NEW_NANOSECONDS = 2 * 10**9
+_STARTED = time.time_ns()
+
+
+def digest(package: Path = PACKAGE) -> str:
+    """The SHA-256 of all our files by name, which is the same for all copies of them."""
+    return _digest(package, state(package))
+
+
+def state(package: Path = PACKAGE) -> str:
+    """What differs once one of our files is edited, added or removed.
+
+    It takes a fraction of the time of `digest`, as it consists of names, sizes and times. A file that was so new when
+    this process started that these can err, or newer, counts by its content.
+    """
+    found = []
+    for name, entry in _files(str(package)):
+        status = entry.stat()
+        times = [status.st_mtime_ns, status.st_ctime_ns]
+        content = _content(entry.path) if max(times) > _STARTED - _NEW_NANOSECONDS else ""
+        found.append([name, status.st_size, *times, content])
+    return hashlib.sha256(json.dumps(sorted(found)).encode()).hexdigest()
+
+
+def names(package: Path = PACKAGE) -> list[str]:
+    """The names of our files relative to the package, sorted."""
+    return sorted(name for name, _ in _files(str(package)))
+
+
+@lru_cache(maxsize=1)
+def _digest(package: Path, _state: str) -> str:
+    """The digest of our files in a state."""
+    found = {name: _content(entry.path) for name, entry in _files(str(package))}
+    return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
+
+
+def _content(path: str) -> str:
+    with open(path, "rb") as file:
+        return hashlib.sha256(file.read()).hexdigest()
+
+
+def _files(folder: str, above: str = "") -> list[tuple[str, os.DirEntry[str]]]:
+    found: list[tuple[str, os.DirEntry[str]]] = []
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(_COUNTED) and entry.is_file():
+                found.append((above + entry.name, entry))
+            elif entry.name not in _LEFT_OUT and entry.is_dir(follow_symlinks=False):
+                found += _files(entry.path, f"{above}{entry.name}/")
+    return found

@@ -1,0 +1,181 @@
+"""Which files and folders this process reads, and in which state, as Python itself tells (audit hooks, PEP 578).
+
+What a generator reads has to be among the inputs that its key covers, or an edit would go unnoticed. What Python
+consists of and what its packages hold is left out, as their versions count, and so is this package, whose files are
+counted apart. So is what is the machine's: `/dev`, `/etc`, `/proc`, `/sys`. What other programs read is not seen.
+
+Of a file that is too large to be an input, such as a bag, a reader takes parts and says so (`in_part`). Each `Part` is
+then an input; a repeated call is recalled as long as the file has the same size and time.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import sysconfig
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from fusesoc_firm.store.facts import Fact, state
+from fusesoc_firm.store.own_code import PACKAGE
+
+# Events of Python with a path as their first argument.
+_OF_FILES = ("open", "sqlite3.connect")
+_OF_FOLDERS = ("os.listdir", "os.scandir")
+_OF_TEMPORARY = ("tempfile.mkdtemp", "tempfile.mkstemp")
+_MACHINE = ("/dev", "/etc", "/proc", "/sys")
+_PATHS_OF_PYTHON = ("stdlib", "platstdlib", "purelib", "platlib")
+# What folders of installed packages are called, Debian's and those of each user included.
+_PACKAGE_FOLDERS = ("site-packages", "dist-packages")
+
+
+@cache
+def _apart() -> tuple[str, ...]:
+    """Folders that count apart. `sysconfig` itself reads files, so the hook must not call this for the first time."""
+    paths = sysconfig.get_paths()
+    return (*_MACHINE, str(PACKAGE), *(paths[name] for name in _PATHS_OF_PYTHON), sys.executable)
+
+
+@dataclass(frozen=True)
+class Part:
+    """What was taken of the file or folder at `path`, which is not read as a whole, under a name of its own."""
+
+    path: Path
+    name: str
+    content: bytes
+
+
+Input = Path | Part
+"""What a generator depends on: a whole file, or part of one."""
+
+
+@dataclass
+class Reads:
+    """What was read: absolute paths in the order in which they were, each in its state before the first reading.
+
+    `parts` are files that were read in part. What lies in `apart`, or in a new temporary folder, is not noted.
+    `python_path` is where Python finds packages.
+    """
+
+    files: dict[str, str | None] = field(default_factory=dict)
+    parts: dict[str, str | None] = field(default_factory=dict)
+    folders: dict[str, str | None] = field(default_factory=dict)
+    apart: list[str] = field(default_factory=lambda: [*_apart()])
+    python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
+
+    def note_file(self, path: str) -> None:
+        """Note a file that is going to be read."""
+        _note_state(self.files, "file", path)
+
+    def facts(self) -> list[Fact]:
+        """All that was noted."""
+        kinds = {"file": self.files, "part": self.parts, "folder": self.folders}
+        return [(kind, path, was) for kind, found in kinds.items() for path, was in found.items()]
+
+
+# Those that are noted now, the innermost last.
+_current: list[Reads] = []
+# Absolute paths of the files that are read in part now.
+_partly: list[set[str]] = []
+
+
+@contextmanager
+def noted(reads: Reads) -> Iterator[None]:
+    """Within it, what is read is added to `reads`."""
+    _install_hook()
+    _current.append(reads)
+    try:
+        yield
+    finally:
+        _current.remove(reads)
+
+
+@contextmanager
+def in_part(files: Iterable[Path]) -> Iterator[None]:
+    """Within it, these files are read in part."""
+    paths = {_absolute(str(file)) for file in files}
+    if _current:
+        for path in sorted(paths):
+            _note_state(_current[-1].parts, "part", path)
+    _partly.append(paths)
+    try:
+        yield
+    finally:
+        _partly.remove(paths)
+
+
+@cache
+def _install_hook() -> None:
+    """Once: a hook stays for as long as the process lives."""
+    sys.addaudithook(_hook)
+
+
+def _hook(event: str, arguments: tuple[object, ...]) -> None:
+    if not _current:
+        return
+    if event in _OF_FILES:
+        if event == "sqlite3.connect":
+            _note(_of_uri(arguments[0]), is_file=True)
+        elif _is_read(*arguments[1:]):
+            _note(arguments[0], is_file=True)
+    elif event in _OF_FOLDERS:
+        # An import lists the folders of Python's path, and never scans one.
+        if event != "os.listdir" or arguments[0] not in _current[-1].python_path:
+            _note(arguments[0], is_file=False)
+    elif event in _OF_TEMPORARY:
+        _current[-1].apart.append(_absolute(str(arguments[0])))
+
+
+def _is_read(mode: object, flags: object) -> bool:
+    if isinstance(mode, str):
+        return "r" in mode
+    return isinstance(flags, int) and flags & os.O_ACCMODE != os.O_WRONLY
+
+
+def _of_uri(name: object) -> object:
+    """The path in a database's name, which may be a URI."""
+    text = os.fsdecode(name) if isinstance(name, str | bytes) else ""
+    return text.removeprefix("file:").partition("?")[0] if text.startswith("file:") else name
+
+
+def _note(path: object, *, is_file: bool) -> None:
+    # A number is a file that is open already, and None the current folder.
+    if not isinstance(path, str | bytes) or (text := os.fsdecode(path)) == ":memory:":
+        return
+    absolute, reads = _absolute(text), _current[-1]
+    if any(absolute in paths for paths in _partly):
+        return
+    # An archive may be on Python's path, too.
+    is_apart = is_file and absolute in reads.python_path
+    if not is_apart and not _is_below(absolute, reads.apart) and not _is_of_package(absolute, reads):
+        _note_state(reads.files if is_file else reads.folders, "file" if is_file else "folder", absolute)
+
+
+def _note_state(found: dict[str, str | None], kind: str, path: str) -> None:
+    if path not in found:
+        # It is read for that, which is not to be noted again.
+        found[path] = None
+        found[path] = state(kind, path)
+
+
+def _absolute(path: str) -> str:
+    return os.path.abspath(path)
+
+
+def _is_below(path: str, folders: Iterable[str]) -> bool:
+    return any(path == folder or path.startswith(f"{folder}{os.sep}") for folder in folders)
+
+
+def _is_of_package(path: str, reads: Reads) -> bool:
+    """Tell whether a file is one of a package that Python finds elsewhere."""
+    for folder in reads.python_path:
+        if path.startswith(f"{folder}{os.sep}"):
+            if os.path.basename(folder) in _PACKAGE_FOLDERS:
+                return True
+            first = os.path.join(folder, path[len(folder) + 1 :].partition(os.sep)[0])
+            if os.path.isfile(os.path.join(first, "__init__.py")) or first.endswith("-info"):
+                return True
+    return False

@@ -1,0 +1,213 @@
+"""Files in a folder that other people may write to, such as the store of a team.
+
+Nothing below its root is trusted: a name there may be a link, a pipe, a device or a folder. Every folder is opened from
+the one above it without following links, a file without waiting for it, and only a regular file counts. The root itself
+is the user's choice, and may be a link. All names are relative to it.
+
+What is made in a folder that its group may write to belongs to the same group, which may write to it, too, whatever the
+umask, as in a shared repository of Git.
+
+Of Python's library no more is imported than that needs.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from fusesoc_firm.text.files import TEMPORARY
+
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+# A pipe is opened without waiting for its other end, a terminal without becoming ours.
+_FILE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
+_RIGHTS = 0o666
+# So often other processes may remove a folder while a file is put there.
+_TRIES = 100
+
+
+def read(root: str, name: str, most: int) -> bytes | None:
+    """The content of a regular file of at most `most` bytes; None if it is missing, unreadable or anything else."""
+    try:
+        with _opened(root, os.path.dirname(name)) as folder:
+            handle = os.open(os.path.basename(name), os.O_RDONLY | _FILE, dir_fd=folder)
+        try:
+            status = os.fstat(handle)
+            if not stat.S_ISREG(status.st_mode) or status.st_size > most:
+                return None
+            with open(handle, "rb", closefd=False) as file:
+                # It appeared whole, so one that still grows is not ours.
+                content = file.read(status.st_size + 1)
+            return content if len(content) == status.st_size else None
+        finally:
+            os.close(handle)
+    except OSError:
+        return None
+
+
+def write_whole(root: str, name: str, data: bytes) -> None:
+    """Write a file beside its place and put it there by one rename; missing folders are made. Raises `OSError`."""
+    for _ in range(_TRIES - 1):
+        # Another process may remove the folder, or what is in it.
+        with suppress(FileNotFoundError):
+            return _write(root, name, data)
+    return _write(root, name, data)
+
+
+def open_lock(root: str, name: str) -> int:
+    """Open a file that is to be locked, which is made if it is missing; its content stays.
+
+    Raises `OSError`, also if it is not a regular file.
+    """
+    for _ in range(_TRIES - 1):
+        with suppress(FileNotFoundError):
+            return _open_lock(root, name)
+    return _open_lock(root, name)
+
+
+def state(root: str, name: str) -> os.stat_result | None:
+    """The state of what is there, of a link its own; None if it is missing or cannot be told."""
+    try:
+        with _opened(root, os.path.dirname(name)) as folder:
+            return os.stat(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
+    except OSError:
+        return None
+
+
+def listed(root: str, name: str) -> list[tuple[str, os.stat_result]]:
+    """What is in the folders of a folder, with its state; and what is where only folders should be."""
+    found = []
+    for inner, status in _entries(root, name) if _is_folder(root, name) else [(name, state(root, name))]:
+        if status is not None:
+            found += _entries(root, inner) if stat.S_ISDIR(status.st_mode) else [(inner, status)]
+    return found
+
+
+def mark_used(root: str, name: str) -> None:
+    """Set the time of a file, or of a link itself, to now. Raises `OSError`."""
+    with _opened(root, os.path.dirname(name)) as folder:
+        os.utime(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
+
+
+def remove(root: str, name: str) -> int:
+    """Remove what is there, a folder with all that it holds; the number of bytes removed. Raises `OSError`."""
+    try:
+        with _opened(root, os.path.dirname(name)) as folder:
+            return _remove(os.path.basename(name), folder)
+    except FileNotFoundError:
+        # Another process was faster.
+        return 0
+
+
+def _write(root: str, name: str, data: bytes) -> None:
+    # A name that no process of any machine has; a process id is one's own only where it runs.
+    temporary = f"{TEMPORARY}{os.urandom(8).hex()}"
+    with _opened(root, os.path.dirname(name), is_made=True) as folder:
+        try:
+            handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _FILE, _RIGHTS, dir_fd=folder)
+            with open(handle, "wb") as file:
+                _share(handle, folder)
+                file.write(data)
+            os.replace(temporary, os.path.basename(name), src_dir_fd=folder, dst_dir_fd=folder)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(temporary, dir_fd=folder)
+            raise
+
+
+def _open_lock(root: str, name: str) -> int:
+    with _opened(root, os.path.dirname(name), is_made=True) as folder:
+        handle = os.open(os.path.basename(name), os.O_RDWR | os.O_CREAT | _FILE, _RIGHTS, dir_fd=folder)
+        if stat.S_ISREG(os.fstat(handle).st_mode):
+            _share(handle, folder)
+            return handle
+        os.close(handle)
+    raise OSError(errno.EINVAL, "Not a regular file")
+
+
+def _remove(name: str, above: int) -> int:
+    removed = 0
+    # Other processes may remove the same at the same time.
+    with suppress(FileNotFoundError):
+        status = os.stat(name, dir_fd=above, follow_symlinks=False)
+        if not stat.S_ISDIR(status.st_mode):
+            os.unlink(name, dir_fd=above)
+            return status.st_size
+        try:
+            for _, folders, files, handle in os.fwalk(name, topdown=False, dir_fd=above):
+                removed += sum(_remove(inner, handle) for inner in files)
+                for inner in folders:
+                    _remove_folder(inner, handle)
+        except RecursionError:
+            raise OSError(errno.ENAMETOOLONG, "Folders within folders are too many") from None
+        _remove_folder(name, above)
+    return removed
+
+
+def _remove_folder(name: str, above: int) -> None:
+    """Remove a folder, unless another process has written into it, or a link to one."""
+    try:
+        os.rmdir(name, dir_fd=above)
+    except NotADirectoryError:
+        os.unlink(name, dir_fd=above)
+    except OSError:
+        return
+
+
+def _is_folder(root: str, name: str) -> bool:
+    status = state(root, name)
+    return status is not None and stat.S_ISDIR(status.st_mode)
+
+
+def _entries(root: str, name: str) -> list[tuple[str, os.stat_result]]:
+    found = []
+    with suppress(OSError), _opened(root, name) as folder:
+        for inner in sorted(os.listdir(folder)):
+            # Another process may remove it in between.
+            with suppress(OSError):
+                found.append((f"{name}/{inner}", os.stat(inner, dir_fd=folder, follow_symlinks=False)))
+    return found
+
+
+@contextmanager
+def _opened(root: str, name: str, *, is_made: bool = False) -> Iterator[int]:
+    """A folder, opened; it and those above it are made if they are missing and it `is_made`."""
+    if is_made:
+        os.makedirs(root, exist_ok=True)
+    handle = os.open(root, _FOLDER)
+    try:
+        for part in filter(None, name.split("/")):
+            if is_made:
+                _make_folder(part, handle)
+            inner = os.open(part, _FOLDER | os.O_NOFOLLOW, dir_fd=handle)
+            os.close(handle)
+            handle = inner
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _make_folder(name: str, above: int) -> None:
+    with suppress(FileExistsError):
+        os.mkdir(name, dir_fd=above)
+        handle = os.open(name, _FOLDER | os.O_NOFOLLOW, dir_fd=above)
+        try:
+            _share(handle, above)
+        finally:
+            os.close(handle)
+
+
+def _share(handle: int, above: int) -> None:
+    """Give what was made in a folder the group and the rights of that group, if the group may write to the folder."""
+    folder, made = os.fstat(above), os.fstat(handle)
+    if not folder.st_mode & stat.S_IWGRP:
+        return
+    is_folder = stat.S_ISDIR(made.st_mode)
+    rights = stat.S_IRGRP | stat.S_IWGRP | (stat.S_IXGRP | stat.S_ISGID if is_folder else 0)
+    # Not if this user is not in the group, or another one has made it.
+    with suppress(PermissionError):
+        if made.st_gid != folder.st_gid:
+            os.fchown(handle, -1, folder.st_gid)
+        os.fchmod(handle, stat.S_IMODE(made.st_mode) | rights)

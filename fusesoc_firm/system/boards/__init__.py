@@ -1,0 +1,1 @@
+"""Boards, and the top level that fits a system on one."""

@@ -1,0 +1,188 @@
+"""Derived System -> template configuration: the system beside a processor, as a block design of Vivado.
+
+A DMA engine carries frames between the processor's memory and the system's streams. Its descriptors are lists (scatter
+and gather): frames, or the bursts of a preemptive scheduler, come at any time and of any length, each into the next
+buffer. The id is in the bytes, so `m_axis_tid` leads nowhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
+from typing import Any
+
+from fusesoc_firm.system.boards.board import Board, board_entity
+from fusesoc_firm.system.boards.processor import PROCESSORS, Processor
+from fusesoc_firm.system.boards.timing_constraints import period
+from fusesoc_firm.system.derived.kernel import function_name, kernel_entity
+from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.hardware.configuration import pin_groups
+from fusesoc_firm.system.hardware.names import Names
+
+Configuration = dict[str, Any]
+
+BLOCK_DESIGN_TEMPLATE = "board/block_design.tcl"
+PACKAGE_TEMPLATE = "hls/package.tcl"
+
+# Bits of a descriptor's length: as many as the DMA engine has (PG021).
+_LENGTH_BITS = 26
+_ADDRESS_BITS = 32
+_STREAM = ("tdata", "tkeep", "tvalid", "tlast")
+# What Vivado would find out by itself, of interfaces that are connected whole and of pins whose polarity is known.
+_FOUND_OUT = {"c_s_axis_s2mm_tdata_width", "C_AUX_RESET_HIGH"}
+# Clock pins of cells, beside the processor's.
+_CLOCK_PINS = (
+    *(f"dma/{name}_aclk" for name in ("s_axi_lite", "m_axi_sg", "m_axi_mm2s", "m_axi_s2mm")),
+    *("control/aclk", "memory/aclk", "reset/slowest_sync_clk", "system_reset/slowest_sync_clk", "system/clk"),
+)
+
+
+def block_design_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Configuration:
+    """The configuration of the block design; `clock` is the frequency of clk in Hz."""
+    processor = PROCESSORS[str(board.processor)]
+    preset = f'apply_board_preset "{1 if board.board_part else 0}"'
+    return {
+        "design": board_entity(system, board),
+        "system": system.entity,
+        "name": system.name,
+        "board": board.name,
+        "description": str(board.description),
+        "has_clocks": bool(system.clocks),
+        "kernels": [{"function": function_name(type_), "kernel": kernel_entity(type_)} for type_ in system.kernels],
+        "ip": processor.ip,
+        "automation": " ".join(filter(None, (processor.automation, preset))),
+        "processor_properties": _properties(_processor_properties(processor, system, clock)),
+        "cells": [
+            {
+                "cell": cell,
+                "ip": ip,
+                "meaning": meaning,
+                "given": [{"name": name, "cell": cell} for name, _ in properties if name in _FOUND_OUT],
+                "properties": _properties(properties),
+            }
+            for cell, ip, meaning, properties in _cells(system, processor)
+        ],
+        "interfaces": _pairs(_interfaces(processor)),
+        "nets": [
+            {"meaning": meaning, "connections": _pairs(pairs)} for meaning, pairs in _nets(system, processor) if pairs
+        ],
+        "pins": _pins(system),
+        "base": processor.base,
+    }
+
+
+def _processor_properties(processor: Processor, system: DerivedSystem, clock: Fraction) -> Iterator[tuple[str, object]]:
+    yield from processor.properties
+    for number, frequency in enumerate((clock, *(item.frequency for item in system.clocks))):
+        yield processor.clock_switch.format(number), 1
+        yield processor.frequency.format(number), f"{float(frequency / 10**6):.9g}"
+
+
+def _cells(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, str, str, Sequence[tuple[str, object]]]]:
+    """Every cell that is an IP, but the processor."""
+    data_width = max(processor.memory_width, system.width)
+    yield (
+        "dma",
+        "axi_dma",
+        "Frames between memory and streams; a list of descriptors for each direction.",
+        [
+            ("c_include_sg", 1),
+            ("c_sg_include_stscntrl_strm", 0),
+            ("c_sg_length_width", _LENGTH_BITS),
+            ("c_addr_width", _ADDRESS_BITS),
+            ("c_m_axi_mm2s_data_width", data_width),
+            ("c_m_axis_mm2s_tdata_width", system.width),
+            ("c_m_axi_s2mm_data_width", data_width),
+            ("c_s_axis_s2mm_tdata_width", system.width),
+        ],
+    )
+    yield "control", "smartconnect", "Registers of the DMA engine.", [("NUM_SI", 1), ("NUM_MI", 1)]
+    yield "memory", "smartconnect", "Descriptors and frames in memory.", [("NUM_SI", 3), ("NUM_MI", 1)]
+    yield "interrupts", "xlconcat", "One for each direction.", [("NUM_PORTS", 2)]
+    yield "reset", "proc_sys_reset", "The processor's reset, by the clock.", []
+    yield (
+        "system_reset",
+        "proc_sys_reset",
+        "The system's: also with a reset of the DMA engine, so that no program finds half a frame of the last one.",
+        [("C_AUX_RESET_HIGH", 0), ("C_AUX_RST_WIDTH", 1)],
+    )
+
+
+def _interfaces(processor: Processor) -> Iterator[tuple[str, str]]:
+    yield f"processor/{processor.control}", "control/S00_AXI"
+    yield "control/M00_AXI", "dma/S_AXI_LITE"
+    for number, name in enumerate(("M_AXI_SG", "M_AXI_MM2S", "M_AXI_S2MM")):
+        yield f"dma/{name}", f"memory/S{number:02}_AXI"
+    yield "memory/M00_AXI", f"processor/{processor.memory}"
+
+
+def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """What is connected pin by pin, each as driver and sink."""
+    clock = f"processor/{processor.clock.format(0)}"
+    processor_clocks = (f"processor/{processor.control_clock}", f"processor/{processor.memory_clock}")
+    yield "The clock", [(clock, pin) for pin in (*processor_clocks, *_CLOCK_PINS)]
+    yield (
+        "Further clocks",
+        [
+            (f"processor/{processor.clock.format(number)}", f"system/{item.port}")
+            for number, item in enumerate(system.clocks, start=1)
+        ],
+    )
+    yield (
+        "Resets",
+        [
+            *((f"processor/{processor.reset}", f"{cell}/ext_reset_in") for cell in ("reset", "system_reset")),
+            *(("reset/interconnect_aresetn", f"{cell}/aresetn") for cell in ("control", "memory")),
+            ("reset/peripheral_aresetn", "dma/axi_resetn"),
+            ("dma/mm2s_prmry_reset_out_n", "system_reset/aux_reset_in"),
+            ("system_reset/peripheral_aresetn", "system/rst_n"),
+        ],
+    )
+    yield (
+        "Frames to the system, and from it",
+        [
+            *((f"dma/m_axis_mm2s_{name}", f"system/s_axis_{name}") for name in _STREAM),
+            ("system/s_axis_tready", "dma/m_axis_mm2s_tready"),
+            *((f"system/m_axis_{name}", f"dma/s_axis_s2mm_{name}") for name in _STREAM),
+            ("dma/s_axis_s2mm_tready", "system/m_axis_tready"),
+        ],
+    )
+    yield (
+        "Interrupts",
+        [
+            ("dma/mm2s_introut", "interrupts/In0"),
+            ("dma/s2mm_introut", "interrupts/In1"),
+            ("interrupts/dout", f"processor/{processor.interrupts}"),
+        ],
+    )
+
+
+def _pins(system: DerivedSystem) -> list[Configuration]:
+    """The pins of accelerators as ports of the design."""
+    return [
+        {"name": port["name"], "direction": "I" if port["direction"] == "in" else "O", "bits": port["bits"]}
+        for group in pin_groups(Names(system), system)
+        for port in group["ports"]
+    ]
+
+
+def package_configuration(
+    type_: AcceleratorType, sources: Sequence[str], system: DerivedSystem, board: Board, clock: Fraction
+) -> Configuration:
+    """The configuration of the script by which Vitis HLS makes an IP of a C++ function, from `sources` beside it."""
+    clocks = {item.name: item.frequency for item in system.clocks}
+    fastest = max(clocks.get(block.clock, clock) for block in system.accelerators if block.type is type_)
+    return {
+        "function": function_name(type_),
+        "part": str(board.part),
+        "period": period(fastest),
+        "sources": [{"file": source} for source in sources],
+    }
+
+
+def _properties(properties: Iterable[tuple[str, object]]) -> list[Configuration]:
+    return [{"name": name, "value": str(value)} for name, value in properties]
+
+
+def _pairs(pairs: Iterable[tuple[str, str]]) -> list[Configuration]:
+    return [{"source": source, "sink": sink} for source, sink in pairs]

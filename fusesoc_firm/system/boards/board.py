@@ -1,0 +1,267 @@
+"""A board: what its FPGA is connected to, and the top level that fits a system on it.
+
+A board is one YAML file. Those of the package lie in `fusesoc_firm/boards`; a core names its own by a path. One without
+a processor has pins, and a link to the host. One with a processor has the system in a block design (`block_design`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.system.boards.processor import MOST_CLOCKS, PROCESSORS
+from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
+from fusesoc_firm.system.hardware.configuration import top_level_pins
+from fusesoc_firm.system.hardware.interconnect import LINK_PINS
+from fusesoc_firm.system.written.specification import AXI_STREAM, LINKS, Specification
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail, nearest
+from fusesoc_firm.text.naming import identifier, text_fault
+from fusesoc_firm.text.yaml_sections import Section, key, read
+from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
+
+FOLDER = Path(__file__).resolve().parents[2] / "boards"
+BOARD_TEMPLATE = "vhdl/board.vhd"
+
+# Edalize's flows for boards with pins, each with the form of its constraints: their template, FuseSoC's file type.
+FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
+# Tools that take the system with its streams: Vivado beside a processor, Quartus as it is.
+VIVADO, QUARTUS = "vivado", "quartus"
+# What they have to know of a board.
+_NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
+_CLOCK = "clk"
+_PORTS = (
+    _CLOCK,
+    *(name for pins in LINK_PINS.values() for name, _, _ in pins),
+    *("led", "led_n", "reset", "reset_n"),
+)
+# What a board may do without.
+_OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq"}
+
+
+# What FPGAs, families and pins are called: scripts and constraints have such words without quotes.
+_WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.,:+/()-]*")
+
+
+def word_fault(text: str) -> tuple[str, str] | None:
+    """What keeps `text` from being what tools call an FPGA, a family or a pin; None if nothing does."""
+    if fault := text_fault(text):
+        return fault
+    legal = "legal are letters, digits, blanks and '_.,:+/()-', a letter or digit first"
+    return None if _WORD.fullmatch(text) else (f"cannot be '{text}'", legal)
+
+
+@dataclass(frozen=True)
+class BoardPin(Section):
+    """A pin of the FPGA that the top level uses."""
+
+    port: Text = key("what is connected there: a port of the board's, or a pin of an accelerator", is_required=True)
+    site: Text = key("the pin, as the FPGA's maker calls it", is_required=True, rule=word_fault)
+    standard: Text | None = key("its electrical standard, if it is not the board's", rule=word_fault)
+
+
+@dataclass(frozen=True)
+class Board(Section):
+    """The whole file."""
+
+    description: Text = key("maker, board and FPGA", is_required=True)
+    flow: Text = key("what of Edalize builds for it", is_required=True, choices=(*FLOWS, *_NEEDED))
+    clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
+    interconnect: Text = key("how the host is connected", is_required=True, choices=(AXI_STREAM, *LINKS))
+    part: Text | None = key("the FPGA as Vivado calls it", rule=word_fault)
+    board_part: Text | None = key(
+        "the board as Vivado calls it, if Vivado is to set up the processor", name="boardPart", rule=word_fault
+    )
+    processor: Text | None = key("the FPGA's processor", choices=tuple(PROCESSORS))
+    standard: Text | None = key("electrical standard of the pins, where the flow wants one", rule=word_fault)
+    device: Text | None = key("the device, for flows that ask for one", rule=word_fault)
+    device_family: Text | None = key("its family, for flows that ask for one", name="deviceFamily", rule=word_fault)
+    synth_options: tuple[Text, ...] = key("options of Yosys' synth command", name="synthOptions", form="texts")
+    nextpnr_options: tuple[Text, ...] = key("options of nextpnr", name="nextpnrOptions", form="texts")
+    pins: tuple[BoardPin, ...] = key("the pins that are used", form="sections", section=BoardPin)
+    name: str = ""
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether a link of bytes leads to the host."""
+        return self.flow in FLOWS
+
+
+@dataclass(frozen=True)
+class _Port:
+    """A pin of an accelerator at the top level: bits of a vector or None, and what to call it in a message."""
+
+    name: str
+    direction: str
+    width: int | None
+    what: str
+    source: SourceRef | None
+
+    def bits(self) -> list[str]:
+        """Every bit, each of which has a place of its own."""
+        return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
+
+
+def boards() -> tuple[str, ...]:
+    """The names of the package's boards."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
+
+
+def board_path(name: str, folder: Path) -> Path:
+    """The file of the package's board of this name, or a file below `folder`."""
+    return folder / name if name.endswith((".yaml", ".yml")) else FOLDER / f"{name}.yaml"
+
+
+def read_board(name: str, folder: Path = Path()) -> Board:
+    """The board that `board_path` says. Raises `InputError`."""
+    path = board_path(name, folder)
+    if not path.is_file():
+        fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
+    faults = Diagnostics()
+    text = read_yaml(path, name if path.parent != FOLDER else path.name, faults)
+    if text.root is None or is_null(text.root):
+        faults.raise_if_any()
+        fail(f"{name} is empty; a board needs the keys 'description', 'flow', 'clock' and 'interconnect'")
+    board = read(Board, text.root, text, faults, "a board")
+    if board.is_sound and board.is_linked:
+        _check_pins(board, faults)
+    elif board.is_sound:
+        _check_streams(board, faults)
+    faults.raise_if_any()
+    return replace(board, name=identifier(path.stem).lower())
+
+
+def _check_pins(board: Board, faults: Diagnostics) -> None:
+    if board.interconnect not in LINKS:
+        faults.error(
+            f"flow '{board.flow}' has no processor to take streams", board.interconnect.source, nearest("", LINKS)
+        )
+        return
+    seen: dict[str, Text] = {}
+    for pin in board.pins:
+        twin = seen.setdefault(pin.port.lower(), pin.port)
+        if twin is not pin.port:
+            faults.error(f"port '{pin.port}' has a pin already, at {twin.source}", pin.port.source)
+    source = board.pins[-1].source if board.pins else board.source
+    needed = {_CLOCK, *(name for name, _, _ in LINK_PINS[LinkKind(board.interconnect)])} - _OPTIONAL
+    for port in sorted(needed - seen.keys()):
+        faults.error(f"the board has no pin for '{port}'", source, f"'{board.interconnect}' needs it")
+
+
+def _check_streams(board: Board, faults: Diagnostics) -> None:
+    given = {
+        "part": board.part,
+        "processor": board.processor,
+        "device": board.device,
+        "deviceFamily": board.device_family,
+    }
+    for name in _NEEDED[board.flow]:
+        if given[name] is None:
+            faults.error(f"a board of flow '{board.flow}' needs the key '{name}'", board.source)
+    if board.interconnect != AXI_STREAM:
+        faults.error(f"flow '{board.flow}' takes streams", board.interconnect.source, f"legal here: {AXI_STREAM}")
+    if board.pins:
+        message = f"flow '{board.flow}' takes no pins"
+        faults.error(message, board.place("pins"), "constraints of your own belong into a fileset of the core")
+
+
+def on_board(specification: Specification, board: Board) -> Specification:
+    """The specification of the system on the board, whose interconnect it has.
+
+    The pin of a board without a processor decides what clk is; a PLL makes whatever the specification wants.
+    """
+    clock = board.clock if board.is_linked else specification.project.clock or board.clock
+    return replace(specification, project=replace(specification.project, interconnect=board.interconnect, clock=clock))
+
+
+def check_fits(system: DerivedSystem, board: Board) -> None:
+    """Raise `InputError` for what a system has and a board's file cannot say."""
+    clocks = 1 + len(system.clocks)
+    if board.processor and clocks > MOST_CLOCKS:
+        fail(f"board '{board.name}' makes {MOST_CLOCKS} clocks, clk included; the system has {clocks}")
+    if not board.is_linked:
+        return
+    faults = Diagnostics()
+    for clock in system.clocks:
+        faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="a board has one clock, clk")
+    _check_places(_accelerator_pins(system), board, faults)
+    faults.raise_if_any()
+
+
+def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> None:
+    """Note every pin of an accelerator that the board has no place for, and every place that is for none."""
+    places = {pin.port.lower() for pin in board.pins}
+    for pin in pins:
+        if pin.name in _PORTS:
+            faults.error(f"{pin.what} is called '{pin.name}', as a port of every board may be", pin.source)
+        elif missing := next((bit for bit in pin.bits() if bit not in places), None):
+            hint = f"give a board file of your own a '{{port: {missing}, site: ...}}'"
+            faults.error(f"{pin.what} has no place on board '{board.name}'", pin.source, hint)
+    known = (*_PORTS, *(bit for pin in pins for bit in pin.bits()))
+    for place in board.pins:
+        if place.port.lower() not in known:
+            message = f"nothing of the system is called '{place.port}'"
+            faults.error(message, place.port.source, nearest(place.port, known))
+
+
+def board_entity(system: DerivedSystem, board: Board) -> str:
+    """The top level of a system on a board; beside a processor, the block design."""
+    return system.entity if board.flow == QUARTUS else f"{system.name}_{board.name}"
+
+
+def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
+    """The configuration of the top level, and of the constraints of its ports."""
+    assert system.link is not None
+    clock_hz = system.link.clock_hz
+    ports = {pin.port.lower() for pin in board.pins}
+    pins = _accelerator_pins(system)
+    link = [(name, direction) for name, direction, _ in LINK_PINS[system.link.kind] if name in ports]
+    own = [(name, "out" if name.startswith("led") else "in") for name in ("led", "led_n", "reset", "reset_n")]
+    declared = [(_CLOCK, "in"), *link, *((name, direction) for name, direction in own if name in ports)]
+    typed = [(name, direction, vhdl_type(None)) for name, direction in declared]
+    typed += [(pin.name, pin.direction, vhdl_type(pin.width)) for pin in pins]
+    return {
+        "entity": board_entity(system, board),
+        "system": system.entity,
+        "description": str(board.description),
+        "clock_hz": clock_hz,
+        "error_count": len(system.error_blocks),
+        "ports": [{"name": name, "direction": direction, "type": type_} for name, direction, type_ in typed],
+        "handed_on": [*(name for name, _ in link), *(pin.name for pin in pins)],
+        **{name: name in ports for name, _ in own},
+        "is_uart": system.link.kind is LinkKind.UART,
+        "clock_mhz": f"{clock_hz / 10**6:g}",
+        "pins": [
+            {
+                "port": str(pin.port).lower(),
+                "site": str(pin.site),
+                "standard": _standard(pin, board),
+            }
+            for pin in board.pins
+        ],
+    }
+
+
+def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
+    standard = pin.standard or board.standard
+    return {"port": str(pin.port).lower(), "name": str(standard)} if standard else None
+
+
+def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
+    """The pins of accelerators, as the top level has them."""
+    names = top_level_pins(system)
+    return [
+        _Port(
+            # As GHDL writes it: it has forgotten the case.
+            names[block.block, pin.name].lower(),
+            str(pin.direction),
+            pin.bits,
+            f"pin '{pin.name}' of '{block.block}'",
+            pin.name.source,
+        )
+        for block in system.accelerators
+        for pin in block.type.accelerator.pins
+    ]

@@ -1,0 +1,43 @@
+"""Derived System -> template configuration: constraints of clocks, and of the paths between them.
+
+docs/how-to/use-several-clocks.md lists them.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from fusesoc_firm.system.boards.board import Board
+from fusesoc_firm.system.boards.processor import PROCESSORS
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.hardware.names import reset_label, seen_reset
+
+Configuration = dict[str, Any]
+
+
+def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Configuration:
+    """The configuration; `clock` is the frequency of clk in Hz. A processor has names of its own for its clocks."""
+    clocks = [("clk", clock), *((item.port, item.frequency) for item in system.clocks)]
+    if board.processor:
+        name = PROCESSORS[str(board.processor)].timing_clock
+        named = [(name.format(number), port, frequency) for number, (port, frequency) in enumerate(clocks)]
+    else:
+        named = [(port, port, frequency) for port, frequency in clocks]
+    resets = [reset for item in system.clocks for reset in (item.reset, seen_reset(item))]
+    return {
+        "description": str(board.description),
+        "clocks": [{"name": name, "port": port, "period": period(frequency)} for name, port, frequency in named],
+        "pairs": [
+            {"source": source, "sink": sink, "period": period(max(first, second))}
+            for source, _, first in named
+            for sink, _, second in named
+            if source != sink
+        ],
+        "resets": [{"label": reset_label(reset)} for reset in resets],
+    }
+
+
+def period(frequency: Fraction) -> str:
+    """The period in ns of a frequency in Hz."""
+    return f"{float(10**9 / frequency):.3f}"

@@ -1,0 +1,1 @@
+"""The system derived from it: types, data flow, ids, clocks and times."""

@@ -1,0 +1,247 @@
+"""Which message goes where: the ports and fields that each `outgoing` means, and what is wrong with the data flow.
+
+A connection that cannot be made is one fault. What lacks a message only because of it is not reported as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
+
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import Names, Paths, names_in_use, select, with_names_in_use
+from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.system.derived.model import Connection, End, MessageSide
+from fusesoc_firm.system.written.specification import Block, Outgoing
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, nearest
+from fusesoc_firm.text.yaml_text import Text
+
+Sides = Mapping[str, tuple[MessageSide, ...]]
+Pair = tuple[MessageSide, MessageSide]
+
+# Stands for the fields of a message that has none.
+_NO_FIELD: Names = ()
+
+
+@dataclass
+class Wiring:
+    """The connections between `blocks`, by name, whose message sides are known (`inputs`, `outputs`).
+
+    Where the specification has faults: `has_more_blocks` tells that there are blocks whose names could not be read,
+    `has_more_messages` that there are connections of messages that are not known; `strays` are messages of connections
+    that could not be read. `ambiguous` are names of several blocks; the first is in the tables.
+    """
+
+    blocks: Mapping[str, Block]
+    inputs: Sides
+    outputs: Sides
+    faults: Diagnostics
+    has_more_blocks: bool = False
+    has_more_messages: bool = False
+    strays: set[tuple[MessageName, Middleware]] = field(default_factory=set)
+    ambiguous: set[str] = field(default_factory=set)
+    # The fields that go from each source to each of its sinks, and who drives each field of a sink.
+    sinks: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)
+    frames: dict[End, Frame] = field(default_factory=dict)
+    driven: dict[End, dict[Names, Outgoing]] = field(default_factory=dict)
+    # The two ends of connections that could not be made.
+    broken_sources: set[str] = field(default_factory=set)
+    broken_sinks: set[str] = field(default_factory=set)
+
+    def connect(self) -> tuple[Connection, ...]:
+        """One connection a message side that gives, in the order of the specification."""
+        for block in self.blocks.values():
+            for outgoing in block.outgoing:
+                if not self._connect(block, outgoing):
+                    self.broken_sources.add(block.name)
+                    self.broken_sinks.add(outgoing.name)
+        if not self.has_more_messages:
+            self._check_sinks()
+        self._check_sources()
+        self._check_cycles()
+        return tuple(
+            Connection(
+                source, tuple(ends), tuple(with_names_in_use(self.frames[source], names) for names in ends.values())
+            )
+            for source, ends in self.sinks.items()
+        )
+
+    def _connect(self, block: Block, outgoing: Outgoing) -> bool:
+        """Make one connection; False where there is none, with the fault noted unless it is already."""
+        if not self._are_known(block, outgoing):
+            return False
+        pairs = self._pairs(block, outgoing)
+        if not pairs:
+            return False
+        free = [pair for pair in pairs if self._rivals(outgoing, pair, pairs[pair]) is None]
+        if not free:
+            rival = self._rivals(outgoing, *next(iter(pairs.items())))
+            if outgoing.name not in self.ambiguous and rival:
+                name, first = rival
+                what = f"'{dotted(name)}'" if outgoing.include or outgoing.exclude else "this message"
+                hint = f"a field comes from one block; this one is named at {first.name.source}"
+                self.faults.error(f"'{outgoing.name}' gets {what} already", outgoing.name.source, hint)
+            return False
+        pair = self._chosen(block, free)
+        source, sink = self._source(block, pair), self._sink(outgoing, pair)
+        self.frames[source] = pair[0].frame
+        self.driven.setdefault(sink, {}).update(dict.fromkeys(pairs[pair], outgoing))
+        ends = self.sinks.setdefault(source, {})
+        ends[sink] = ends.get(sink, frozenset()) | pairs[pair]
+        return True
+
+    def _are_known(self, block: Block, outgoing: Outgoing) -> bool:
+        name = outgoing.name
+        if not name:
+            return False
+        if name not in self.blocks:
+            if not self.has_more_blocks:
+                self.faults.error(f"no block is called '{name}'", name.source, nearest(name, self.blocks))
+            self.strays |= {side.kind for side in self.outputs.get(block.name, ())}
+            return False
+        target = self.blocks[name]
+        if block.type is None and block.mode == "publisher":
+            message = f"'{block.name}' is a publisher; its message goes to the host"
+            self.faults.error(message, name.source, "'outgoing' belongs to subscribers and accelerators")
+            return False
+        if target.type is None and target.mode == "subscriber":
+            message = f"'{name}' is a subscriber; its message comes from the host"
+            self.faults.error(message, name.source, "'outgoing' names accelerators and publishers")
+            return False
+        return block.name in self.outputs and name in self.inputs
+
+    def _pairs(self, block: Block, outgoing: Outgoing) -> dict[Pair, frozenset[Names]]:
+        """The sides at both ends that carry the same message, each with the fields that go this way."""
+        gives, takes = self.outputs[block.name], self.inputs[outgoing.name]
+        alike = [(given, taken) for given in gives for taken in takes if given.kind == taken.kind]
+        if not alike:
+            self.faults.error(
+                f"'{block.name}' gives {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
+                outgoing.name.source,
+                _what_lacks(block, gives, "output")
+                or _what_lacks(self.blocks[outgoing.name], takes, "input")
+                or "a connection is between blocks of the same message, in the same ROS version",
+            )
+            return {}
+        try:
+            pairs = {pair: _fields(outgoing, *pair) for pair in alike}
+        except InputError as error:
+            self.faults.take(error, None)
+            return {}
+        pairs = {pair: names for pair, names in pairs.items() if names}
+        if not pairs:
+            self.faults.error(
+                f"no field goes from '{block.name}' to '{outgoing.name}'",
+                outgoing.name.source,
+                "what both ends have and 'include' and 'exclude' leave goes there",
+            )
+        return pairs
+
+    def _rivals(self, outgoing: Outgoing, pair: Pair, names: Iterable[Names]) -> tuple[Names, Outgoing] | None:
+        """A field that the sink gets already, and by which connection."""
+        driven = self.driven.get(self._sink(outgoing, pair), {})
+        return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
+
+    def _chosen(self, block: Block, free: Sequence[Pair]) -> Pair:
+        """The first pair with an output that goes nowhere yet; else the last output that fits gets one more sink."""
+        unused = [pair for pair in free if self._source(block, pair) not in self.sinks]
+        last = free[-1][0]
+        return unused[0] if unused else next(pair for pair in free if pair[0] == last)
+
+    @staticmethod
+    def _source(block: Block, pair: Pair) -> End:
+        return End(str(block.name), pair[0].prefix)
+
+    @staticmethod
+    def _sink(outgoing: Outgoing, pair: Pair) -> End:
+        return End(str(outgoing.name), pair[1].prefix)
+
+    def _check_sinks(self) -> None:
+        for block in self.blocks.values():
+            for side in self.inputs.get(block.name, ()):
+                if block.name not in self.broken_sinks and side.kind not in self.strays:
+                    self._check_sink(block, side)
+
+    def _check_sink(self, block: Block, side: MessageSide) -> None:
+        """A publisher sends defaults for fields that it does not get; an accelerator needs all of its input."""
+        driven = self.driven.get(End(str(block.name), side.prefix), {})
+        missing = sorted(dotted(name) for name in _names(side.frame) - driven.keys())
+        if not driven:
+            self.faults.error(
+                f"nothing goes to {_words('input', side)} of '{block.name}' ({side.frame.message})",
+                block.name.source,
+                f"name '{block.name}' as 'outgoing' of a block that gives {side.frame.message}",
+            )
+        elif missing and block.type is not None:
+            self.faults.error(
+                f"{_words('input', side)} of '{block.name}' ({side.frame.message}) lacks {', '.join(missing)}",
+                block.name.source,
+                "let a connection include it, or the accelerator's interface exclude it",
+            )
+
+    def _check_sources(self) -> None:
+        for block in self.blocks.values():
+            for side in self.outputs.get(block.name, ()):
+                is_excused = not block.is_sound or block.name in self.broken_sources
+                if not is_excused and End(str(block.name), side.prefix) not in self.sinks:
+                    self.faults.error(
+                        f"{_words('output', side)} of '{block.name}' ({side.frame.message}) goes nowhere",
+                        block.name.source,
+                        f"name a block that takes {side.frame.message} as 'outgoing' of '{block.name}'",
+                    )
+
+    def _check_cycles(self) -> None:
+        """A message cannot be waited for by what it is made of."""
+        # Lists, as the order in sets of strings differs from run to run.
+        graph: dict[str, list[str]] = {}
+        for source, sinks in self.sinks.items():
+            for sink in sinks:
+                graph.setdefault(sink.block, []).append(source.block)
+        while cycle := _cycle(graph):
+            order = list(self.blocks)
+            start = min(range(len(cycle)), key=lambda position: order.index(cycle[position]))
+            way = [*cycle[start:], *cycle[: start + 1]]
+            self.faults.error(f"these blocks wait for each other: {' -> '.join(way)}", self.blocks[way[0]].name.source)
+            # Without this step it is no cycle; there may be others.
+            graph[way[1]] = [block for block in graph[way[1]] if block != way[0]]
+
+
+def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
+    """The blocks of a cycle in the direction of its messages, each once; empty if there is none."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        # Each is the predecessor of the next; the first comes again at the end.
+        return list(error.args[1][:-1])
+    return []
+
+
+def _fields(outgoing: Outgoing, given: MessageSide, taken: MessageSide) -> frozenset[Names]:
+    """The fields that go from one side to another. Raises `InputError` for a path that is none."""
+    chosen = select(given.frame, *(places(paths) for paths in (outgoing.include, outgoing.exclude)))
+    return _names(given.frame) & _names(taken.frame) & _names(chosen)
+
+
+def places(paths: Iterable[Text]) -> Paths:
+    """The paths of `include` or `exclude`, as `select` takes them."""
+    return {path: path.source for path in paths}
+
+
+def _names(frame: Frame) -> frozenset[Names]:
+    return names_in_use(frame) if frame.names else frozenset({_NO_FIELD})
+
+
+def _messages(sides: Sequence[MessageSide]) -> str:
+    return " and ".join(f"{side.frame.message} ({side.frame.ros.title})" for side in sides) or "no message"
+
+
+def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
+    """The key that an accelerator lacks which has no message at this side; empty if it has one."""
+    return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
+
+
+def _words(what: str, side: MessageSide) -> str:
+    return f"{what} '{side.prefix}'" if side.prefix else f"the {what}"

@@ -1,0 +1,68 @@
+"""The design units of a system: a tool keeps one of each name, so no two may share one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.constants import constants_package
+from fusesoc_firm.converter.payload_length import length_entity
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.system.derived.kernel import kernel_entity
+from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.written.specification import Block
+from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.naming import identifier
+
+
+def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
+    """Note every block and accelerator that cannot have the entities that its message, name or sources ask for."""
+    owners = {
+        system.entity: "the system",
+        f"{system.entity}_tb": "the system's test bench",
+        f"{system.entity}_live": "the system's test bench at the end of a pipe",
+        f"{system.entity}_in_environment": "the system's test bench",
+    }
+    frames: dict[str, Frame] = {}
+    packages: dict[str, MessageName] = {}
+    for entity, block, frame in _converters(system):
+        if frames.setdefault(entity, frame) != frame:
+            message = f"'{block}' and {owners[entity]} need the entity '{entity}' for different messages"
+            hint = f"one system has a message in one ROS version: here {frames[entity].ros.title}"
+            faults.error(message, blocks[block].name.source, hint)
+        owners.setdefault(entity, f"converter '{block}'")
+        package = constants_package(frame.message)
+        if packages.setdefault(package, frame.message) != frame.message:
+            message = f"'{block}' and {owners[package]} need the package '{package}' for different messages"
+            hint = "a package is called after package and name of its message, joined with '_', in small letters"
+            faults.error(message, blocks[block].name.source, hint)
+        owners.setdefault(package, f"converter '{block}'")
+    for frame, suffix in system.computed_lengths.items():
+        owners.setdefault(length_entity(frame, suffix), f"what computes the length of {frame.message}")
+    for accelerator in system.accelerator_types:
+        name = accelerator.accelerator.name
+        if accelerator.accelerator.type != "HLS" and identifier(name) != name:
+            hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+            faults.error(
+                f"no {'module' if accelerator.is_component else 'entity'} can be called '{name}'", name.source, hint
+            )
+        for entity in _entities(accelerator):
+            if owner := owners.get(entity.lower()):
+                hint = "the entities of one system have names of their own, whatever their capitals"
+                faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source, hint)
+            owners[entity.lower()] = f"accelerator '{name}'"
+
+
+def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
+    """The entity of each converter, its block and its frame."""
+    for converter in system.subscribers:
+        yield subscriber_entity(converter.frame, converter.suffix), converter.block, converter.frame
+    for converter in system.publishers:
+        yield publisher_entity(converter.frame, converter.suffix), converter.block, converter.frame
+
+
+def _entities(accelerator: AcceleratorType) -> Iterator[str]:
+    yield accelerator.entity
+    if accelerator.accelerator.type == "HLS":
+        yield kernel_entity(accelerator)

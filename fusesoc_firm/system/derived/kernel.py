@@ -1,0 +1,134 @@
+"""Accelerators written as a C++ function for high-level synthesis.
+
+Such an accelerator is a kernel with the `ap_ctrl_hs` handshake that HLS tools give a function, and a wrapper that
+gives it the message sides of an accelerator. In synthesis the kernel is what the HLS tool makes. In simulation it is
+an entity of the same name and ports that calls the user's function itself, compiled to a shared library.
+
+The function is called after its file. It takes the inputs' fields by value, then the outputs' by pointer or
+reference, in wire order; its parameters should be called `<field>_in` and `<field>_out`, which become the ports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from fusesoc_firm.converter.limits import check_fixed_size
+from fusesoc_firm.converter.ports import FieldPort, field_ports
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.system.derived.model import AcceleratorType, MessageSide
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.naming import distinct_identifiers, identifier
+
+AP_PORTS = ("ap_clk", "ap_rst", "ap_start", "ap_done", "ap_idle", "ap_ready")
+"""The ports of the handshake `ap_ctrl_hs`."""
+WORD_BITS = 32
+"""Bits of a word between the function and its kernel."""
+_CPP_TYPES = {
+    "bool": "bool",
+    "float32": "float",
+    "float64": "double",
+    **{f"{sign}int{bits}": f"std::{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)},
+}
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A parameter of the C++ function.
+
+    `port` is the kernel's, `signal` the accelerator's; `word` is the first of the words of 32 bits that carry it.
+    """
+
+    port: str
+    signal: str
+    field: FieldPort
+    word: int
+
+    @property
+    def bits(self) -> int:
+        """Bits of the kernel's port."""
+        return self.field.width or 1
+
+    @property
+    def words(self) -> int:
+        """Words of 32 bits that carry it."""
+        return -(-self.bits // WORD_BITS)
+
+
+def function_name(accelerator: AcceleratorType) -> str:
+    """The C++ function: named after the first source file."""
+    return PurePosixPath(accelerator.accelerator.sources[0]).stem
+
+
+def kernel_entity(accelerator: AcceleratorType) -> str:
+    """The entity around the function, which the wrapper instantiates: an IP, or in simulation what calls the C++.
+
+    Not the function's own name: that is a module within the IP.
+    """
+    return f"{function_name(accelerator)}_kernel"
+
+
+def library_name(accelerator: AcceleratorType) -> str:
+    """The shared library that simulation loads from its work folder."""
+    return f"lib{function_name(accelerator)}.so"
+
+
+def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:
+    """The function's inputs and outputs, of an accelerator that `check_kernel` has no fault to note in."""
+    inputs = [(side, field) for side in accelerator.inputs for field in field_ports(side.frame)]
+    outputs = [(side, field) for side in accelerator.outputs for field in field_ports(side.frame)]
+    # `in_` gives `x_in`, and `in1_` gives `x_in1`.
+    names = distinct_identifiers([(field.name, side.prefix) for side, field in inputs + outputs], AP_PORTS)
+    return _arguments(inputs, names), _arguments(outputs, names[len(inputs) :])
+
+
+def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[str]) -> list[Argument]:
+    found: list[Argument] = []
+    for (side, field), name in zip(fields, names, strict=False):
+        word = found[-1].word + found[-1].words if found else 0
+        found.append(Argument(name, f"{side.prefix}{field.name}", field, word))
+    return found
+
+
+def prototype(accelerator: AcceleratorType) -> str:
+    """The function as it must be declared."""
+    inputs, outputs = arguments(accelerator)
+    parameters = [f"{cpp_type(item)} {item.port}" for item in inputs]
+    parameters += [f"{cpp_type(item)} *{item.port}" for item in outputs]
+    return f"void {function_name(accelerator)}({', '.join(parameters)})"
+
+
+def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
+    """Note what keeps an accelerator from being a function: its name, or messages that no plain parameters carry."""
+    name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
+    function = function_name(accelerator)
+    if identifier(function) != function:
+        hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+        message = f"the function is called after its file, and '{function}' cannot be its name"
+        faults.error(message, sources[0].source, hint)
+    if not accelerator.inputs or not accelerator.outputs:
+        lacking = "output" if accelerator.inputs else "input"
+        message = f"'{name}' is of type HLS, which needs at least one input and one output"
+        faults.error(message, name.source, f"its interface has no '{lacking}'")
+    interface = accelerator.accelerator.interface
+    for side, item in zip(
+        (*accelerator.inputs, *accelerator.outputs), (*interface.input, *interface.output), strict=True
+    ):
+        for problem in _problems(side.frame):
+            message = f"'{name}' is of type HLS, which takes {problem}"
+            faults.error(message, item.message.source, "write this accelerator in VHDL")
+
+
+def _problems(frame: Frame) -> list[str]:
+    """What of a message no parameter carries, behind what one does."""
+    try:
+        check_fixed_size(frame)
+    except InputError as error:
+        return [f"messages of fixed size, but {fault.message}" for fault in error.diagnostics]
+    return [f"single values, not the array {port.comment}" for port in field_ports(frame) if port.field.is_array]
+
+
+def cpp_type(argument: Argument) -> str:
+    """The C++ type of an argument."""
+    return _CPP_TYPES[argument.field.field.type.name]

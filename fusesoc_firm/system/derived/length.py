@@ -1,0 +1,189 @@
+"""How the length of a payload is known ahead of it, and which publishers store their frames whole.
+
+A length is computed from those of the parts, given by the accelerator, or counted in a buffer behind the publisher. A
+buffer also stands where several publishers wait for the same stream: as only one of them sends at a time, the others
+would hold up its stream for ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from fusesoc_firm.frame.length import Length, Repeat, sent_length_of
+from fusesoc_firm.frame.model import Data, Frame, Loop, all_nodes
+from fusesoc_firm.frame.select import names_in_use, select
+from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.system.derived.model import Connection, End, LengthSource, MessageSide, PayloadLength
+from fusesoc_firm.system.written.specification import Block, OutputType
+from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.naming import identifier
+
+# More than any FPGA has on the chip.
+_LARGEST_BUFFER = 2**24
+_ADD_BUFFER = "add 'buffer: <bytes of its longest payload>'"
+
+
+def with_lengths(
+    connections: Sequence[Connection],
+    outputs: Mapping[str, Sequence[MessageSide]],
+    blocks: Mapping[str, Block],
+    faults: Diagnostics,
+) -> tuple[Connection, ...]:
+    """The connections with how the lengths of their payloads are known."""
+    found: list[Connection] = []
+    suffixes: dict[Frame, str] = {}
+    for connection in connections:
+        if connection.frame.is_fixed_size:
+            found.append(connection)
+            continue
+        source = connection.source
+        (side,) = (side for side in outputs[source.block] if side.prefix == source.prefix)
+        _check_whole(connection, side, connections, blocks, faults)
+        is_sent = any(blocks[sink.block].type is None for sink in connection.sinks)
+        length = side.length or _subscriber_length(connection.frame, is_sent=is_sent)
+        if connection.frame != select(connection.frame):
+            # Outputs of the same parts share the entity of the first.
+            suffix = suffixes.setdefault(connection.frame, f"_{identifier(source.block).lower()}")
+            length = replace(length, suffix=suffix)
+        found.append(replace(connection, length=length))
+    return tuple(found)
+
+
+def _check_whole(
+    connection: Connection,
+    side: MessageSide,
+    connections: Sequence[Connection],
+    blocks: Mapping[str, Block],
+    faults: Diagnostics,
+) -> None:
+    """Note a message of variable size that is taken apart: where its segments end depends on its fields."""
+    names = [names_in_use(frame) for frame in connection.frames]
+    whole = names[0] if blocks[connection.source.block].type is None else names_in_use(side.frame)
+    message = connection.frame.message
+    for end, given in zip(connection.sinks, names, strict=True):
+        place = blocks[end.block].name.source
+        if given != whole:
+            apart = ", ".join(f"'{dotted(name)}'" for name in sorted(given ^ whole))
+            text = f"'{end.block}' takes other fields of {message} than '{connection.source.block}' gives: {apart}"
+            faults.error(text, place, "a message of variable size goes with the same fields to all that take it")
+        if sum(end in other.sinks for other in connections) > 1:
+            text = f"'{end.block}' gets {message} from several blocks"
+            faults.error(text, place, "a message of variable size comes from one block")
+
+
+def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
+    """How the length of what a subscriber gives is known: it has that of the whole message.
+
+    Without all its parts a message that is sent on (`is_sent`) has another one; to an accelerator it is what came.
+    """
+    unused = [node for node in all_nodes(frame.nodes) if isinstance(node, Data | Loop) and not node.is_used]
+    if not unused or not is_sent:
+        return PayloadLength(LengthSource.GIVEN, "the subscriber has it")
+    length = sent_length_of(frame)
+    if length.minimum == length.maximum:
+        return PayloadLength(LengthSource.COMPUTED, "it is always the same without what is not used")
+    names = ", ".join(dict.fromkeys(f"'{dotted(node.names)}'" for node in unused))
+    return PayloadLength(LengthSource.BUFFERED, f"the subscriber's is with {names}, which goes nowhere")
+
+
+def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> PayloadLength | None:
+    """How the length of an accelerator's output is known; None if it is always the same, or with the fault noted."""
+    if frame.is_fixed_size:
+        if item.length is not None:
+            message = f"'length' is given for {frame.message}, which is of fixed size"
+            faults.error(message, item.length.source, "leave it out: the length is always the same")
+        return None
+    length = sent_length_of(frame)
+    if item.length == LengthSource.COMPUTED.value and not length.is_computed:
+        message = f"the length of {frame.message} cannot be computed: {_doubt(length)}"
+        faults.error(message, item.length.source, "legal here: given, buffered")
+        return None
+    if item.length is not None:
+        return PayloadLength(LengthSource(item.length), "the specification says so")
+    if length.is_computed:
+        return PayloadLength(LengthSource.COMPUTED, "the lengths at the output's ports determine it")
+    return PayloadLength(LengthSource.BUFFERED, _doubt(length))
+
+
+def publisher_buffers(
+    connections: Sequence[Connection], publishers: Mapping[str, Block], faults: Diagnostics
+) -> dict[str, int]:
+    """The bytes of the longest payload of each publisher that stores its frames whole."""
+    needs = _needs(connections, publishers)
+    buffers: dict[str, int] = {}
+    for connection in connections:
+        for end in connection.sinks:
+            if end.block in publishers:
+                block = publishers[end.block]
+                size = _buffer(block, connection.frame, needs.get(end.block), faults)
+                if size is not None:
+                    buffers[end.block] = size
+    return buffers
+
+
+@dataclass(frozen=True)
+class _Need:
+    """Why a publisher must store its frames, and what can be done about it."""
+
+    reason: str
+    hint: str
+
+
+def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics) -> int | None:
+    """The size of a publisher's buffer; None if it has none, or with the fault noted."""
+    if frame.is_fixed_size:
+        if block.buffer is not None:
+            message = f"'{block.name}' has a 'buffer', but {frame.message} is of fixed size"
+            faults.error(message, block.place("buffer"), "leave it out: only what is of variable size is stored")
+        return None
+    length = sent_length_of(frame)
+    size = block.buffer
+    if size is None and need and length.maximum is not None and length.maximum <= _LARGEST_BUFFER:
+        size = length.maximum
+    if size is None and need:
+        faults.error(f"'{block.name}' needs a 'buffer': {need.reason}", block.name.source, need.hint)
+    elif size is not None and not length.minimum <= size <= _LARGEST_BUFFER:
+        message = f"'{block.name}' cannot have a buffer of {size} bytes for {frame.message}"
+        faults.error(message, block.place("buffer"), f"legal here: {length.minimum} to {_LARGEST_BUFFER}")
+    return size
+
+
+def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -> dict[str, _Need]:
+    """The publishers that must store their frames."""
+    needs: dict[str, _Need] = {}
+    for connection in connections:
+        if connection.length is None:
+            continue
+        if len(connection.sinks) > 1:
+            waiting = [name for name in publishers if name in _blocks_behind(connection.sinks, connections)]
+            if len(waiting) > 1:
+                names = ", ".join(f"'{name}'" for name in waiting)
+                reason = f"{names} wait for the same streams, but only one of them can send at a time"
+                needs = dict.fromkeys(waiting, _Need(reason, _ADD_BUFFER)) | needs
+        if connection.length.source is LengthSource.BUFFERED:
+            source = connection.source.block
+            reason = f"the length of what '{source}' gives must be counted, as {connection.length.reason}"
+            hint = f"{_ADD_BUFFER}, or 'length: given' to the output of '{source}' if it has the length on a port"
+            counted = (end.block for end in connection.sinks if end.block in publishers)
+            needs |= dict.fromkeys(counted, _Need(reason, hint))
+    return needs
+
+
+def _blocks_behind(ends: Iterable[End], connections: Sequence[Connection]) -> set[str]:
+    """All blocks that messages of variable size reach from `ends`, `ends` included."""
+    found: set[str] = set()
+    for end in ends:
+        found.add(end.block)
+        for connection in connections:
+            if connection.source.block == end.block and connection.length is not None:
+                found |= _blocks_behind(connection.sinks, connections)
+    return found
+
+
+def _doubt(length: Length) -> str:
+    """Why the lengths at the ports do not determine the payload's."""
+    outer = next(term for term in length.terms if isinstance(term, Repeat) and term.stride is None)
+    inner = next(term for term in outer.body if isinstance(term, Repeat))
+    name = "" if inner.part.path == outer.part.path else f", '{dotted(inner.part.names)}'"
+    return f"each element of '{dotted(outer.part.names)}' has a length of its own{name}"

@@ -1,0 +1,48 @@
+"""How frames get between the host and a system: the specification's `interconnect`."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from fusesoc_firm.system.derived.model import Link, LinkKind, Scheduling
+from fusesoc_firm.system.written.specification import AXI_STREAM, Project
+from fusesoc_firm.text.diagnostics import Diagnostics
+
+# Beyond it the generic CLOCK_HZ is no integer of VHDL.
+_FASTEST = 10**9
+
+
+def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
+    """The link between the host and a system; None where the system's streams are its ports. Faults are noted.
+
+    `clock` is the frequency of clk in Hz, if it is given.
+    """
+    if project.interconnect == AXI_STREAM:
+        return None
+    kind = LinkKind(project.interconnect)
+    if scheduling.is_preemptive:
+        faults.error(
+            f"interconnect '{kind.value}' cannot carry the bursts of scheduler '{scheduling.policy}'",
+            project.interconnect.source,
+            "a row of bytes does not show where a burst ends: take a scheduler that is not preemptive, or 'axi_stream'",
+        )
+    return Link(kind, _clock_hz(project, clock, faults))
+
+
+def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:
+    """The clock's frequency as an integer; 0 where it is not given."""
+    if project.clock is None or clock is None:
+        if project.interconnect == LinkKind.UART.value:
+            faults.error(
+                f"interconnect '{project.interconnect}' needs the clock's frequency",
+                project.interconnect.source,
+                "add 'clock' to the project, such as 'clock: 100 MHz'",
+            )
+        return 0
+    if clock.denominator != 1 or clock > _FASTEST:
+        faults.error(
+            f"interconnect '{project.interconnect}' cannot work at 'clock' {project.clock}",
+            project.clock.source,
+            "legal: a whole number of Hz, at most 1 GHz",
+        )
+    return int(clock)

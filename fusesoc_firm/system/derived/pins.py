@@ -1,0 +1,43 @@
+"""The pins of accelerators: ports that belong to no message and lead out of the system."""
+
+from __future__ import annotations
+
+from fusesoc_firm.system.derived.model import AcceleratorType
+from fusesoc_firm.system.derived.sides import accelerator_ports
+from fusesoc_firm.system.written.specification import SOFTWARE, Pin
+from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.naming import identifier
+
+# As many as the largest array has that a port of a message holds.
+_MOST_BITS = 65536
+_OWN_PORTS = ("clk", "rst_n")
+# What accelerators of some types lack.
+_WITHOUT_PINS = {"HLS": "ports but those of its messages", SOFTWARE: "ports"}
+
+
+def check_pins(type_: AcceleratorType, faults: Diagnostics) -> None:
+    """Note every pin that cannot be a port of its accelerator."""
+    accelerator = type_.accelerator
+    if accelerator.type in _WITHOUT_PINS and accelerator.pins:
+        message = f"'{accelerator.name}' is of type {accelerator.type}, which has no {_WITHOUT_PINS[accelerator.type]}"
+        faults.error(message, accelerator.pins[0].source, "write this accelerator in VHDL")
+        return
+    taken = dict.fromkeys(_OWN_PORTS, "a port of every accelerator")
+    taken |= {f"{prefix}{port.name}".lower(): "a port of a message" for prefix, port in accelerator_ports(type_)}
+    for pin in accelerator.pins:
+        _check_pin(pin, taken, faults)
+
+
+def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
+    if pin.bits is not None and not 1 <= pin.bits <= _MOST_BITS:
+        message = f"'bits' of pin '{pin.name}' cannot be {pin.bits}"
+        faults.error(message, pin.place("bits"), f"legal here: 1 to {_MOST_BITS}")
+    if not pin.name:
+        return
+    if identifier(pin.name) != pin.name:
+        hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+        faults.error(f"no port can be called '{pin.name}'", pin.name.source, hint)
+    elif owner := taken.get(pin.name.lower()):
+        hint = "the ports of an entity have names of their own, whatever their capitals"
+        faults.error(f"a pin cannot be called '{pin.name}', which is {owner}", pin.name.source, hint)
+    taken[pin.name.lower()] = f"the pin at {pin.name.source}"

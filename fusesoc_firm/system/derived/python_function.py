@@ -1,0 +1,121 @@
+"""An accelerator in software: a Python function that takes its messages and gives its answers.
+
+    def mix(message0, message1):
+        return {"x": message0["x"] + message1["x"], "y": 0.0, "z": 0.0}
+
+Here its file is only read, never run.
+"""
+
+from __future__ import annotations
+
+import ast
+import keyword
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.system.derived.model import AcceleratorType
+from fusesoc_firm.system.written.specification import SOFTWARE, SOURCE_SUFFIXES
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.text.files import is_file
+from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.yaml_text import Text
+
+_KEYWORDS = frozenset(word.lower() for word in keyword.kwlist)
+
+
+def function_name(type_: AcceleratorType) -> str:
+    """The function: named after the accelerator."""
+    return identifier(type_.accelerator.name, avoid=_KEYWORDS, suffix="function")
+
+
+def parameter_names(type_: AcceleratorType) -> list[str]:
+    """What the function's parameters could be called: one an input, in their order."""
+    count = len(type_.inputs)
+    return ["message"] if count == 1 else [f"message{number}" for number in range(count)]
+
+
+def prototype(type_: AcceleratorType) -> str:
+    """The function as it must be declared."""
+    return f"def {function_name(type_)}({', '.join(parameter_names(type_))})"
+
+
+def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> None:
+    """Note what keeps the file at `path`, the first of the sources, from holding the function; it may be missing."""
+    accelerator = type_.accelerator
+    if not type_.inputs:
+        message = f"'{accelerator.name}' takes no message, so nothing would call its function"
+        hint = "without 'sources' it stands for software elsewhere, which sends when it likes"
+        faults.error(message, accelerator.name.source, hint)
+        return
+    if not is_file(path) or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:
+        return
+    source = accelerator.sources[0]
+    file = _File(_shown(source), path.read_text(encoding="utf-8", errors="replace"))
+    hint = f"expected: {prototype(type_)}"
+    try:
+        found = _definition(ast.parse(file.text), function_name(type_))
+    except (SyntaxError, ValueError) as error:
+        line, column = (error.lineno, error.offset) if isinstance(error, SyntaxError) else (1, 1)
+        faults.error(f"this is not Python: {getattr(error, 'msg', error)}", file.place(line or 1, column or 1))
+        return
+    if found is None:
+        faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, hint)
+    elif isinstance(found, ast.FunctionDef) and not _takes(found.args, len(type_.inputs)):
+        count = len(type_.inputs)
+        message = f"'{found.name}' cannot be called with {count} message{'' if count == 1 else 's'}"
+        faults.error(message, file.place(found.lineno, found.col_offset + 1), hint)
+
+
+def _shown(source: Text) -> str:
+    """A source as it is called from where the specification is."""
+    return str(Path(source.source.file).parent / source) if source.source else str(source)
+
+
+@dataclass(frozen=True)
+class _File:
+    """The text of a source, and what it is called in messages."""
+
+    name: str
+    text: str
+
+    def place(self, line: int, column: int) -> SourceRef:
+        """A place in it."""
+        lines = self.text.split("\n")
+        return SourceRef(self.name, line, column, lines[line - 1] if line <= len(lines) else "")
+
+
+def _definition(module: ast.Module, name: str) -> ast.stmt | None:
+    """The last statement of a module that gives something a name: the one that holds."""
+    return next((found for found in reversed([*_statements(module.body)]) if name in _bound(found)), None)
+
+
+def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
+    """All statements of a module's own scope, also those that hang on a condition."""
+    for statement in body:
+        yield statement
+        for block in ("body", "orelse", "finalbody"):
+            if isinstance(statement, ast.If | ast.Try | ast.With):
+                yield from _statements(getattr(statement, block, ()))
+
+
+def _bound(statement: ast.stmt) -> set[str]:
+    """The names that a statement gives to something that may be called."""
+    match statement:
+        case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+            return {name}
+        case ast.Import(names=aliases) | ast.ImportFrom(names=aliases):
+            return {alias.asname or alias.name for alias in aliases}
+        case ast.Assign(targets=targets):
+            return {target.id for target in targets if isinstance(target, ast.Name)}
+        case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr()):
+            return {name}
+    return set()
+
+
+def _takes(arguments: ast.arguments, count: int) -> bool:
+    """Whether a function can be called with so many values by their order."""
+    positional = len(arguments.posonlyargs) + len(arguments.args)
+    fewest = positional - len(arguments.defaults)
+    needs_keywords = None in arguments.kw_defaults
+    return fewest <= count and (count <= positional or arguments.vararg is not None) and not needs_keywords

@@ -1,0 +1,241 @@
+"""Which part of a system is software, and how messages get from one part to the other.
+
+A specification says what goes where, and the type of an accelerator whether it is hardware. A message that goes from
+hardware to a block in software leaves through a publisher that is made for it, one that goes from such a block to
+hardware enters through a subscriber. All other messages of software stay on the host: a subscriber that feeds nothing
+else is no converter, nor is a publisher that gets nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
+
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.frame.select import names_in_use, with_names_in_use
+from fusesoc_firm.system.derived.model import AcceleratorBlock, Connection, End, MessageSide, Software, Topic
+from fusesoc_firm.system.written.specification import PUBLISHER, SUBSCRIBER, Block
+from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.naming import distinct_identifiers, identifier
+from fusesoc_firm.text.yaml_sections import keys_only_of
+from fusesoc_firm.text.yaml_text import Text
+
+Sides = Mapping[str, tuple[MessageSide, ...]]
+
+# An id is one byte.
+MOST_CONVERTERS = 256
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A system in its two parts: `software`, and the hardware's blocks by name, message sides and connections.
+
+    `crossings` are the converters among these blocks that the specification does not have, each with the message side
+    in software that it stands for. They come last, in the order of the specification's blocks.
+    """
+
+    blocks: Mapping[str, Block]
+    inputs: Sides
+    outputs: Sides
+    connections: tuple[Connection, ...]
+    crossings: Mapping[str, End]
+    software: Software
+
+    def of_mode(self, mode: str) -> dict[str, Block]:
+        """The hardware's subscribers or publishers."""
+        return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == mode}
+
+    def check(self, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
+        """Note what keeps the hardware of a specification with these `blocks` from being one."""
+        first = next(iter(blocks.values())).name.source
+        if not self.blocks:
+            hint = "an accelerator, or a message that goes from a subscriber to a publisher, must stay there"
+            faults.error("all accelerators are software, so nothing is left for hardware", first, hint)
+            return
+        for mode in (SUBSCRIBER, PUBLISHER):
+            found = [*self.of_mode(mode).values()]
+            if not found:
+                hint = f"a {mode} is a block with 'mode: {mode}', or a message between hardware and software"
+                faults.error(f"the hardware has no {mode}; it needs at least one", first, hint)
+            elif len(found) > MOST_CONVERTERS:
+                message = f"the hardware has {len(found)} {mode}s; an id of one byte tells {MOST_CONVERTERS} apart"
+                faults.error(message, found[MOST_CONVERTERS].name.source)
+        taking = {end.block for name, end in self.crossings.items() if self.blocks[name].mode == PUBLISHER}
+        for block in self.software.blocks:
+            if block.block not in taking:
+                _check_no_publisher_keys(blocks[block.block], faults)
+
+
+def message_names(blocks: Mapping[str, Block], inputs: Sides, outputs: Sides) -> dict[End, str]:
+    """A name for each message side of each accelerator, `<block>_in`, that no block has."""
+    ends = [
+        End(name, side.prefix)
+        for name, block in blocks.items()
+        if block.type is not None
+        for side in (*inputs.get(name, ()), *outputs.get(name, ()))
+    ]
+    taken = [identifier(name) for name in blocks]
+    return dict(zip(ends, distinct_identifiers([(end.block, end.prefix) for end in ends], taken), strict=True))
+
+
+@dataclass(frozen=True)
+class Parting:
+    """A system that is to be parted: it is known which blocks are `software`; `names` as `message_names` has them."""
+
+    blocks: Mapping[str, Block]
+    software: Sequence[AcceleratorBlock]
+    inputs: Sides
+    outputs: Sides
+    connections: Sequence[Connection]
+    names: Mapping[End, str]
+
+    def parts(self) -> Parts:
+        """Hardware and software, each with its connections."""
+        hardware = tuple(self._hardware_connections())
+        host = tuple(self._host_connections())
+        ends = {end.block for connection in hardware for end in (connection.source, *connection.sinks)}
+        blocks = {name: block for name, block in self.blocks.items() if self._is_hardware(name) or name in ends}
+        entering, leaving = [*self._entering()], [*self._leaving()]
+        return Parts(
+            blocks | {self.names[end]: self._converter(end, side) for end, side in (*entering, *leaving)},
+            {**self.inputs, **{self.names[end]: (_bare(side),) for end, side in leaving}},
+            {**self.outputs, **{self.names[end]: (_bare(side),) for end, side in entering}},
+            hardware,
+            {self.names[end]: end for end, _ in (*entering, *leaving)},
+            self._software(host),
+        )
+
+    def _software(self, connections: tuple[Connection, ...]) -> Software:
+        """The host's part; publishers have the fields that they get."""
+        sources = {connection.source.block for connection in connections}
+        subscribers = [
+            self._topic(name, self.outputs[name][0].frame) for name in self._converters(SUBSCRIBER) if name in sources
+        ]
+        publishers = []
+        for name in self._converters(PUBLISHER):
+            given = [
+                frame
+                for connection in connections
+                for end, frame in zip(connection.sinks, connection.frames, strict=True)
+                if end.block == name
+            ]
+            if given:
+                publishers.append(self._topic(name, _joined(given)))
+        return Software(tuple(self.software), tuple(subscribers), tuple(publishers), connections)
+
+    def _topic(self, name: str, frame: Frame) -> Topic:
+        """The topic of one of the specification's converters."""
+        return Topic(name, frame, given_name=str(self.blocks[name].topic or ""))
+
+    # --- where a message is ----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _in_software(self) -> frozenset[str]:
+        return frozenset(block.block for block in self.software)
+
+    def _is_hardware(self, name: str) -> bool:
+        """Whether a block is an accelerator in hardware."""
+        return self.blocks[name].type is not None and name not in self._in_software
+
+    def _converters(self, mode: str) -> Iterator[str]:
+        return (name for name, block in self.blocks.items() if block.type is None and block.mode == mode)
+
+    @cached_property
+    def _hardware_sinks(self) -> frozenset[End]:
+        """The ends whose message is in hardware: all of it, even if a part comes from the host.
+
+        Those of accelerators there, those in software that get something from such accelerators, and publishers that
+        get something from hardware, be it from a subscriber.
+        """
+        return frozenset(
+            sink
+            for connection in self.connections
+            for sink in connection.sinks
+            if self._is_hardware(sink.block)
+            or self._is_hardware(connection.source.block)
+            or not {sink.block, connection.source.block} & self._in_software
+        )
+
+    def _entering(self) -> Iterator[tuple[End, MessageSide]]:
+        """The outputs in software that something in hardware takes."""
+        sources = {connection.source for connection in self.connections if any(self._in_hardware(connection))}
+        return self._sides(self.outputs, sources)
+
+    def _leaving(self) -> Iterator[tuple[End, MessageSide]]:
+        """The inputs in software that come from hardware."""
+        return self._sides(self.inputs, self._hardware_sinks)
+
+    def _sides(self, sides: Sides, wanted: Iterable[End]) -> Iterator[tuple[End, MessageSide]]:
+        found = frozenset(wanted)
+        for block in self.software:
+            for side in sides[block.block]:
+                if (end := End(block.block, side.prefix)) in found:
+                    yield end, side
+
+    # --- connections -----------------------------------------------------------------------------------------------
+
+    def _in_hardware(self, connection: Connection) -> Iterator[tuple[End, Frame]]:
+        """The sinks in hardware, with what they get."""
+        return (pair for pair in _pairs(connection) if pair[0] in self._hardware_sinks)
+
+    def _hardware_connections(self) -> Iterator[Connection]:
+        for connection in self.connections:
+            pairs = [(self._crossing(sink), frame) for sink, frame in self._in_hardware(connection)]
+            if pairs:
+                yield _connection(self._crossing(connection.source), pairs)
+
+    def _host_connections(self) -> Iterator[Connection]:
+        for end, side in self._leaving():
+            yield _connection(self._crossing(end), [(end, side.frame)])
+        for connection in self.connections:
+            pairs = [pair for pair in _pairs(connection) if pair[0] not in self._hardware_sinks]
+            entering = [frame for _, frame in self._in_hardware(connection)]
+            if entering and connection.source.block in self._in_software:
+                pairs.insert(0, (self._crossing(connection.source), _joined(entering)))
+            if pairs:
+                yield _connection(connection.source, pairs)
+
+    def _crossing(self, end: End) -> End:
+        """The end in hardware that stands for one in software; any other end itself."""
+        return End(self.names[end]) if end.block in self._in_software else end
+
+    def _converter(self, end: End, side: MessageSide) -> Block:
+        """The block of a converter that stands for a side; a publisher has the block's keys of publishers."""
+        block = self.blocks[end.block]
+        made = Block(name=Text(self.names[end], block.name.source), source=block.source, places=block.places)
+        if side in self.outputs[end.block]:
+            return replace(made, mode=Text(SUBSCRIBER))
+        keys = {key: getattr(block, key) for key in keys_only_of(Block, PUBLISHER)}
+        leaving = [side.frame for other, side in self._leaving() if other.block == end.block]
+        if side.frame.is_fixed_size and not all(frame.is_fixed_size for frame in leaving):
+            # It is meant for the others.
+            del keys["buffer"]
+        return replace(made, mode=Text(PUBLISHER), **keys)
+
+
+def _check_no_publisher_keys(block: Block, faults: Diagnostics) -> None:
+    for key in keys_only_of(Block, PUBLISHER):
+        if getattr(block, key) is not None:
+            message = f"'{key}' belongs to a publisher, but no message leaves hardware for '{block.name}'"
+            hint = "the key is for a message that a block in software takes from hardware"
+            faults.error(message, block.place(key), hint)
+
+
+def _bare(side: MessageSide) -> MessageSide:
+    """The side as a converter has it."""
+    return MessageSide("", side.frame)
+
+
+def _pairs(connection: Connection) -> Iterator[tuple[End, Frame]]:
+    return zip(connection.sinks, connection.frames, strict=True)
+
+
+def _connection(source: End, pairs: Sequence[tuple[End, Frame]]) -> Connection:
+    return Connection(source, tuple(end for end, _ in pairs), tuple(frame for _, frame in pairs))
+
+
+def _joined(frames: Sequence[Frame]) -> Frame:
+    """A message with all fields that are used in one of several."""
+    names = reduce(frozenset.union, (names_in_use(frame) for frame in frames))
+    return with_names_in_use(frames[0], names)

@@ -1,0 +1,229 @@
+"""What the scheduler must know of the publishers' times, in cycles of `clk`.
+
+A time of the specification is a number of cycles, or one with a unit, which the project's `clock` makes cycles of.
+How long a frame takes to be sent (its WCET in the dissertation's section 6.3.2) follows from its size where that
+is known.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, floor
+from typing import TYPE_CHECKING
+
+from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
+from fusesoc_firm.scheduling.tasks import Task
+from fusesoc_firm.system.derived.model import Converter, DerivedSystem, PublisherTimes, Scheduling
+from fusesoc_firm.system.written.specification import AUTO_SCHEDULER, Block, Project
+from fusesoc_firm.text.diagnostics import Diagnostics
+from fusesoc_firm.text.yaml_text import Text
+
+if TYPE_CHECKING:
+    from fusesoc_firm.scheduling.analysis import Bound, Channel
+
+# Bytes of a frame before its payload: id and length.
+_HEADER_BYTES = 5
+# A scheduler's times are a few bits wider than the longest deadline, so that it can tell early from late (cores/sched).
+_SPARE_TIME_BITS = 3
+_FEWEST_TIME_BITS, _MOST_TIME_BITS = 8, 31
+_LONGEST_TIME = 2 ** (_MOST_TIME_BITS - _SPARE_TIME_BITS) - 1
+
+_SECONDS = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
+_HERTZ = {"Hz": 1, "kHz": 1000, "MHz": 10**6, "GHz": 10**9}
+_QUANTITY = re.compile(r"(\d{1,20}(?:\.\d{1,20})?)\s*([A-Za-z]*)", re.ASCII)
+# In Hz: slower is no clock, faster is no FPGA.
+_SLOWEST, _FASTEST = 1, 10**10
+# VHDL's largest integer, to which the scheduler counts.
+_LONGEST_RUN = 2**31 - 1
+
+# What to add to a publisher that lacks a time.
+_PERIOD = "add 'period: <cycles, a time, or a rate>', such as 'period: 100 Hz'"
+_WCET = "add 'wcet: <cycles or a time>', or 'buffer: <bytes of its longest payload>'"
+
+Rounding = Callable[[Fraction], int]
+
+
+def scheduling_of(
+    project: Project,
+    clock: Fraction | None,
+    blocks: Mapping[str, Block],
+    publishers: Sequence[Converter],
+    faults: Diagnostics,
+) -> Scheduling:
+    """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted.
+
+    `clock` is the frequency of clk in Hz, if it is given.
+    """
+    reader = _Reader(clock, faults)
+    times = tuple(reader.times(blocks[item.block], item, project.width) for item in publishers)
+    policy, reasons = str(project.scheduler), tuple[str, ...]()
+    _check_shortest_run(project, faults)
+    _check_complete(policy, [blocks[item.block] for item in publishers], times, faults)
+    if policy == AUTO_SCHEDULER:
+        policy, reasons = _chosen(project, publishers, times)
+    return Scheduling(policy, times, POLICIES[policy].is_preemptive, project.shortest_run, _time_bits(times), reasons)
+
+
+def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
+    """The publishers' tasks, in the order of their ids. Raises `InputError` for every time that is not known."""
+    faults = Diagnostics()
+    for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
+        if times.period is None:
+            hint = "the least time between its messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
+            faults.error(f"the 'period' of publisher '{publisher.block}' is not given", hint=hint)
+        if times.transfer_time is None:
+            hint = "the cycles that its longest frame takes to be sent"
+            message = f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound"
+            faults.error(message, hint=hint)
+    faults.raise_if_any()
+    return _tasks(system.publishers, system.scheduling.times)
+
+
+def channel_of(system: DerivedSystem) -> Channel:
+    """What the publishers share."""
+    from fusesoc_firm.scheduling.analysis import Channel
+
+    return Channel(system.width // 8, system.scheduling.shortest_run)
+
+
+def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
+    """What is certain of each publisher under the system's scheduler, in the order of their ids.
+
+    Nothing, unless all their times are known.
+    """
+    tasks = _tasks(system.publishers, system.scheduling.times)
+    if len(tasks) < len(system.publishers):
+        return ()
+    from fusesoc_firm.scheduling.analysis import analyse
+
+    return analyse(system.scheduling.policy, tasks, channel_of(system), is_ordered=True).bounds
+
+
+def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> tuple[Task, ...]:
+    """The tasks of those publishers of which all times are known."""
+    return tuple(
+        Task(publisher.block, item.period, item.transfer_time, item.deadline or item.period)
+        for publisher, item in zip(publishers, times, strict=True)
+        if item.period and item.transfer_time
+    )
+
+
+def _chosen(
+    project: Project, publishers: Sequence[Converter], times: Sequence[PublisherTimes]
+) -> tuple[str, tuple[str, ...]]:
+    """The smallest scheduler that holds all deadlines, as far as times are known, and why it is this one."""
+    # With NumPy it takes longer to load than most systems take to be generated.
+    from fusesoc_firm.scheduling.analysis import Channel, Criterion, choose
+
+    tasks = _tasks(publishers, times)
+    if len(tasks) < len(publishers) or project.shortest_run < 1:
+        return DEFAULT, ()
+    channel = Channel(project.width // 8, project.shortest_run)
+    # Publishers have their priorities by their ids, which the host knows: these stay as they are.
+    choice = choose(tasks, Criterion.LUTS, channel, is_ordered=True)
+    return choice.best.policy, choice.reasons
+
+
+def frame_beats(payload_bytes: int, width: int) -> int:
+    """Beats of a frame on a stream of `width` bits."""
+    return -(-(_HEADER_BYTES + payload_bytes) * 8 // width)
+
+
+def _time_bits(times: Iterable[PublisherTimes]) -> int:
+    """Bits of the scheduler's time: all deadlines fit, and everybody's frame may still come in between."""
+    reach = max((item.deadline or 0 for item in times), default=0) + sum(item.transfer_time or 0 for item in times)
+    return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
+
+
+def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
+    """The clock's frequency in Hz; None if it is not given, or wrong, which is noted."""
+    return None if project.clock is None else frequency("clock", project.clock, faults)
+
+
+def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
+    """A frequency in Hz, or None if what stands at `key` is none, which is noted."""
+    found = _QUANTITY.fullmatch(text)
+    hertz = Fraction(found[1]) * _HERTZ[found[2]] if found and found[2] in _HERTZ else Fraction(0)
+    if not _SLOWEST <= hertz <= _FASTEST:
+        hint = "a frequency from 1 Hz to 10 GHz, such as 100 MHz or 12.5 MHz"
+        faults.error(f"'{key}' cannot be '{text}'", text.source, hint)
+        return None
+    return hertz
+
+
+def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
+    if not 1 <= project.shortest_run <= _LONGEST_RUN:
+        place = project.place("shortest_run")
+        faults.error(f"'shortestRun' cannot be {project.shortest_run}", place, f"legal here: 1 to {_LONGEST_RUN} beats")
+
+
+def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
+    """Note what a policy must know of a publisher and is not said."""
+    is_auto = policy == AUTO_SCHEDULER
+    has_deadlines = not is_auto and POLICIES[policy].has_deadlines
+    has_transfer_times = is_auto or POLICIES[policy].has_transfer_times
+    for block, item in zip(blocks, times, strict=True):
+        # What cannot be read is noted already.
+        if is_auto and item.period is None and block.period is None:
+            faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
+        if has_deadlines and item.deadline is None and block.period is None and block.deadline is None:
+            message = f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'"
+            faults.error(message, block.name.source, _PERIOD)
+        if has_transfer_times and item.transfer_time is None and block.wcet is None:
+            message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound"
+            faults.error(message, block.name.source, _WCET)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads times. The clock is in Hz, if it is given."""
+
+    clock: Fraction | None
+    faults: Diagnostics
+
+    def times(self, block: Block, publisher: Converter, width: int) -> PublisherTimes:
+        """A publisher's times; early ones are rounded down, late ones up, so that no deadline is missed by rounding."""
+        period = self._cycles(block.period, "period", floor)
+        transfer_time = self._cycles(block.wcet, "wcet", ceil)
+        if block.wcet is None:
+            transfer_time = _beats_at_most(publisher, width)
+        deadline = self._cycles(block.deadline, "deadline", floor) if block.deadline else period
+        return PublisherTimes(period, transfer_time, deadline)
+
+    def _cycles(self, time: Text | None, key: str, rounded: Rounding) -> int | None:
+        """A time in cycles, or None if there is none or it is wrong, which is noted."""
+        if time is None:
+            return None
+        found = _QUANTITY.fullmatch(time)
+        units = (*_SECONDS, *_HERTZ) if key == "period" else tuple(_SECONDS)
+        if not found or found[2] not in ("", *units) or (not found[2] and "." in found[1]):
+            hint = f"a number of cycles, or a number with one of {', '.join(units)}"
+            self.faults.error(f"'{key}' cannot be '{time}'", time.source, hint)
+            return None
+        number, unit = Fraction(found[1]), found[2]
+        if unit and self.clock is None:
+            message = f"'{key}' is '{time}', but the clock's frequency is not given"
+            self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
+            return None
+        cycles = number if not unit else self._of_unit(number, unit)
+        if not 1 <= cycles <= _LONGEST_TIME:
+            message = f"'{key}' is {floor(cycles)} cycles"
+            self.faults.error(message, time.source, f"legal here: 1 to {_LONGEST_TIME} cycles")
+            return None
+        return rounded(cycles)
+
+    def _of_unit(self, number: Fraction, unit: str) -> Fraction:
+        assert self.clock is not None
+        if unit in _SECONDS:
+            return number * _SECONDS[unit] * self.clock
+        return self.clock / (number * _HERTZ[unit]) if number else Fraction(0)
+
+
+def _beats_at_most(publisher: Converter, width: int) -> int | None:
+    """Beats of a publisher's longest frame; None if it has no bound."""
+    longest = publisher.buffer or length_of(publisher.frame).maximum
+    return None if longest is None else frame_beats(longest, width)

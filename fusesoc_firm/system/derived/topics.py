@@ -1,0 +1,65 @@
+"""What topics may be called, and which blocks of a system meet on one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from fusesoc_firm.system.derived.model import Topic
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
+from fusesoc_firm.text.yaml_text import Text
+
+# What both ROS 1 and ROS 2 accept.
+_WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
+_NAME = re.compile(rf"/?{_WORD}(?:/{_WORD})*")
+_LEGAL = "legal here: /arm/left, or arm/left, which is relative to the node's namespace; letters, digits and single '_'"
+
+
+@dataclass(frozen=True)
+class TopicUse:
+    """A topic of a system, which publishes on it or subscribes to it, and the place of that in the specification."""
+
+    topic: Topic
+    is_published: bool
+    source: SourceRef | None
+
+
+def check_topic_name(name: Text, faults: Diagnostics) -> None:
+    """Note a name that ROS 1 or ROS 2 does not accept, and a private one."""
+    if name.startswith("~"):
+        message = f"topic '{name}' depends on the node's name, which a node is only given when it is started"
+        faults.error(message, name.source, _LEGAL)
+    elif not _NAME.fullmatch(name):
+        faults.error(f"'{name}' is not a topic's name", name.source, _LEGAL)
+
+
+def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
+    """Note each topic of two types, and warn of each that the system both publishes on and subscribes to.
+
+    Topics of ROS 1 and of ROS 2 never meet. A relative name is compared as it is without a namespace.
+    """
+    met: dict[tuple[object, str], list[TopicUse]] = {}
+    for use in uses:
+        met.setdefault((use.topic.frame.ros, use.topic.name), []).append(use)
+    for (_, name), (first, *others) in met.items():
+        for other in others:
+            _check_type(name, first, other, faults)
+        _check_loop(name, (first, *others), faults)
+
+
+def _check_type(name: str, first: TopicUse, other: TopicUse, faults: Diagnostics) -> None:
+    one, two = (use.topic.frame.message for use in (first, other))
+    if one != two:
+        message = f"topic {name} of '{other.topic.block}' has the type {two}, but that of '{first.topic.block}' {one}"
+        faults.error(message, other.source, f"a topic has one type; '{first.topic.block}' is at {first.source}")
+
+
+def _check_loop(name: str, uses: Iterable[TopicUse], faults: Diagnostics) -> None:
+    """Warn of a message that comes back."""
+    uses = tuple(uses)
+    taking = next((use for use in uses if not use.is_published), None)
+    giving = next((use for use in uses if use.is_published), None)
+    if taking and giving:
+        message = f"'{giving.topic.block}' publishes on topic {name}, to which '{taking.topic.block}' subscribes"
+        faults.warn(message, giving.source, "what the system sends there comes back to it: a loop")

@@ -1,0 +1,191 @@
+"""Derived System -> template configuration: the top level and its test bench as plain dictionaries.
+
+The message side of a block is the same few ports everywhere: the fields, `segment_valid`, `msg_valid` and
+`msg_ready`. Every block has a signal for each of its ports, called `<block>_<port>` (`names`); `instances` connects
+blocks to them, and `wires` one with another.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.derived.sides import SidePort
+from fusesoc_firm.system.hardware.instances import (
+    ERROR_CODE_BITS,
+    accelerator_instance,
+    component,
+    publisher_instance,
+    subscriber_instance,
+)
+from fusesoc_firm.system.hardware.interconnect import interconnect_configuration
+from fusesoc_firm.system.hardware.maps import port_map
+from fusesoc_firm.system.hardware.names import RELEASED, Names, blocks, reset_label, seen_reset
+from fusesoc_firm.system.hardware.scheduler import scheduler_configuration
+from fusesoc_firm.system.hardware.wires import connections
+
+Configuration = dict[str, Any]
+
+# Of the simulated host's clock, in ps.
+_HOST_PERIOD = 10_000
+
+SYSTEM_TEMPLATE = "vhdl/system.vhd"
+TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
+
+
+def system_configuration(system: DerivedSystem) -> Configuration:
+    """The configuration of the top level."""
+    names = Names(system)
+    return {
+        **dimensions(system),
+        "name": system.name,
+        **interconnect_configuration(system),
+        **scheduler_configuration(system),
+        "clocks": _clocks(system),
+        "resets": _resets(system),
+        "publisher_errors": [
+            {"bit": bit, "block": block}
+            for bit, block in enumerate(system.error_blocks)
+            if bit >= len(system.subscribers)
+        ],
+        "components": [component(type_) for type_ in system.accelerator_types if type_.is_component],
+        "signals": [_signals(names, *block) for block in blocks(system)],
+        "subscribers": [subscriber_instance(names, converter, system) for converter in system.subscribers],
+        "publishers": [publisher_instance(names, converter, system) for converter in system.publishers],
+        "accelerators": [accelerator_instance(names, block, system) for block in system.accelerators],
+        "pins": pin_groups(names, system),
+        "connections": connections(names, system),
+    }
+
+
+def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
+    """The test bench that compares with files, or the one that does what a pipe says."""
+    return f"{system.entity}_live" if is_live else f"{system.entity}_tb"
+
+
+def test_bench_configuration(
+    system: DerivedSystem, seed: int, stall_percent: int, environment: str | None, *, is_live: bool
+) -> Configuration:
+    """The configuration of the test bench: the simulated host beside the system, and at its pins the `environment`.
+
+    That is an entity with `clk`, `rst_n` and the pins, each in the other direction. If it `is_live`, the host is at the
+    end of a pipe, and joins no bursts.
+    """
+    pins = pin_groups(Names(system), system)
+    formals = [
+        "clk",
+        "rst_n",
+        *(clock.port for clock in system.clocks),
+        *(str(port["name"]) for group in pins for port in group["ports"]),
+    ]
+    # A link carries bytes.
+    host_width = 8 if system.link else system.width
+    has_join = system.scheduling.is_preemptive and not is_live
+    return {
+        "bench": test_bench_entity(system, is_live=is_live),
+        "is_live": is_live,
+        "pins": pins,
+        "clocks": [
+            {**clock, "period": max(2, round(_HOST_PERIOD / item.ratio)), "number": number}
+            for number, (clock, item) in enumerate(zip(_clocks(system), system.clocks, strict=True), start=1)
+        ],
+        "environment": {"entity": environment, "ports": port_map((name, name) for name in formals)}
+        if environment
+        else None,
+        **dimensions(system),
+        **interconnect_configuration(system),
+        "host_width": host_width,
+        "host_lanes": host_width // 8,
+        "seed": seed,
+        "stall_percent": stall_percent,
+        "has_join": has_join,
+        "from": "burst" if has_join else "from",
+    }
+
+
+def _clocks(system: DerivedSystem) -> list[Configuration]:
+    """Every further clock as a port of the top level."""
+    return [
+        {
+            "port": clock.port,
+            "megahertz": f"{float(clock.frequency / 10**6):g}",
+            "blocks": ", ".join(block.block for block in system.accelerators if block.clock == clock.name),
+        }
+        for clock in system.clocks
+    ]
+
+
+def _resets(system: DerivedSystem) -> Configuration | None:
+    """The resets of further clocks: each domain sees it, one after the other, and clk's; then all let go."""
+    if not system.clocks:
+        return None
+    before = ""
+    instances = []
+    for clock in system.clocks:
+        instances.append(_reset(clock.port, before, seen_reset(clock)))
+        before = seen_reset(clock)
+    instances.append(_reset("clk", before, RELEASED))
+    instances += [_reset(clock.port, RELEASED, clock.reset) for clock in system.clocks]
+    signals = [RELEASED, *(name for clock in system.clocks for name in (seen_reset(clock), clock.reset))]
+    return {"signals": signals, "instances": instances}
+
+
+def _reset(clock: str, release: str, reset: str) -> Configuration:
+    return {"label": reset_label(reset), "clock": clock, "release": release, "reset": reset}
+
+
+def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
+    """What the pins of blocks are called at the top level, by block and name."""
+    names = Names(system)
+    return {
+        (block.block, pin.name): names.port(block.block, pin.name)
+        for block in system.accelerators
+        for pin in block.type.accelerator.pins
+    }
+
+
+def pin_groups(names: Names, system: DerivedSystem) -> list[Configuration]:
+    """The pins of each block that has some, as ports of the top level."""
+    return [
+        {
+            "block": block.block,
+            "ports": [
+                {
+                    "name": names.port(block.block, pin.name),
+                    "direction": str(pin.direction),
+                    "type": vhdl_type(pin.bits),
+                    "bits": pin.bits,
+                }
+                for pin in block.type.accelerator.pins
+            ],
+        }
+        for block in system.accelerators
+        if block.type.accelerator.pins
+    ]
+
+
+def dimensions(system: DerivedSystem) -> Configuration:
+    """The sizes of the top level's ports and signals."""
+    publishers = len(system.publishers)
+    return {
+        "entity": system.entity,
+        "width": system.width,
+        "lanes": system.width // 8,
+        "subscriber_count": len(system.subscribers),
+        "publisher_count": publishers,
+        "pub_data_bits": publishers * system.width,
+        "pub_keep_bits": publishers * system.width // 8,
+        "select_bits": max(1, (publishers - 1).bit_length()),
+        "error_count": len(system.error_blocks),
+        "error_code_bits": ERROR_CODE_BITS * len(system.error_blocks),
+    }
+
+
+def _signals(names: Names, block: str, ports: list[tuple[str, SidePort]]) -> Configuration:
+    return {
+        "block": block,
+        "declarations": [
+            {"name": names.port(block, f"{prefix}{port.name}"), "type": vhdl_type(port.width)} for prefix, port in ports
+        ],
+    }

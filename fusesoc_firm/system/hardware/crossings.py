@@ -1,0 +1,178 @@
+"""Where the two ends of a connection differ, in their clocks or in the widths of their streams, and what stands there.
+
+A message and each of its elements is a scope: a handshake, fields that hold while it lasts, and streams and elements
+within. A handshake and its fields cross in a `firm_cdc_message`, a stream in a `firm_cdc_stream`. Where only widths
+differ, streams pass a `firm_axis_resize`, which holds nothing back, and all else is wired.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from fusesoc_firm.converter.message_ports import LENGTH_BITS, ElementPorts, MessageSide, message_side
+from fusesoc_firm.converter.program import has_bytes
+from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node
+from fusesoc_firm.system.derived.model import Clock, Connection, DerivedSystem, End
+from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, Handshake
+
+# A field's port and its bits, None for a `std_logic`.
+Field = tuple[str, int | None]
+
+
+@dataclass(frozen=True)
+class Scope:
+    """A message, or an element of an array: its handshake, and the ports of its fields and streams.
+
+    `parent` is the handshake of what it lies within.
+    """
+
+    handshake: Handshake
+    parent: Handshake | None = None
+    fields: list[Field] = field(default_factory=list)
+    streams: list[str] = field(default_factory=list)
+
+    @property
+    def bits(self) -> int:
+        """Of all fields."""
+        return sum(width or 1 for _, width in self.fields)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Two ends of a connection that differ; a clock is None where it is that of the system."""
+
+    source: End
+    sink: End
+    frame: Frame
+    source_clock: Clock | None
+    sink_clock: Clock | None
+    source_width: int
+    sink_width: int
+
+    @property
+    def is_clocked(self) -> bool:
+        """Whether the clocks differ."""
+        return self.source_clock != self.sink_clock
+
+    @property
+    def scopes(self) -> list[Scope]:
+        """The message, and behind it the elements of its arrays in wire order."""
+        return _scopes(self.frame)
+
+    @property
+    def clocks(self) -> str:
+        """The ports of both clocks, as words; empty if they are the same."""
+        return f"{port_of(self.source_clock)} to {port_of(self.sink_clock)}" if self.is_clocked else ""
+
+    @property
+    def widths(self) -> str:
+        """The widths of the streams at both ends, as words; empty if they are the same or there is no stream."""
+        has_streams = any(scope.streams for scope in self.scopes)
+        is_resized = has_streams and self.source_width != self.sink_width
+        return f"{self.source_width} to {self.sink_width} bits" if is_resized else ""
+
+    def signals(self) -> Iterator[tuple[str, int | None]]:
+        """What is declared for it: the word of each signal and its bits."""
+        if not self.is_clocked:
+            return
+        if self.frame.is_fixed_size:
+            yield from (("valid", None), ("ready", None))
+            return
+        scopes = self.scopes
+        for scope in scopes:
+            part = scope.handshake.part
+            if parts_of(scope, scopes):
+                yield word(part, "settled"), None
+            if scope.parent:
+                yield word(part, "idle"), None
+            yield from ((word(part, name), scope.bits) for name in ("given", "taken"))
+            yield from ((word(f"{stream}_axis", "idle"), None) for stream in scope.streams)
+
+    def instances(self) -> Iterator[str]:
+        """The word of each instance's label."""
+        for scope in self.scopes:
+            if self.is_clocked:
+                yield word(scope.handshake.part, "crossing")
+            if self.is_clocked or self.source_width != self.sink_width:
+                yield from (word(f"{stream}_axis", "crossing") for stream in scope.streams)
+
+
+def port_of(clock: Clock | None) -> str:
+    """The clock at the top level."""
+    return clock.port if clock else "clk"
+
+
+def word(part: str, name: str) -> str:
+    """What a signal or a label is called beside the two ends."""
+    return f"{part}_{name}" if part else name
+
+
+def parts_of(scope: Scope, scopes: Sequence[Scope]) -> list[str]:
+    """The words of the signals that tell whether a stream or an element within a scope is idle."""
+    streams = [word(f"{stream}_axis", "idle") for stream in scope.streams]
+    return streams + [word(item.handshake.part, "idle") for item in scopes if item.parent == scope.handshake]
+
+
+def crossings(system: DerivedSystem, connection: Connection) -> list[Crossing | None]:
+    """For each sink of a connection what stands before it; None where both ends are alike."""
+    return [_crossing(system, connection, sink) for sink in connection.sinks]
+
+
+def all_crossings(system: DerivedSystem) -> list[Crossing]:
+    """Every crossing of a system, in the order of its connections."""
+    return [found for item in system.connections for found in crossings(system, item) if found]
+
+
+def _crossing(system: DerivedSystem, connection: Connection, sink: End) -> Crossing | None:
+    source, target = connection.source.block, sink.block
+    found = Crossing(
+        connection.source,
+        sink,
+        # The parts of a message of variable size are the same for all sinks.
+        connection.frame,
+        system.clock_of(source),
+        system.clock_of(target),
+        system.width_of(source),
+        system.width_of(target),
+    )
+    return found if found.clocks or found.widths else None
+
+
+def _scopes(frame: Frame) -> list[Scope]:
+    if frame.is_fixed_size:
+        return [Scope(Handshake("", "segment_valid", "msg_ready"))]
+    side = message_side(frame)
+    message = Scope(Handshake("", "msg_valid", "msg_ready", "segment_valid", side.segments))
+    message.fields.append((PAYLOAD_LENGTH, LENGTH_BITS))
+    return [message, *_collect(side, frame.nodes, message)]
+
+
+def _collect(side: MessageSide, nodes: Sequence[Node], scope: Scope) -> Iterator[Scope]:
+    """Put fields and streams into their scope, and give the scopes within it."""
+    for node in nodes:
+        match node:
+            case Fixed():
+                ports = (side.field(leaf) for leaf in node.fields if leaf.count and leaf.is_used)
+                # Padding may part the elements of a leaf.
+                scope.fields.extend(
+                    dict.fromkeys((p.name, p.width) for p in ports if (p.name, p.width) not in scope.fields)
+                )
+            case Data() if node.is_used:
+                stream = side.stream(node)
+                scope.fields.append((stream.length, LENGTH_BITS))
+                scope.streams.append(stream.name)
+            case Loop() if node.is_used:
+                element = side.element(node)
+                if node.count is None:
+                    scope.fields.append((element.length, LENGTH_BITS))
+                if has_bytes(node):
+                    inner = Scope(_handshake(element), scope.handshake, [(element.last, None)])
+                    yield inner
+                    yield from _collect(side, node.body, inner)
+
+
+def _handshake(element: ElementPorts) -> Handshake:
+    if element.segments is None:
+        return Handshake(element.name, element.valid, element.ready)
+    return Handshake(element.name, element.valid, element.ready, element.segment_valid, element.segments)

@@ -1,0 +1,111 @@
+"""The instances of the top level: converters with their buffers, and accelerators."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
+from fusesoc_firm.system.derived.model import AcceleratorBlock, AcceleratorType, Converter, DerivedSystem
+from fusesoc_firm.system.derived.sides import accelerator_ports, side_ports
+from fusesoc_firm.system.hardware.maps import port_map
+from fusesoc_firm.system.hardware.names import AXIS, Names
+
+ERROR_CODE_BITS = 4
+
+
+def subscriber_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """A subscriber: from the Manager to its message side."""
+    ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
+    return {
+        **_instance(names, converter.block, subscriber_entity(converter.frame, converter.suffix)),
+        "message": str(converter.frame.message),
+        "id": converter.id,
+        "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
+        "error": _error(converter, system),
+    }
+
+
+def publisher_instance(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """A publisher, with the buffer behind it if it stores frames whole."""
+    ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
+    has_errors = not converter.frame.is_fixed_size and not converter.buffer
+    return {
+        **_instance(names, converter.block, publisher_entity(converter.frame, converter.suffix)),
+        "message": str(converter.frame.message),
+        **_part_of_manager(converter, system.width),
+        "ports": port_map((port.name, names.port(converter.block, port.name)) for port in ports),
+        "error": _error(converter, system) if has_errors else None,
+        "buffer": _buffer(names, converter, system) if converter.buffer else None,
+    }
+
+
+def _part_of_manager(converter: Converter, width: int) -> dict[str, int]:
+    """Where a publisher's frames go: its part of what the Manager takes."""
+    number, lanes = converter.id, width // 8
+    return {
+        "id": number,
+        "data_high": width * (number + 1) - 1,
+        "data_low": width * number,
+        "keep_high": lanes * (number + 1) - 1,
+        "keep_low": lanes * number,
+    }
+
+
+def _error(converter: Converter, system: DerivedSystem) -> dict[str, int]:
+    """Where a converter's errors go: its part of the system's."""
+    bit = system.error_blocks.index(converter.block)
+    return {"bit": bit, "high": ERROR_CODE_BITS * (bit + 1) - 1, "low": ERROR_CODE_BITS * bit}
+
+
+def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
+    """The buffer behind a publisher, and the signals between both."""
+    block, lanes = converter.block, system.width // 8
+    return {
+        "block": block,
+        "label": names.label(block, "buffer"),
+        "width": system.width,
+        "lanes": lanes,
+        "depth": max(2, -(-(ID_BYTES + LENGTH_BYTES + converter.buffer) // lanes)),
+        **{word: names.frame(block, word) for word in (*AXIS, "error", "error_code")},
+        **_part_of_manager(converter, system.width),
+        "out": _error(converter, system),
+    }
+
+
+def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedSystem) -> dict[str, Any]:
+    """An accelerator with its message sides and pins."""
+    clock = system.clock_of(block.block)
+    differences = [clock.port] if clock else []
+    differences += [f"{block.type.width} bits"] if block.type.width != system.width else []
+    formals = [f"{prefix}{port.name}" for prefix, port in accelerator_ports(block.type)]
+    formals += [str(pin.name) for pin in block.type.accelerator.pins]
+    return {
+        **_instance(names, block.block, block.type.entity),
+        "is_component": block.type.is_component,
+        "has_width": block.type.has_width,
+        "width": block.type.width,
+        "differences": ", ".join(differences),
+        "clock": clock.port if clock else "clk",
+        "reset": clock.reset if clock else "rst_n",
+        "ports": port_map((formal, names.port(block.block, formal)) for formal in formals),
+    }
+
+
+def component(type_: AcceleratorType) -> dict[str, Any]:
+    """The declaration of an accelerator that is no entity."""
+    ports = [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_)]
+    ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
+    return {
+        "entity": type_.entity,
+        "has_width": type_.has_width,
+        "ports": [
+            {"name": name, "direction": "out" if is_output else "in", "type": vhdl_type(bits)}
+            for name, is_output, bits in ports
+        ],
+    }
+
+
+def _instance(names: Names, block: str, entity: str) -> dict[str, Any]:
+    return {"block": block, "label": names.label(block), "entity": entity}

@@ -1,0 +1,42 @@
+"""The top level's side of the host: streams as ports, or the link that they end at, as plain data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
+
+# The pins of a link at the top level, as its core calls them. A board may leave open what has a default.
+LINK_PINS = {
+    LinkKind.UART: (
+        ("uart_rxd", "in", "std_logic"),
+        ("uart_txd", "out", "std_logic"),
+        ("uart_rts_n", "out", "std_logic"),
+        ("uart_cts_n", "in", "std_logic := '0'"),
+    ),
+    LinkKind.SPI: (
+        ("spi_sclk", "in", "std_logic"),
+        ("spi_cs_n", "in", "std_logic"),
+        ("spi_mosi", "in", "std_logic"),
+        ("spi_miso", "out", "std_logic"),
+        ("spi_irq", "out", "std_logic"),
+    ),
+}
+
+
+def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
+    """The streams as ports of the top level, or the link that they end at."""
+    if system.link is None:
+        return {"has_streams": True, "link": None}
+    return {
+        "has_streams": False,
+        "link": {
+            "entity": f"firm_{system.link.kind.value}_link",
+            "adapter": f"firm_sim_{system.link.kind.value}",
+            "uart": {"clock_hz": system.link.clock_hz} if system.link.kind is LinkKind.UART else None,
+            "pins": [
+                {"name": name, "direction": direction, "type": type_}
+                for name, direction, type_ in LINK_PINS[system.link.kind]
+            ],
+        },
+    }

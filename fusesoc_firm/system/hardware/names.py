@@ -1,0 +1,181 @@
+"""What the top level calls things: a signal for each port of each block, labels, and what stands between blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.payload_length import length_entity
+from fusesoc_firm.system.derived.model import Clock, Connection, DerivedSystem, End, LengthSource
+from fusesoc_firm.system.derived.sides import (
+    PAYLOAD_LENGTH,
+    Handshake,
+    SidePort,
+    accelerator_ports,
+    handshakes,
+    side_ports,
+)
+from fusesoc_firm.system.hardware.crossings import Crossing, all_crossings
+from fusesoc_firm.text.naming import distinct_identifiers
+
+# Names of the top level's own, and of its test bench: no block's signal or pin may be called so.
+_TAKEN = """
+    clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
+    s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
+    m_axis_tdata m_axis_tkeep m_axis_tid m_axis_tvalid m_axis_tlast m_axis_tready
+    to_tdata to_tkeep to_tvalid to_tlast to_tready
+    from_tdata from_tkeep from_tid from_tvalid from_tlast from_tready
+    burst_tdata burst_tkeep burst_tid burst_tvalid burst_tlast burst_tready
+    u_host u_system u_join u_environment
+    sub_axis_tdata sub_axis_tkeep sub_axis_tlast sub_axis_tvalid sub_axis_tready
+    pub_axis_tdata pub_axis_tkeep pub_axis_tvalid pub_axis_tlast pub_axis_tready
+    sched_request sched_beat sched_last sched_grant_valid sched_grant_select
+    u_link u_adapter clock_hz baud link_error
+    uart_rxd uart_txd uart_rts_n uart_cts_n spi_sclk spi_cs_n spi_mosi spi_miso spi_irq
+    periods deadlines transfer_times firm_sched_pkg times_t
+    std standard std_logic std_logic_vector
+""".split()
+AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
+# Low until every clock domain has been reset.
+RELEASED = "domains_rst_n"
+# Between a publisher and its buffer.
+FRAME_SIGNALS = tuple(f"frame_{word}" for word in (*AXIS, "error", "error_code"))
+
+
+class Names:
+    """The signal of each port of each block, those of what stands between blocks, and the labels."""
+
+    def __init__(self, system: DerivedSystem) -> None:
+        found = blocks(system)
+        forks = [(item.source, fork) for item in system.connections for fork in forked(item)]
+        buffered = [item.block for item in system.publishers if item.buffer]
+        labels: list[tuple[str, ...]] = [("u", block) for block, _ in found]
+        labels += [("u", *_fork_key(end, fork, "fork")) for end, fork in forks]
+        labels += [
+            ("u", item.source.block, item.source.prefix, "length")
+            for item in system.connections
+            if item.length and item.length.source is LengthSource.COMPUTED
+        ]
+        labels += [("u", block, "buffer") for block in buffered]
+        labels += [("u", *_crossing_key(item, word)) for item in all_crossings(system) for word in item.instances()]
+        label_names = distinct_identifiers(labels, _TAKEN)
+        self._labels = dict(zip(labels, label_names, strict=True))
+
+        entities = {subscriber_entity(item.frame, item.suffix) for item in system.subscribers}
+        entities |= {publisher_entity(item.frame, item.suffix) for item in system.publishers}
+        entities |= {item.entity for item in system.accelerator_types}
+        entities |= {length_entity(frame, suffix) for frame, suffix in system.computed_lengths.items()}
+        reserved = {*_TAKEN, system.entity, *entities, *label_names, *clock_names(system)}
+        # What stands between blocks has keys of three parts, so no field of a message can have the same.
+        ports = [(block, f"{prefix}{port.name}") for block, sides in found for prefix, port in sides]
+        signals: list[tuple[str, ...]] = [
+            _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
+        ]
+        signals += [(block, "", word) for block in buffered for word in FRAME_SIGNALS]
+        signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
+        signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
+        # Pins first: who connects them should find them under the names they ask for.
+        pins = [(block.block, pin.name) for block in system.accelerators for pin in block.type.accelerator.pins]
+        keys: list[tuple[str, ...]] = [*pins, *ports, *signals]
+        self._signals: Mapping[tuple[str, ...], str] = dict(
+            zip(keys, distinct_identifiers(keys, reserved), strict=True)
+        )
+
+    def label(self, *words: str) -> str:
+        """The label of a block, or of what the further words call."""
+        return self._labels["u", *words]
+
+    def port(self, block: str, port: str) -> str:
+        """The signal of a block's port, or the top level's port that is a pin."""
+        return self._signals[block, port]
+
+    def at(self, end: End, port: str) -> str:
+        """The signal of a port of the message at an end of a connection."""
+        return self._signals[end.block, f"{end.prefix}{port}"]
+
+    def fork(self, end: End, fork: Handshake) -> str:
+        """The label of the fork behind an output."""
+        return self._labels["u", *_fork_key(end, fork, "fork")]
+
+    def forked(self, end: End, fork: Handshake, word: str) -> str:
+        """The signal with the `valid`, `ready` or `segment_valid` of all that stand behind a fork."""
+        return self._signals[_fork_key(end, fork, f"fork_{word}")]
+
+    def length(self, connection: Connection) -> str:
+        """The signal with the length of a connection's payloads."""
+        source = connection.source
+        return self._signals[_length_key(source)] if is_found_out(connection) else self.at(source, PAYLOAD_LENGTH)
+
+    def crossing(self, crossing: Crossing, word: str) -> str:
+        """A signal of a crossing."""
+        return self._signals[_crossing_key(crossing, word)]
+
+    def crossing_label(self, crossing: Crossing, word: str) -> str:
+        """The label of an instance of a crossing."""
+        return self._labels["u", *_crossing_key(crossing, word)]
+
+    def frame(self, block: str, signal: str) -> str:
+        """A signal between a publisher and its buffer."""
+        return self._signals[block, "", f"frame_{signal}"]
+
+
+def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]]:
+    """Each block with all signals of its message sides and their prefixes, in the order of the data flow."""
+    blocks = []
+    for converter in system.subscribers:
+        ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
+        blocks.append((converter.block, [("", port) for port in ports]))
+    for block in system.accelerators:
+        blocks.append((block.block, accelerator_ports(block.type)))
+    for converter in system.publishers:
+        ports = side_ports(converter.frame, system.width, gives=False, has_valid=False)
+        blocks.append((converter.block, [("", port) for port in ports]))
+    return blocks
+
+
+def forked(connection: Connection) -> Iterator[Handshake]:
+    """The handshakes of a connection that need a fork."""
+    if len(connection.sinks) > 1 and connection.frame.is_fixed_size:
+        yield Handshake("", "segment_valid", "msg_ready")
+    elif len(connection.sinks) > 1:
+        yield from handshakes(connection.frame)
+
+
+def is_found_out(connection: Connection) -> bool:
+    """Whether the length of a connection's payloads does not come from its source."""
+    return connection.length is not None and connection.length.source is not LengthSource.GIVEN
+
+
+def clock_names(system: DerivedSystem) -> list[str]:
+    """What the top level has for further clocks: ports, resets, and the labels of what makes these."""
+    if not system.clocks:
+        return []
+    resets = [RELEASED, *(name for clock in system.clocks for name in (clock.reset, seen_reset(clock)))]
+    return [*(clock.port for clock in system.clocks), *resets, *map(reset_label, resets)]
+
+
+def reset_label(reset: str) -> str:
+    """The label of what makes a reset."""
+    return f"u_{reset.removesuffix('_n')}"
+
+
+def seen_reset(clock: Clock) -> str:
+    """Low until a clock domain, and those before it, have been reset."""
+    return f"seen_{clock.name}_n"
+
+
+def _crossing_key(crossing: Crossing, word: str) -> tuple[str, ...]:
+    source, sink = crossing.source, crossing.sink
+    return source.block, source.prefix, "to", sink.block, sink.prefix, word
+
+
+def _length_key(end: End) -> tuple[str, str, str]:
+    return end.block, end.prefix, "sent_length"
+
+
+def _fork_words(fork: Handshake) -> list[str]:
+    return ["fork_valid", "fork_ready", *(["fork_segment_valid"] if fork.segment_valid else [])]
+
+
+def _fork_key(end: End, fork: Handshake, word: str) -> tuple[str, str, str]:
+    return end.block, end.prefix, f"{fork.part}_{word}" if fork.part else word

@@ -1,0 +1,179 @@
+"""The connections of the top level as assignments between signals, as in the dissertation's listing 6.9.
+
+Between the signals stands what lets several blocks take a message, and what finds out the length of a payload.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fusesoc_firm.converter.payload_length import length_entity, length_ports
+from fusesoc_firm.converter.ports import field_ports
+from fusesoc_firm.converter.vhdl import all_of, bit, bits
+from fusesoc_firm.system.derived.model import Connection, DerivedSystem, End, LengthSource, PayloadLength
+from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, Handshake, handshakes, side_ports
+from fusesoc_firm.system.hardware.crossing_wires import SourceSide, crossing_configuration, field_pairs
+from fusesoc_firm.system.hardware.crossings import Crossing, crossings, port_of
+from fusesoc_firm.system.hardware.maps import port_map
+from fusesoc_firm.system.hardware.names import Names, forked, is_found_out
+
+# A length of 32 bits.
+_LONGEST = 'x"FFFFFFFF"'
+
+
+def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
+    """The assignments of every connection. A sink of several sources takes their parts of a message together."""
+    waiting: dict[End, list[str]] = {}
+    for connection in system.connections:
+        if connection.frame.is_fixed_size:
+            for sink, (valid, _) in zip(connection.sinks, _arriving(names, system, connection), strict=True):
+                waiting.setdefault(sink, []).append(valid)
+    return [_connection(names, connection, system, waiting) for connection in system.connections]
+
+
+def _connection(
+    names: Names, connection: Connection, system: DerivedSystem, waiting: Mapping[End, list[str]]
+) -> dict[str, Any]:
+    """The assignments of a connection; with several sinks, forks let each take the message in its own time.
+
+    `waiting` are the valids of all sources of each sink; what they make together is assigned with the last one.
+    """
+    length = connection.length
+    pairs: list[tuple[str, str]] = []
+    if _is(LengthSource.BUFFERED, length):
+        # As long as it gets.
+        pairs.append((names.length(connection), _LONGEST))
+    if connection.frame.is_fixed_size:
+        pairs += _fixed_pairs(names, system, connection, waiting)
+    else:
+        for number, crossing in enumerate(crossings(system, connection)):
+            pairs += _pairs(names, connection, number, system, crossing)
+    return {
+        "message": str(connection.frame.message),
+        "source": connection.source.block,
+        "sinks": ", ".join(sink.block for sink in connection.sinks),
+        "length_note": f"; its length is {length.source.value}" if length else "",
+        "length_signal": {"name": names.length(connection)} if is_found_out(connection) else None,
+        "length": _length(names, connection) if _is(LengthSource.COMPUTED, length) else None,
+        "forks": [_fork(names, connection, fork, system) for fork in forked(connection)],
+        "crossings": [
+            crossing_configuration(names, crossing, _source_side(names, connection, number, system))
+            for number, crossing in enumerate(crossings(system, connection))
+            if crossing
+        ],
+        "assignments": [{"target": target, "source": value} for target, value in pairs],
+    }
+
+
+def _fixed_pairs(
+    names: Names, system: DerivedSystem, connection: Connection, waiting: Mapping[End, list[str]]
+) -> Iterator[tuple[str, str]]:
+    """The assignments of a message of fixed size."""
+    source = connection.source
+    arriving = _arriving(names, system, connection)
+    for sink, frame, (valid, ready) in zip(connection.sinks, connection.frames, arriving, strict=True):
+        yield from ((names.at(sink, port.name), names.at(source, port.name)) for port in field_ports(frame))
+        sink_valid, sink_ready = bit(names.at(sink, "segment_valid"), 0), names.at(sink, "msg_ready")
+        if valid == waiting[sink][-1]:
+            whole = all_of(waiting[sink])
+            yield sink_valid, whole
+            if sink.prefix:
+                yield names.at(sink, "msg_valid"), whole
+        yield ready, sink_ready if len(waiting[sink]) == 1 else all_of((sink_ready, sink_valid))
+
+
+def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> list[tuple[str, str]]:
+    """Where each sink of a message of fixed size has its valid from, and its ready goes to."""
+    return [
+        (names.crossing(crossing, "valid"), names.crossing(crossing, "ready")) if crossing else handshake
+        for crossing, handshake in zip(crossings(system, connection), _handshakes(names, connection), strict=True)
+    ]
+
+
+def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
+    """What the source of a message of fixed size shows each sink as valid, and takes as ready."""
+    source = connection.source
+    for fork in forked(connection):
+        valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
+        return [(bit(valid, number), bit(ready, number)) for number in range(len(connection.sinks))]
+    return [(bit(names.at(source, "segment_valid"), 0), names.at(source, "msg_ready"))]
+
+
+def _pairs(
+    names: Names, connection: Connection, number: int, system: DerivedSystem, crossing: Crossing | None
+) -> list[tuple[str, str]]:
+    """The same of one of variable size between the source and a sink, as far as no instance stands there."""
+    sink, source = connection.sinks[number], _source_side(names, connection, number, system)
+    if crossing and crossing.is_clocked:
+        return list(field_pairs(names, crossing, source))
+    pairs = []
+    for port in side_ports(connection.frames[number], system.width, gives=True, has_valid=True):
+        if crossing and port.name.rpartition("_")[0].endswith("_axis"):
+            continue
+        at_source, at_sink = source.ports[port.name], names.at(sink, port.name)
+        pairs.append((at_sink, at_source) if port.is_output else (at_source, at_sink))
+    return pairs
+
+
+def _source_side(names: Names, connection: Connection, number: int, system: DerivedSystem) -> SourceSide:
+    """What the source shows a sink; a handshake that is forked goes by its fork."""
+    source = connection.source
+    if connection.frame.is_fixed_size:
+        valid, ready = _handshakes(names, connection)[number]
+        return SourceSide({"segment_valid": valid, "msg_ready": ready}, {})
+    ports = {
+        port.name: names.length(connection) if port.name == PAYLOAD_LENGTH else names.at(source, port.name)
+        for port in side_ports(connection.frames[number], system.width, gives=True, has_valid=True)
+    }
+    begun = {
+        item.part: bit(ports[item.segment_valid], 0) for item in handshakes(connection.frame) if item.segment_valid
+    }
+    for fork in forked(connection):
+        low, high = fork.segments * number, fork.segments * (number + 1) - 1
+        ports[fork.valid] = bit(names.forked(source, fork, "valid"), number)
+        ports[fork.ready] = bit(names.forked(source, fork, "ready"), number)
+        if fork.segment_valid is not None:
+            segment_valid = names.forked(source, fork, "segment_valid")
+            ports[fork.segment_valid] = bits(segment_valid, high, low)
+            begun[fork.part] = bit(segment_valid, low)
+    return SourceSide(ports, begun)
+
+
+def _length(names: Names, connection: Connection) -> dict[str, Any]:
+    """What computes the length of an accelerator's payloads."""
+    source = connection.source
+    inputs = ((formal, names.at(source, formal)) for formal in length_ports(connection.frame))
+    return {
+        "label": names.label(source.block, source.prefix, "length"),
+        "entity": length_entity(connection.frame, connection.length.suffix if connection.length else ""),
+        "ports": port_map([*inputs, (PAYLOAD_LENGTH, names.length(connection))]),
+    }
+
+
+def _fork(names: Names, connection: Connection, fork: Handshake, system: DerivedSystem) -> dict[str, Any]:
+    source, count = connection.source, len(connection.sinks)
+    clock = system.clock_of(source.block)
+    source_valid = names.at(source, fork.valid)
+    return {
+        "label": names.fork(source, fork),
+        "sinks": count,
+        "clock": port_of(clock),
+        "reset": clock.reset if clock else "rst_n",
+        "source_valid": bit(source_valid, 0) if connection.frame.is_fixed_size else source_valid,
+        "source_ready": names.at(source, fork.ready),
+        "sink_valid": names.forked(source, fork, "valid"),
+        "sink_ready": names.forked(source, fork, "ready"),
+        "segments": {
+            "count": fork.segments,
+            "bits": count * fork.segments,
+            "source_segment_valid": names.at(source, fork.segment_valid),
+            "sink_segment_valid": names.forked(source, fork, "segment_valid"),
+        }
+        if fork.segment_valid is not None
+        else None,
+    }
+
+
+def _is(source: LengthSource, length: PayloadLength | None) -> bool:
+    return length is not None and length.source is source

@@ -1,0 +1,218 @@
+"""The `.core` file of a system: what FuseSoC is told about it, with all targets that a system can have.
+
+Its upper part is written once and is its author's from then on. The targets are written anew from one template, so
+that a target that is new there comes to every system; those of the author's own, by other names, stay.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from fusesoc_firm.request.core_reader import read_core
+from fusesoc_firm.system.boards.board import QUARTUS, VIVADO, board_entity, boards, read_board
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.hardware.verilog_bench import translated_unit
+from fusesoc_firm.system.system_core import LoadedSystem
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.naming import text_fault
+from fusesoc_firm.text.quoting import yaml_list, yaml_scalar
+from fusesoc_firm.text.render import render
+from fusesoc_firm.tools.simulators import Simulator, default_simulator, fitting
+
+HEAD_TEMPLATE = "core/system.core"
+TARGETS_TEMPLATE = "core/targets.core"
+
+# Families of FPGAs as Yosys calls them, and the options of its synth command: a target synth_<name> for each.
+FAMILIES = [
+    {"name": "xilinx", "description": "Xilinx UltraScale+", "options": "[-family, xcup, -flatten, -abc9]"},
+    {"name": "ecp5", "description": "Lattice ECP5", "options": "[-abc9]"},
+    {"name": "ice40", "description": "Lattice iCE40 UltraPlus", "options": "[-abc9, -device, u, -dsp]"},
+    {"name": "gowin", "description": "Gowin", "options": "[]"},
+]
+# The instances of the generator that targets ask for.
+_SYSTEM, _SIMULATION = "system", "simulation"
+# The core with the generator `far`, and the one that had it before version 0.2.0.
+_SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
+_SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
+# A target with the comment above it; blank lines part them.
+_TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class CoreOptions:
+    """What a new `.core` is to say beside what the specification does; paths are relative to it."""
+
+    name: str = ""
+    description: str = ""
+    depend: Sequence[str] = ()
+    stimuli: str = "stimuli.yaml"
+    model: str = "model.py"
+    environment: Sequence[str] = ()
+    paths: Sequence[str | Path] = ()
+    distro: str = ""
+
+
+def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
+    """The text of the `.core` in `path` for the system of a specification: of one that is there, with new targets.
+
+    The `paths` of `options` are told from the current folder. Raises `InputError`.
+    """
+    if path.exists():
+        return updated_core(loaded.system, path)
+    folder = path.absolute().parent
+    options = replace(
+        options,
+        depend=[*options.depend, *loaded.specification.message_cores],
+        paths=[os.path.relpath(item, folder) for item in options.paths],
+    )
+    return new_core(loaded.system, os.path.relpath(spec, folder), options)
+
+
+def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
+    """The text of a `.core` that is not there yet, for the specification `spec` beside it. Raises `InputError`."""
+    if fault := text_fault(options.description):
+        fail(f"--description {fault[0]}", hint=fault[1])
+    further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
+    head = render(
+        HEAD_TEMPLATE,
+        {
+            "name": options.name or f"robot:sys:{system.name}:0.1.0",
+            "description": options.description or f"System {system.name}",
+            "depend": list(options.depend),
+            "spec": spec,
+            "options": [{"name": name, "value": value} for name, value in further.items() if value],
+            "stimuli": options.stimuli,
+            "model": options.model,
+            "environment": {"files": _paths(options.environment)} if options.environment else None,
+        },
+    )
+    return head + _targets(system, is_simulated=True, has_environment=bool(options.environment))
+
+
+def updated_core(system: DerivedSystem, path: Path) -> str:
+    """The text of the `.core` in `path` with the targets of today. Raises `InputError` if it is none of a system."""
+    core = read_core(path)
+    if not isinstance(core.data.get("generate"), dict):
+        fail(f"{path} is no core with a section 'generate'")
+    instances, text = core.section("generate"), path.read_text(encoding="utf-8")
+    if _GENERATORS in text and _SYSTEM_CORE not in text:
+        fail(f"{path} does not depend on '{_SYSTEM_CORE}', which has the generator 'far'", hint=f"{_GENERATORS} had it")
+    if _SYSTEM not in instances:
+        fail(f"{path} has no instance '{_SYSTEM}' under 'generate'; without the file, this command writes another one")
+    is_simulated = _SIMULATION in instances
+    has_environment = is_simulated and bool(core.parameters(_SIMULATION).get("environment"))
+    targets = _targets(system, is_simulated=is_simulated, has_environment=has_environment)
+    if not (section := _SECTION.search(text)):
+        return f"{text.rstrip()}\n\n{targets}"
+    names = _TARGET.findall(targets)
+    own = [target[0].strip("\n") for target in _TARGET.finditer(section[1]) if target[1] not in names]
+    rest = text[section.end() :]
+    return text[: section.start()] + "\n\n".join([targets.rstrip("\n"), *own]) + "\n" + (f"\n{rest}" if rest else "")
+
+
+def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool) -> str:
+    has_kernels = bool(system.kernels)
+    unit = translated_unit(system, has_environment=has_environment)
+    return render(
+        TARGETS_TEMPLATE,
+        {
+            "entity": system.entity,
+            "simulations": [
+                target
+                for is_live in ((False, True) if is_simulated else ())
+                for target in _simulations(system, unit, is_live=is_live)
+            ],
+            # Only an HLS tool makes them, so there is no netlist of the whole.
+            "has_kernels": has_kernels,
+            "families": [] if has_kernels else FAMILIES,
+            "boards": [target for name in boards() if (target := _board(system, name, has_kernels=has_kernels))],
+        },
+    )
+
+
+def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator[dict[str, object]]:
+    """The targets of simulations, or of live ones: the first simulator has the plain name.
+
+    Those that read no VHDL translate the design unit `unit` with all below it.
+    """
+    has_verilog = any(item.is_component for item in system.accelerator_types)
+    sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
+    is_system_verilog = any(source.endswith((".sv", ".svh")) for source in sources)
+    kind, bench, suffix = ("live", "verilog_pipe", "live") if is_live else ("sim", "verilog_host", "tb")
+    known = fitting(has_verilog=has_verilog, is_live=is_live)
+    for name, item in known.items():
+        is_first, is_default = item is next(iter(known.values())), name == default_simulator()
+        parameters = ["product: live"] * is_live + [f"simulator: {name}"] * (not is_default)
+        # A system that the default one cannot simulate has the first target by both names.
+        anchor = (kind if is_live else name) if is_first and not is_default else ""
+        yield {
+            "target": kind if is_first else f"{kind}_{name}",
+            "alias": {"name": f"{kind}_{name}", "anchor": anchor} if anchor else None,
+            "anchored": f" &{anchor}" if anchor else "",
+            "description": _description(item, is_first=is_first, is_live=is_live),
+            "parameters": f": {{{', '.join(parameters)}}}" if parameters else "",
+            "further_flag": "" if item.reads_vhdl else f", {bench}: true",
+            "simulator": name,
+            "before": _options(item.system_verilog if is_system_verilog else {}),
+            "translated": None if item.reads_vhdl else {"unit": unit},
+            "options": _options(item.options),
+            "toplevel": f"{system.entity}_{suffix}",
+        }
+
+
+def _description(simulator: Simulator, *, is_first: bool, is_live: bool) -> str:
+    if is_live and is_first:
+        return f"Build a simulator in {simulator.title} that another program starts and sends frames to"
+    if is_live:
+        return f"The same in {simulator.title}"
+    if is_first:
+        netlist = "" if simulator.reads_vhdl else "; GHDL makes a netlist of the VHDL"
+        return f"Simulate with {simulator.title}, compare every byte with the model{netlist}"
+    return f"The same with {simulator.title}{simulator.remark}"
+
+
+def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
+    return [{"name": name, "value": value} for name, value in options.items()]
+
+
+def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
+    """A board's target; None if it takes no kernels and the system has some."""
+    board = read_board(name)
+    if has_kernels and board.flow != VIVADO:
+        return None
+    options: dict[str, str | Sequence[str] | None] = {
+        "frontends": ["ghdlsynth"] if board.is_linked else None,
+        "part": board.part,
+        "board_part": board.board_part,
+        # A block design refers to modules by name only where Vivado manages the sources.
+        "source_mgmt_mode": "All" if board.flow == VIVADO else None,
+        "yosys_synth_options": board.synth_options,
+        "nextpnr_options": board.nextpnr_options,
+        "device": board.device,
+        "family" if board.flow == QUARTUS else "device_family": board.device_family,
+    }
+    top = board_entity(system, board)
+    product = "Quartus project" if board.flow == QUARTUS else "Bitstream"
+    return {
+        "name": name,
+        "description": f"{product} for the board {board.description}",
+        # Of Quartus, Edalize has no flow.
+        "is_tool": board.flow == QUARTUS,
+        "flow": str(board.flow),
+        "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],
+        "toplevel": f"{top}_wrapper" if board.flow == VIVADO else top,
+    }
+
+
+def _value(value: str | Sequence[str]) -> str:
+    """A word or a list of words in YAML."""
+    return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
+
+
+def _paths(items: Sequence[str | Path]) -> str:
+    """A list on one line; nothing if it is empty."""
+    return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

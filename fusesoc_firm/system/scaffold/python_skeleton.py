@@ -1,0 +1,91 @@
+"""A first version of an accelerator in software: a function with its messages' fields, and defaults as answers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from fusesoc_firm.frame.codec import decode
+from fusesoc_firm.frame.defaults import encode_used
+from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node, Path
+from fusesoc_firm.frame.select import used_part, with_names_in_use
+from fusesoc_firm.system.derived.model import AcceleratorType
+from fusesoc_firm.system.derived.python_function import function_name, parameter_names
+from fusesoc_firm.text.quoting import python_string
+
+Configuration = dict[str, Any]
+
+
+def python_skeleton(type_: AcceleratorType) -> Configuration:
+    """The configuration of the function's first version."""
+    parameters = parameter_names(type_)
+    count = len(type_.outputs)
+    answers = ["answer"] if count == 1 else [f"answer{number}" for number in range(count)]
+    return {
+        "function": function_name(type_),
+        "parameters": ", ".join(parameters),
+        "inputs": [_described(name, side.frame) for name, side in zip(parameters, type_.inputs, strict=True)],
+        "outputs": [
+            {**_described(name, side.frame), "values": _values(side.frame)}
+            for name, side in zip(answers, type_.outputs, strict=True)
+        ],
+        "answer": ", ".join(answers) or "None",
+    }
+
+
+def _described(name: str, frame: Frame) -> Configuration:
+    """A message and its used fields with their types."""
+    fields = dict(_fields(frame.nodes, "", 0))
+    return {
+        "name": name,
+        "message": str(frame.message),
+        "fields": [{"field": field, "type": type_} for field, type_ in fields.items()],
+    }
+
+
+def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str, str]]:
+    """The leaves of nodes below `above`, to which `depth` names lead."""
+    for node in nodes:
+        match node:
+            case Fixed(fields=leaves):
+                for leaf in leaves:
+                    if leaf.is_used:
+                        yield f"{above}{_shown(leaf.path[depth:])}", f"{leaf.type.name}{_size(leaf.path)}"
+            case Data() if node.is_used and len(node.path) > depth:
+                yield f"{above}{_shown(node.path[depth:])}", node.ros_type
+            case Loop() if node.is_used:
+                path = f"{above}{_shown(node.path[depth:])}"
+                yield path, node.ros_type
+                yield from _fields(node.body, f"{path}[].", len(node.path))
+
+
+def _shown(path: Path) -> str:
+    """A path as people write it, without the size of its last array."""
+    above = [f"{step.name}[{step.count}]" if step.count is not None else step.name for step in path[:-1]]
+    return ".".join([*above, path[-1].name])
+
+
+def _size(path: Path) -> str:
+    return "" if path[-1].count is None else f"[{path[-1].count}]"
+
+
+def _values(frame: Frame) -> list[Configuration]:
+    """The default of each field that is used."""
+    message = decode(frame, encode_used(with_names_in_use(frame, ()), {}))
+    return [{"field": name, "value": _literal(value)} for name, value in used_part(message, frame).items()]
+
+
+def _literal(value: Any) -> str:
+    """A value as Python writes it."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{python_string(name)}: {_literal(inner)}' for name, inner in value.items())}}}"
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        same = len(value) > 1 and all(inner == value[0] for inner in value)
+        if same and not isinstance(value[0], Mapping | list):
+            return f"[{_literal(value[0])}] * {len(value)}"
+        return f"[{', '.join(map(_literal, value))}]"
+    if isinstance(value, str):
+        return python_string(value)
+    is_finite = not isinstance(value, float) or math.isfinite(value)
+    return repr(value) if is_finite else f'float("{value}")'

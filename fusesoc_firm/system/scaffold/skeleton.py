@@ -1,0 +1,228 @@
+"""A first version of an accelerator that has no source yet: the ports that its messages imply, and zeros as answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.converter.message_ports import message_side
+from fusesoc_firm.converter.program import has_bytes
+from fusesoc_firm.converter.vhdl import vhdl_type
+from fusesoc_firm.frame.length import sent_length_of
+from fusesoc_firm.frame.model import Loop, Node
+from fusesoc_firm.system.derived.kernel import arguments, function_name, prototype
+from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, MessageSide
+from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, SidePort, accelerator_ports
+from fusesoc_firm.system.scaffold.python_skeleton import python_skeleton
+from fusesoc_firm.system.written.specification import SOFTWARE, Pin
+from fusesoc_firm.text.naming import distinct_identifiers, identifier
+from fusesoc_firm.text.render import render
+
+Configuration = dict[str, Any]
+
+_FUNCTION_TEMPLATE = "hls/skeleton.cpp"
+_SOFTWARE_TEMPLATE = "python/skeleton.py"
+
+
+# What the architecture or module declares; a pin may have such a name.
+_SIGNALS = ("is_there", "is_sent", "sent_r", "done")
+
+
+@dataclass(frozen=True)
+class _Language:
+    """How a language of hardware declares ports."""
+
+    template: str
+    directions: tuple[str, str]
+    type: Callable[[int | None], str]
+    separator: str
+    comment: str
+    has_types_first: bool = False
+
+
+_LANGUAGES = {
+    "VHDL": _Language(
+        template="vhdl/skeleton.vhd",
+        directions=("in ", "out"),
+        type=vhdl_type,
+        separator=";",
+        comment="--",
+    ),
+    "Verilog": _Language(
+        template="verilog/skeleton.v",
+        directions=("input  wire", "output wire"),
+        type=lambda bits: "" if bits is None else f"[{bits - 1}:0] ",
+        separator=",",
+        comment="//",
+        has_types_first=True,
+    ),
+}
+
+
+def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
+    """A text for the first source of each accelerator none of whose sources is in `folder`."""
+    texts = {}
+    for type_ in (*system.accelerator_types, *system.software.types):
+        paths = [folder / source for source in type_.accelerator.sources]
+        # Software elsewhere has none.
+        if paths and not any(path.exists() for path in paths):
+            texts[paths[0]] = skeleton(type_)
+    return texts
+
+
+def skeleton(type_: AcceleratorType) -> str:
+    """The text of an accelerator's source."""
+    if language := _LANGUAGES.get(type_.accelerator.type):
+        template, configuration = language.template, _entity(type_, language)
+    elif type_.accelerator.type == SOFTWARE:
+        template, configuration = _SOFTWARE_TEMPLATE, python_skeleton(type_)
+    else:
+        template, configuration = _FUNCTION_TEMPLATE, _function(type_)
+    return render(template, {**configuration, "purpose": _purpose(type_)})
+
+
+def _purpose(type_: AcceleratorType) -> str:
+    taken, given = (
+        ", ".join(str(side.frame.message) for side in sides) or "nothing" for sides in (type_.inputs, type_.outputs)
+    )
+    return f"{taken} in, {given} out"
+
+
+def _function(type_: AcceleratorType) -> Configuration:
+    inputs, outputs = arguments(type_)
+    return {
+        "function": function_name(type_),
+        "prototype": prototype(type_),
+        "inputs": [item.port for item in inputs],
+        "outputs": [item.port for item in outputs],
+    }
+
+
+def _entity(type_: AcceleratorType, language: _Language) -> Configuration:
+    ports = accelerator_ports(type_)
+    of_side = {
+        side.prefix: [port for prefix, port in ports if prefix == side.prefix]
+        for side in (*type_.inputs, *type_.outputs)
+    }
+    pins = type_.accelerator.pins
+    names = distinct_identifiers(((name,) for name in _SIGNALS), [str(pin.name) for pin in pins])
+    own = dict(zip(_SIGNALS, names, strict=True))
+    gives = [_given(number, side, of_side[side.prefix]) for number, side in enumerate(type_.outputs)]
+    return {
+        **own,
+        "entity": identifier(type_.accelerator.name),
+        "sides": _declarations(type_, of_side, pins, language),
+        "takes": [side.prefix for side in type_.inputs],
+        "output_count": max(1, len(type_.outputs)),
+        "gives": gives,
+        "counts": [count for given in gives for count in given["counts"]],
+        "discards": _discards(type_.inputs, of_side),
+        "pins": [{"port": str(pin.name), "bits": pin.bits} for pin in pins if pin.direction == "out"],
+    }
+
+
+def _declarations(
+    type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin], language: _Language
+) -> list[Configuration]:
+    """The ports of each side, and the pins, as the entity or module declares them."""
+    groups = [
+        (
+            f"{side.frame.message}",
+            [(f"{side.prefix}{port.name}", port.is_output, port.width, port.comment) for port in of_side[side.prefix]],
+        )
+        for side in (*type_.inputs, *type_.outputs)
+    ]
+    if pins:
+        groups.append(("pins", [(str(pin.name), pin.direction == "out", pin.bits, "") for pin in pins]))
+    declared = [port for _, ports in groups for port in ports]
+    names = max((len(name) for name, *_ in declared), default=0)
+    types = max((len(language.type(bits)) for *_, bits, _ in declared), default=0) if language.has_types_first else 0
+    last = declared[-1][0] if declared else ""
+    return [
+        {
+            "comment": title,
+            "ports": [
+                {
+                    "name": name if language.has_types_first else name.ljust(names),
+                    "direction": language.directions[is_output],
+                    "type": language.type(bits).ljust(types),
+                    "semicolon": "" if name == last else language.separator,
+                    "comment": f"  {language.comment} {comment}" if comment else "",
+                }
+                for name, is_output, bits, comment in ports
+            ],
+        }
+        for title, ports in groups
+    ]
+
+
+def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Configuration:
+    """What an output does: its handshake with the message, the length of a message of zeros, zeros for the rest."""
+    counts = _counts(side, number)
+    by_name = {f"{side.prefix}{port.name}": port for port in ports}
+    length = f"{side.prefix}{PAYLOAD_LENGTH}"
+    segments = [f"{side.prefix}segment_valid", *(count["segment_valid"] for count in counts)]
+    valid = [f"{side.prefix}msg_valid", *(count["valid"] for count in counts)]
+    driven = {length, *segments, *valid, *(count["last"] for count in counts)}
+    return {
+        "number": number,
+        "ready": f"{side.prefix}msg_ready",
+        "segments": [{"port": name, "bits": by_name[name].width or 1} for name in segments if name in by_name],
+        "valid": [name for name in valid if name in by_name],
+        "length": _length(length, side) if length in by_name else None,
+        "zeros": [
+            {"port": name, "bits": port.width}
+            for name, port in by_name.items()
+            if port.is_output and name not in driven
+        ],
+        "counts": counts,
+    }
+
+
+def _length(port: str, side: MessageSide) -> Configuration:
+    """The length of a message of zeros."""
+    value = sent_length_of(side.frame).minimum
+    return {"port": port, "value": value, "digits": f"{value:08x}"}
+
+
+def _counts(side: MessageSide, number: int) -> list[Configuration]:
+    """The arrays of fixed size that output `number` sends; their elements are counted, as the last one is marked."""
+    if side.frame.is_fixed_size:
+        return []
+    ports = message_side(side.frame)
+    found: list[Configuration] = []
+    for loop in _fixed_loops(side.frame.nodes):
+        element = ports.element(loop)
+        found.append(
+            {
+                "port": f"{side.prefix}{element.name}",
+                "count_r": f"{side.prefix}{element.name}_r",
+                "high": (loop.count or 1) - 1,
+                "number": number,
+                "segment_valid": f"{side.prefix}{element.segment_valid}",
+                "valid": f"{side.prefix}{element.valid}",
+                "ready": f"{side.prefix}{element.ready}",
+                "last": f"{side.prefix}{element.last}",
+            }
+        )
+    return found
+
+
+def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
+    """The arrays of fixed size that a message of zeros has elements of: no other array is around them."""
+    for node in nodes:
+        if isinstance(node, Loop) and node.is_used and node.count and has_bytes(node):
+            yield node
+            yield from _fixed_loops(node.body)
+
+
+def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> list[str]:
+    """The streams and elements of inputs, which must be taken to their ends."""
+    return [
+        f"{side.prefix}{port.name}"
+        for side in inputs
+        for port in of_side[side.prefix]
+        if port.is_output and port.name != "msg_ready"
+    ]

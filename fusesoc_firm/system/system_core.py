@@ -1,0 +1,309 @@
+"""The generator `far`: a system's converters, accelerators and top level as a core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from fractions import Fraction
+from functools import cached_property, partial
+from pathlib import Path, PurePosixPath
+
+from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
+from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
+from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
+from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
+from fusesoc_firm.converter.sources import publisher_source, subscriber_source
+from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
+from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.request.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
+from fusesoc_firm.store.reads import Input
+from fusesoc_firm.system.boards.block_design import (
+    BLOCK_DESIGN_TEMPLATE,
+    PACKAGE_TEMPLATE,
+    block_design_configuration,
+    package_configuration,
+)
+from fusesoc_firm.system.boards.board import (
+    BOARD_TEMPLATE,
+    FLOWS,
+    VIVADO,
+    Board,
+    board_configuration,
+    board_entity,
+    board_path,
+    check_fits,
+    on_board,
+    read_board,
+)
+from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
+from fusesoc_firm.system.derived.analysis import derive, source_files
+from fusesoc_firm.system.derived.kernel import function_name
+from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
+from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
+from fusesoc_firm.system.hardware.hls import WRAPPER_TEMPLATE, wrapper_configuration
+from fusesoc_firm.system.written.specification import Accelerator, Specification, is_core, read_specification
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
+from fusesoc_firm.text.naming import identifier
+from fusesoc_firm.text.render import render
+
+# FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
+_FILE_TYPES = {
+    ".vhd": VHDL,
+    ".vhdl": VHDL,
+    ".v": "verilogSource-2005",
+    ".vh": "verilogSource-2005",
+    ".sv": "systemVerilogSource",
+    ".svh": "systemVerilogSource",
+}
+_INCLUDE_SUFFIXES = (".vh", ".svh")
+
+
+@dataclass(frozen=True)
+class LoadedSystem:
+    """A specification, the folder its paths are relative to, the board if one is given, and the system derived.
+
+    `warnings` are for whoever wrote the specification.
+    """
+
+    specification: Specification
+    folder: Path
+    libraries: Mapping[Middleware, MessageLibrary]
+    system: DerivedSystem
+    board: Board | None = None
+    warnings: tuple[Diagnostic, ...] = ()
+
+    def inputs(self) -> list[Input]:
+        """The accelerators' sources and the files of all messages."""
+        return [*source_files(self.specification, self.folder), *self._message_files()]
+
+    def messages(self) -> list[tuple[MessageName, Definitions]]:
+        """Every message of a converter once, whichever of its fields are used, with all definitions within it."""
+        messages = dict.fromkeys((frame.ros, frame.message) for frame in self.system.frames)
+        return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
+
+    def definitions(self) -> list[tuple[MessageLibrary, Definitions]]:
+        """The library of each message, of software too, with all definitions within it."""
+        types = self.system.software.types
+        sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
+        frames = dict.fromkeys((*self.system.frames, *sides))
+        return [(self.libraries[frame.ros], self.libraries[frame.ros].closure(frame.message)) for frame in frames]
+
+    def _message_files(self) -> list[Input]:
+        found = [path for library, definitions in self.definitions() for path in library.files(definitions)]
+        return list(dict.fromkeys(found))
+
+
+def load_system(
+    path: Path,
+    libraries: Mapping[Middleware, MessageLibrary],
+    *,
+    needs_sources: bool = True,
+    board: Board | None = None,
+    core_folders: CoreFolders = no_core_folders,
+) -> LoadedSystem:
+    """Read and derive the system of a specification, on a board if one is given. Raises `InputError` with all faults.
+
+    Unless it `needs_sources`, those of accelerators may be missing. What the specification names under `paths` goes
+    before what the `libraries` know.
+    """
+    faults = Diagnostics()
+    specification = read_specification(path, str(path), faults)
+    if board:
+        specification = on_board(specification, board)
+    own = {str(item): item.source for item in specification.paths}
+    spoken = {MIDDLEWARES[word] for word in specification.middlewares if word in MIDDLEWARES} or {*libraries}
+    needed = Libraries({ros: partial(libraries.__getitem__, ros) for ros in libraries if ros in spoken})
+    libraries = with_paths(needed, own, path.parent, core_folders, faults)
+    system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
+    return LoadedSystem(specification, path.parent, libraries, system, board, faults.warnings)
+
+
+def with_paths(
+    known: Mapping[Middleware, MessageLibrary],
+    paths: Mapping[str, SourceRef | None],
+    folder: Path,
+    core_folders: CoreFolders,
+    faults: Diagnostics,
+) -> dict[Middleware, MessageLibrary]:
+    """The libraries with the `paths` of a specification in `folder` before all else.
+
+    Raises `InputError` with all `faults` if one of these paths is wrong, since unknown messages would follow from it.
+    """
+    before = len(faults.found)
+    places: dict[Path, SourceRef | None] = {}
+    for item, source in paths.items():
+        try:
+            places |= dict.fromkeys(core_folders({item: source}) if is_core(item) else [folder / item], source)
+        except InputError as error:
+            faults.take(error, source)
+    own: dict[Middleware, MessageLibrary] = {}
+    for ros in known:
+        try:
+            own[ros] = known[ros].before(places)
+        except InputError as error:
+            faults.take(error, None)
+    if len(faults.found) > before:
+        faults.raise_if_any()
+    return own
+
+
+def load_requested(request: Request) -> LoadedSystem:
+    """The system of a generator call."""
+    return load_system(
+        specification_path(request),
+        libraries(*library_sources(request)),
+        board=_board(request),
+        core_folders=request.message_folders.of,
+    )
+
+
+def specification_path(request: Request) -> Path:
+    """The specification that a generator call names."""
+    return request.files_root / str(request.parameters["spec"])
+
+
+def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
+    """The specification of a request and every file that it leads to, as it was loaded."""
+    board = [_board_path(request)] if request.parameters.get("board") else []
+    return [specification_path(request), *board, *loaded.inputs()]
+
+
+def _board_path(request: Request) -> Path:
+    return board_path(str(request.parameters["board"]), request.files_root)
+
+
+def _board(request: Request) -> Board | None:
+    name = request.parameters.get("board")
+    return read_board(str(name), request.files_root) if name else None
+
+
+class Part(Enum):
+    """What a generated file is for, as the dissertation's table 6.2 tells them apart."""
+
+    CONVERTERS = "converters"
+    WRAPPERS = "wrappers"
+    COMPONENTS = "components"
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A generated file: what it is called, what it is for, and what it is rendered from."""
+
+    path: str
+    part: Part
+    template: str
+    configuration: Configuration
+
+    @cached_property
+    def text(self) -> str:
+        """Its content."""
+        return render(self.template, self.configuration)
+
+
+def artifacts(loaded: LoadedSystem) -> list[Artifact]:
+    """Every file that is generated for a system, once, in the order in which a tool reads them, the top level last."""
+    return list({item.path: item for item in _artifacts(loaded)}.values())
+
+
+def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
+    system = loaded.system
+    for path, configuration in constants_configurations(loaded.messages()):
+        yield Artifact(path, Part.CONVERTERS, CONSTANTS_TEMPLATE, configuration)
+    for item in system.subscribers:
+        entity = subscriber_entity(item.frame, item.suffix)
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *subscriber_source(item.frame, system.width, entity))
+    for item in system.publishers:
+        entity = publisher_entity(item.frame, item.suffix)
+        yield Artifact(f"{entity}.vhd", Part.CONVERTERS, *publisher_source(item.frame, system.width, entity))
+    for frame, suffix in system.computed_lengths.items():
+        configuration = payload_length_configuration(frame, suffix)
+        yield Artifact(f"{length_entity(frame, suffix)}.vhd", Part.COMPONENTS, LENGTH_TEMPLATE, configuration)
+    for type_ in system.kernels:
+        configuration = wrapper_configuration(type_)
+        yield Artifact(f"{configuration['entity']}.vhd", Part.WRAPPERS, WRAPPER_TEMPLATE, configuration)
+    yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
+
+
+def system_core(loaded: LoadedSystem) -> GeneratedCore:
+    """The core of a loaded system, its files in the order in which a tool reads them. Raises `InputError`."""
+    system = loaded.system
+    made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
+    top = f"{system.entity}.vhd"
+    files = {path: file for path, file in made.items() if path != top}
+    files |= _sources(system.accelerator_types, loaded.folder)
+    files[top] = made[top]
+    if loaded.board:
+        files |= _board_files(loaded, loaded.board)
+    return GeneratedCore(f"System {system.name}", files)
+
+
+def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
+    """What fits a system on a board: a top level and constraints."""
+    check_fits(loaded.system, board)
+    if board.is_linked:
+        return _linked_files(loaded, board)
+    return _processor_files(loaded, board) if board.flow == VIVADO else _clock_files(loaded, board, "sdc", "SDC")
+
+
+def _linked_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
+    configuration = board_configuration(loaded.system, board)
+    form, file_type = FLOWS[board.flow]
+    return {
+        f"{board_entity(loaded.system, board)}.vhd": GeneratedFile(render(BOARD_TEMPLATE, configuration), VHDL),
+        f"{board.name}.{form}": GeneratedFile(render(f"board/{form}", configuration), file_type),
+    }
+
+
+def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
+    """The block design, and what it takes to make IP of C++."""
+    system, clock = loaded.system, _clock(loaded)
+    files: dict[str, GeneratedFile] = {}
+    for type_ in system.kernels:
+        paths = {source_name(type_.accelerator, source): loaded.folder / source for source in type_.accelerator.sources}
+        files |= {name: GeneratedFile(path.read_bytes(), "user") for name, path in paths.items()}
+        script = render(PACKAGE_TEMPLATE, package_configuration(type_, list(paths), system, board, clock))
+        files[f"{function_name(type_)}.tcl"] = GeneratedFile(script, "user")
+    if system.clocks:
+        files |= _clock_files(loaded, board, "xdc", "xdc")
+    design = render(BLOCK_DESIGN_TEMPLATE, block_design_configuration(system, board, clock))
+    files[f"{board_entity(system, board)}.tcl"] = GeneratedFile(design, "tclSource")
+    return files
+
+
+def _clock_files(loaded: LoadedSystem, board: Board, form: str, file_type: str) -> dict[str, GeneratedFile]:
+    """The constraints of clocks."""
+    text = render(f"board/{form}", clocks_configuration(loaded.system, board, _clock(loaded)))
+    return {f"{board.name}.{form}": GeneratedFile(text, file_type)}
+
+
+def _clock(loaded: LoadedSystem) -> Fraction:
+    """The frequency of clk in Hz."""
+    assert loaded.system.clock is not None, "a board has a clock"
+    return loaded.system.clock
+
+
+def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:
+    """The user's VHDL and Verilog; a package of two accelerators is there once, as it must not be analysed twice."""
+    files: dict[str, GeneratedFile] = {}
+    taken: set[Path] = set()
+    for type_ in types:
+        accelerator = type_.accelerator
+        for source in accelerator.sources if accelerator.type != "HLS" else ():
+            path = (folder / source).resolve()
+            if path not in taken:
+                suffix = path.suffix.lower()
+                files[source_name(accelerator, source)] = GeneratedFile(
+                    path.read_bytes(), _FILE_TYPES[suffix], is_include_file=suffix in _INCLUDE_SUFFIXES
+                )
+                taken.add(path)
+    return files
+
+
+def source_name(accelerator: Accelerator, source: str) -> str:
+    """Where a source file lies in the generated core: below a folder of its accelerator, as in the specification."""
+    names = {"..": "above", "/": "root"}
+    parts = [names.get(part, part) for part in PurePosixPath(source).parts]
+    return str(PurePosixPath(identifier(accelerator.name), *parts))

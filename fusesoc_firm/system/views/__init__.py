@@ -1,0 +1,1 @@
+"""Listings, pictures and reports of a derived system."""

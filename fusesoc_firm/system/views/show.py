@@ -1,0 +1,232 @@
+"""The derived System as plain data: the content of the dissertation's listings 6.7 and 6.9."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.system.derived.model import (
+    AcceleratorBlock,
+    Connection,
+    Converter,
+    DerivedSystem,
+    End,
+    MessageSide,
+    PayloadLength,
+    PublisherTimes,
+    Scheduling,
+)
+from fusesoc_firm.system.derived.python_function import function_name
+from fusesoc_firm.system.derived.sides import side_ports
+from fusesoc_firm.system.derived.timing import bounds_of
+from fusesoc_firm.system.hardware.configuration import top_level_pins
+from fusesoc_firm.system.hardware.crossings import all_crossings
+from fusesoc_firm.system.written.specification import AXI_STREAM
+
+if TYPE_CHECKING:
+    from fusesoc_firm.scheduling.analysis import Bound
+
+
+def derived_description(system: DerivedSystem) -> dict[str, Any]:
+    """Converters, accelerators and every connection between two ports, as `block/port`."""
+    pins = top_level_pins(system)
+    return {
+        "System": {
+            "name": system.name,
+            "top": system.entity,
+            "fpgaPart": system.fpga_part,
+            "width": system.width,
+            "interconnect": system.link.kind.value if system.link else AXI_STREAM,
+            **_scheduling(system.scheduling),
+            **_clocks(system),
+        },
+        "Converters": {
+            "AXIS_to_msg": [
+                _converter(item, subscriber_entity(item.frame, item.suffix)) for item in system.subscribers
+            ],
+            "msg_to_AXIS": [
+                _converter(item, publisher_entity(item.frame, item.suffix))
+                | _length(item, system.length_to(item))
+                | _times(times)
+                | _bound(bound)
+                for item, times, bound in zip_longest(system.publishers, system.scheduling.times, bounds_of(system))
+            ],
+        },
+        "Accelerators": [
+            {
+                "name": block.block,
+                "entity": block.type.entity,
+                "type": str(block.type.accelerator.type),
+                "sources": [str(source) for source in block.type.accelerator.sources],
+                **_domain(system, block),
+                **_pins(block, pins),
+            }
+            for block in system.accelerators
+        ],
+        "Connections": list(_connections(system.connections, system.width)),
+        **_software(system),
+        **_crossings(system),
+    }
+
+
+def counts(system: DerivedSystem) -> str:
+    """How many blocks of each kind a system has, in words."""
+    found = [
+        (len(system.subscribers), "subscriber"),
+        (len(system.accelerators), "accelerator"),
+        (len(system.publishers), "publisher"),
+    ]
+    if system.software.blocks:
+        found.append((len(system.software.blocks), "accelerator"))
+    words = ", ".join(f"{count} {word}{'' if count == 1 else 's'}" for count, word in found)
+    return words + (" in software" if system.software.blocks else "")
+
+
+def _clocks(system: DerivedSystem) -> dict[str, Any]:
+    """The further clocks, each with its port and its frequency in Hz."""
+    clocks = [{"name": item.name, "port": item.port, "hertz": float(item.frequency)} for item in system.clocks]
+    return {"clocks": clocks} if clocks else {}
+
+
+def _domain(system: DerivedSystem, block: AcceleratorBlock) -> dict[str, Any]:
+    """In what a block is not as the system: its clock, and the width of its streams."""
+    clock = system.clock_of(block.block)
+    shown: dict[str, Any] = {"clock": clock.port} if clock else {}
+    return shown | ({"width": block.type.width} if block.type.width != system.width else {})
+
+
+def _crossings(system: DerivedSystem) -> dict[str, Any]:
+    """Where the ends of a connection differ."""
+    found = []
+    for item in all_crossings(system):
+        ends = {"from": _side(item.source), "to": _side(item.sink)}
+        found.append(ends | {name: words for name in ("clocks", "widths") if (words := getattr(item, name))})
+    return {"Crossings": found} if found else {}
+
+
+def _side(end: End) -> str:
+    return f"{end.block}/{end.prefix.rstrip('_')}".rstrip("/")
+
+
+def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict[str, Any]:
+    """The pins of a block, with the ports of the top level that they are."""
+    pins = [
+        {
+            "name": str(pin.name),
+            "direction": str(pin.direction),
+            "bits": pin.bits or 1,
+            "port": names[block.block, pin.name],
+        }
+        for pin in block.type.accelerator.pins
+    ]
+    return {"pins": pins} if pins else {}
+
+
+def _software(system: DerivedSystem) -> dict[str, Any]:
+    """The blocks in software, and the ways of their messages on the host."""
+    blocks = [
+        {
+            "name": block.block,
+            "type": str(block.type.accelerator.type),
+            **_function(block),
+            "inputs": [_taken(End(block.block, side.prefix), side, system) for side in block.type.inputs],
+            "outputs": [_given(End(block.block, side.prefix), side, system) for side in block.type.outputs],
+        }
+        for block in system.software.blocks
+    ]
+    return {"Software": blocks} if blocks else {}
+
+
+def _function(block: AcceleratorBlock) -> dict[str, Any]:
+    sources = [str(source) for source in block.type.accelerator.sources]
+    return {"function": function_name(block.type), "sources": sources} if sources else {}
+
+
+def _taken(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
+    """A message that software takes: where it is from."""
+    sources = [item.source for item in system.software.connections if end in item.sinks]
+    return {**_message(end, side, system), "from": [_place(source, system.publishers, system) for source in sources]}
+
+
+def _given(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
+    """A message that software gives: where it goes."""
+    sinks = [sink for item in system.software.connections if item.source == end for sink in item.sinks]
+    return {**_message(end, side, system), "to": [_place(sink, system.subscribers, system) for sink in sinks]}
+
+
+def _message(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
+    return {"name": system.names[end], "nameMW": str(side.frame.message), "ROS": side.frame.ros.number}
+
+
+def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> dict[str, Any]:
+    """What a message of software comes from or goes to: another block, a converter of the hardware, or a topic."""
+    if end.prefix:
+        return {"block": end.block, "message": system.names[end]}
+    crossing = [item for item in converters if item.block == end.block]
+    return {"converter": end.block, "id": crossing[0].id} if crossing else {"topic": end.block}
+
+
+def _converter(converter: Converter, entity: str) -> dict[str, Any]:
+    return {
+        "nameBD": entity,
+        "nameMW": str(converter.frame.message),
+        "ROS": converter.frame.ros.number,
+        "block": converter.block,
+        **({"software": converter.software.block} if converter.software else {"topic": converter.name}),
+        "id": converter.id,
+        "payloadBytes": _payload_bytes(converter.frame),
+    }
+
+
+def _payload_bytes(frame: Frame) -> int | str:
+    length = length_of(frame)
+    if length.maximum is None:
+        return f"{length.minimum} and more"
+    return length.minimum if frame.is_fixed_size else f"{length.minimum} to {length.maximum}"
+
+
+def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any]:
+    """How a publisher learns the length of its payloads and why so, and what it stores of them."""
+    if length is None:
+        return {}
+    buffer = {"buffer": publisher.buffer} if publisher.buffer else {}
+    return {"length": length.source.value, "because": length.reason, **buffer}
+
+
+def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
+    shown: dict[str, Any] = {"scheduler": scheduling.policy}
+    if scheduling.reasons:
+        shown["because"] = [*scheduling.reasons]
+    return shown | ({"shortestRun": scheduling.shortest_run} if scheduling.is_preemptive else {})
+
+
+def _times(times: PublisherTimes) -> dict[str, int]:
+    """A publisher's times in cycles, as far as they are known."""
+    found = {"periodCycles": times.period, "wcetCycles": times.transfer_time, "deadlineCycles": times.deadline}
+    return {name: cycles for name, cycles in found.items() if cycles is not None}
+
+
+def _bound(bound: Bound | None) -> dict[str, int | str]:
+    """What is certain of a publisher's frames, and what its accelerator may have to keep while one is late."""
+    if bound is None:
+        return {}
+    if bound.response is None or bound.lateness is None or bound.buffer is None:
+        return {"worstLatenessCycles": "no bound: it may never be served"}
+    return {
+        "worstResponseCycles": bound.response,
+        "worstLatenessCycles": bound.lateness,
+        "latenessBufferBytes": bound.buffer,
+    }
+
+
+def _connections(connections: Iterable[Connection], width: int) -> Iterator[dict[str, str]]:
+    for connection in connections:
+        source = connection.source
+        for sink, frame in zip(connection.sinks, connection.frames, strict=True):
+            for port in side_ports(frame, width, gives=True, has_valid=False):
+                at_source, at_sink = (f"{end.block}/{end.prefix}{port.name}" for end in (source, sink))
+                yield {"from": at_source, "to": at_sink} if port.is_output else {"from": at_sink, "to": at_source}

@@ -1,0 +1,1 @@
+"""The specification as its author wrote it."""

@@ -1,0 +1,58 @@
+"""What the sources of an accelerator tell about it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from fusesoc_firm.system.written.specification import Accelerator
+from fusesoc_firm.text.files import is_file
+from fusesoc_firm.text.naming import identifier
+
+
+@dataclass(frozen=True)
+class _Language:
+    """How a language writes a comment, the parameters of a unit, and one called WIDTH among these.
+
+    `parameters` has the unit's name to be filled in, and a group of what stands between name and ports.
+    """
+
+    comment: re.Pattern[str]
+    parameters: str
+    width: re.Pattern[str]
+    flags: re.RegexFlag
+
+
+_LANGUAGES = {
+    # Between `generic (` and `port (`; VHDL knows no case.
+    "VHDL": _Language(
+        re.compile(r"--.*"),
+        r"\bentity\s+{unit}\s+is\s+generic\s*\((.*?)\)\s*;\s*(?:port\b|end\b)",
+        re.compile(r"(?:^|[;,])\s*(?:constant\s+)?width\s*[:,]", re.IGNORECASE),
+        re.IGNORECASE | re.DOTALL,
+    ),
+    # In the header, or within the module as before Verilog-2001.
+    "Verilog": _Language(
+        re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL),
+        r"\bmodule\s+{unit}\b(.*?)\bendmodule\b",
+        re.compile(r"\bparameter\b[^;]*?\bWIDTH\s*=(?!=)"),
+        re.DOTALL,
+    ),
+}
+
+
+def declares_width(accelerator: Accelerator, sources: Iterable[Path]) -> bool:
+    """Whether the accelerator is an entity with a generic WIDTH, or a module with a parameter: the streams' bits.
+
+    A source that cannot be read is the analysis' concern, not this one's.
+    """
+    if (language := _LANGUAGES.get(accelerator.type)) is None:
+        return False
+    pattern = language.parameters.format(unit=re.escape(identifier(accelerator.name)))
+    for source in sources:
+        text = source.read_text(encoding="utf-8", errors="replace") if is_file(source) else ""
+        if found := re.search(pattern, language.comment.sub("", text), language.flags):
+            return bool(language.width.search(found[1]))
+    return False

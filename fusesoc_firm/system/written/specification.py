@@ -1,0 +1,238 @@
+"""The system specification as its author wrote it: the grammar of the dissertation's listing 6.6.
+
+This is the one source of the grammar. A section is a class, a key a field; spelling, form, legal values and meaning
+stand at the field. What the sections say together (names that must be known, connections) is for `analysis`.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from fusesoc_firm.converter.stream import WIDTHS
+from fusesoc_firm.message.middleware import MIDDLEWARES
+from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail
+from fusesoc_firm.text.naming import LONGEST_PATH, text_fault
+from fusesoc_firm.text.yaml_sections import Section, key, read
+from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
+
+# The type of an accelerator that is a function on the host.
+SOFTWARE = "ROS-SW"
+# The types of accelerators, each with the endings of its sources' names.
+SOURCE_SUFFIXES = {
+    "HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"),
+    "VHDL": (".vhd", ".vhdl"),
+    "Verilog": (".v", ".sv", ".vh", ".svh"),
+    SOFTWARE: (".py",),
+}
+ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
+SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
+# A block that is no accelerator, and one that is.
+CONVERTER, ACCELERATOR = "converter", "accelerator"
+# What makes a block a converter.
+CONVERTER_KEYS = ("middleware", "mode", "message")
+# The smallest of the schedulers that holds all deadlines.
+AUTO_SCHEDULER = "auto"
+# How frames get between the host and the system: the top level's own streams, or a link of bytes (cores/board).
+AXI_STREAM = "axi_stream"
+LINKS = ("uart", "spi")
+LENGTHS = ("computed", "given", "buffered")
+DIRECTIONS = ("in", "out")
+# `vendor:library:name`, maybe with a version.
+_CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
+
+# Tools read the names of sources in makefiles, scripts and command lines, where most of them quote nothing.
+_SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}")
+
+
+def source_fault(text: str) -> tuple[str, str] | None:
+    """What keeps `text` from being a source file's name; None if nothing does."""
+    if fault := text_fault(text, LONGEST_PATH):
+        return fault
+    legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
+    return None if _SOURCE.fullmatch(text) else (f"cannot be '{text}', which some tools do not take as a file", legal)
+
+
+_FIELDS: dict[str, Any] = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
+_INCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "only these fields, such as pose.position, each with all below it"}
+_EXCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "none of these fields"}
+_MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
+
+
+@dataclass(frozen=True)
+class ClockDomain(Section):
+    """A clock beside that of the system."""
+
+    name: Text = key("the clock's name; its port at the top level is clk_<name>", is_required=True)
+    frequency: Text = key("its frequency, such as 150 MHz", is_required=True)
+
+
+@dataclass(frozen=True)
+class Project(Section):
+    """What holds for the whole system."""
+
+    name: Text = key("the system's name; the top level is <name>_system", is_required=True)
+    # The dissertation's listings 6.1, 6.6 and 5.1 spell it in three ways.
+    fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
+    width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
+    scheduler: Text = key("who may send to the host next", choices=(*POLICIES, AUTO_SCHEDULER), default=Text(DEFAULT))
+    shortest_run: int = key(
+        "beats that a publisher sends at least before a preemptive scheduler interrupts it",
+        name="shortestRun",
+        form="integer",
+        default=16,
+    )
+    interconnect: Text = key(
+        "how frames get between the host and the system: as streams, for a DMA engine, or over a link of bytes",
+        choices=(AXI_STREAM, *LINKS),
+        default=Text(AXI_STREAM),
+    )
+    clock: Text | None = key("frequency of clk, such as 100 MHz, for times that are not in cycles and for clocks")
+    clocks: tuple[ClockDomain, ...] = key("further clocks, for accelerators", form="sections", section=ClockDomain)
+
+
+@dataclass(frozen=True)
+class InterfaceType(Section):
+    """A message that an accelerator takes."""
+
+    middleware: Text = key("whose message it is", **_MIDDLEWARE)
+    message: Text = key("the message's type, such as geometry_msgs/Quaternion", is_required=True)
+    include: tuple[Text, ...] = key(**_INCLUDE)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE)
+
+
+@dataclass(frozen=True)
+class OutputType(InterfaceType):
+    """A message that an accelerator gives."""
+
+    length: Text | None = key("where the length of a payload of variable size comes from", choices=LENGTHS)
+
+
+@dataclass(frozen=True)
+class Interface(Section):
+    """All messages of an accelerator."""
+
+    input: tuple[InterfaceType, ...] = key("messages it takes", form="sections", section=InterfaceType)
+    output: tuple[OutputType, ...] = key("messages it gives", form="sections", section=OutputType)
+
+
+@dataclass(frozen=True)
+class Pin(Section):
+    """A port of an accelerator that is none of a message: it leads out of the system."""
+
+    name: Text = key("the port's name; at the top level it is <block>_<name>", is_required=True)
+    direction: Text = key("which way it leads, as the accelerator sees it", is_required=True, choices=DIRECTIONS)
+    bits: int | None = key("bits of a std_logic_vector; without it the port is a std_logic", form="integer")
+
+
+@dataclass(frozen=True)
+class Accelerator(Section):
+    """A type of accelerator; blocks are its instances."""
+
+    name: Text = key("the type's name; in VHDL that of the entity, in Verilog of the module", is_required=True)
+    type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
+    sources: tuple[Text, ...] = key(
+        "its source files, relative to the specification",
+        form="texts",
+        is_required=True,
+        unless=("type", SOFTWARE),
+        rule=source_fault,
+    )
+    interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
+    width: int | None = key("bits of its streams; those of the project unless given", form="integer", choices=WIDTHS)
+    pins: tuple[Pin, ...] = key("its ports that lead out of the system", form="sections", section=Pin)
+
+    @property
+    def is_software(self) -> bool:
+        """Whether it runs on the host."""
+        return self.type == SOFTWARE
+
+
+@dataclass(frozen=True)
+class Outgoing(Section):
+    """A connection from the block it stands in."""
+
+    name: Text = key("the block that the message goes to", is_required=True)
+    include: tuple[Text, ...] = key(**_INCLUDE)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE)
+
+
+@dataclass(frozen=True)
+class Block(Section):
+    """An instance: of an accelerator (it has a type) or a converter (it has middleware, mode and message)."""
+
+    name: Text = key("the block's name", is_required=True)
+    type: Text | None = key("the accelerator it is an instance of; empty for a converter")
+    clock: Text | None = key(
+        "which of the project's clocks an accelerator runs at; clk unless given", only_of=ACCELERATOR
+    )
+    middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES), only_of=CONVERTER)
+    mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
+    message: Text | None = key("a converter's message", only_of=CONVERTER)
+    topic: Text | None = key(
+        "the topic of a converter's messages, such as /arm/left or left; the block's name unless given",
+        only_of=CONVERTER,
+    )
+    include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
+    exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
+    buffer: int | None = key(
+        "bytes of the longest payload of a publisher that stores frames whole", form="integer", only_of=PUBLISHER
+    )
+    period: Text | None = key(
+        "time between two messages of a publisher: cycles, 10 ms, or a rate such as 100 Hz", only_of=PUBLISHER
+    )
+    wcet: Text | None = key(
+        "longest time that a publisher's frame takes to be sent; known where the size is", only_of=PUBLISHER
+    )
+    deadline: Text | None = key(
+        "time from a publisher's request to the end of its frame; its period unless given", only_of=PUBLISHER
+    )
+    outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
+
+
+@dataclass(frozen=True)
+class Specification(Section):
+    """The whole file."""
+
+    project: Project = key("what holds for the whole system", form="section", section=Project, is_required=True)
+    paths: tuple[Text, ...] = key(
+        "folders, bags and cores with message definitions, relative to the file, searched before all others",
+        form="texts",
+    )
+    accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
+    blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
+    # The file stops being YAML somewhere, so there may be more of everything.
+    is_cut: bool = False
+
+    @property
+    def message_cores(self) -> dict[str, SourceRef | None]:
+        """The cores among `paths`, each with its place."""
+        return {str(item): item.source for item in self.paths if is_core(item)}
+
+    @property
+    def middlewares(self) -> set[str]:
+        """The middlewares that it names, by its words."""
+        sides = [side for item in self.accelerators for side in (*item.interface.input, *item.interface.output)]
+        words = [*(block.middleware for block in self.blocks), *(side.middleware for side in sides)]
+        return {str(word) for word in words if word}
+
+
+def is_core(path: str) -> bool:
+    """Whether an item of `paths` is the name of a core."""
+    return _CORE.fullmatch(path) is not None
+
+
+def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
+    """The specification in a file, called `file` in messages, with all that is wrong in it noted.
+
+    Raises `InputError` if the file cannot be read, is empty, or is no YAML from the start.
+    """
+    text = read_yaml(path, file, faults)
+    if text.root is None or is_null(text.root):
+        faults.raise_if_any()
+        fail(f"{file} is empty; a specification needs the keys 'project' and 'blocks'")
+    return replace(read(Specification, text.root, text, faults, "a specification"), is_cut=text.is_cut)

@@ -1,0 +1,1 @@
+"""Diagnostics with source positions, identifiers, templates, YAML and files."""

@@ -1,0 +1,154 @@
+"""Faults in the user's input: where they are, what they are, and what would be right; and warnings of what is doubtful.
+
+Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics`
+collector, goes on as far as it can, and lets the collector raise one `InputError` that holds all faults of
+the file. The two doors (`cli`, `plugin.answer`) print it and exit with 1; nobody else catches it. Warnings are only
+printed: they change neither what is made nor the exit status.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NoReturn
+
+# Of a file that is none of ours at all, each line is a fault.
+_MOST_SHOWN = 200
+# Characters of a line that are shown around a fault, and of a word that is shown whole.
+_WIDEST = 200
+_LONG_WORD = re.compile(r"\S{500,}")
+
+
+@dataclass(frozen=True)
+class SourceRef:
+    """A place in a text: `line` and `column` count from 1, `text` is that whole line, `width` the characters meant."""
+
+    file: str
+    line: int
+    column: int
+    text: str = ""
+    width: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+    def excerpt(self) -> str:
+        """The line with a caret under the place, or nothing where the text is unknown."""
+        if not self.text:
+            return ""
+        number = f"{self.line:5d}"
+        first = max(0, self.column - _WIDEST // 2) if len(self.text) > _WIDEST else 0
+        shown = "".join(c if c.isprintable() or c == "\t" else "?" for c in self.text[first : first + _WIDEST])
+        # Tabs keep their width under the caret only if they are repeated there.
+        indent = "".join("\t" if c == "\t" else " " for c in shown[: self.column - 1 - first])
+        underline = "^" + "~" * (min(self.width, max(1, len(shown) - len(indent))) - 1)
+        return f"{number} | {shown}\n{' ' * len(number)} | {indent}{underline}"
+
+
+def byte_place(file: str, data: bytes, position: int) -> SourceRef:
+    """The place of a byte in a file that is no text; its column counts bytes."""
+    line_start = data.rfind(b"\n", 0, position) + 1
+    return SourceRef(file, data.count(b"\n", 0, position) + 1, position - line_start + 1)
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """A fault or a warning: a sentence, its place (None where the input has no lines) and, if known, what is legal."""
+
+    message: str
+    source: SourceRef | None = None
+    hint: str = ""
+    is_warning: bool = False
+
+    def __str__(self) -> str:
+        place = f"{self.source}: " if self.source else ""
+        lines = [f"{place}{'warning' if self.is_warning else 'error'}: {_readable(self.message)}"]
+        if self.source and (excerpt := self.source.excerpt()):
+            lines.append(excerpt)
+        if self.hint:
+            lines.append(f"      = {_readable(self.hint)}")
+        return "\n".join(lines)
+
+
+def _readable(text: str) -> str:
+    """`text` for a terminal: what would steer it is escaped, and a word of any length is shortened."""
+    escaped = "".join(c if c.isprintable() or c in "\t\n" else repr(c)[1:-1] for c in text)
+    return _LONG_WORD.sub(lambda word: f"{word[0][:100]}...{word[0][-20:]}", escaped)
+
+
+class InputError(Exception):
+    """All faults of an input; `str()` is ready to be printed."""
+
+    def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
+        self.diagnostics = tuple(diagnostics)
+        lines = [str(diagnostic) for diagnostic in self.diagnostics[:_MOST_SHOWN]]
+        if len(self.diagnostics) > _MOST_SHOWN:
+            lines.append(f"and {len(self.diagnostics) - _MOST_SHOWN} more")
+        super().__init__("\n".join(lines))
+
+
+@dataclass
+class Diagnostics:
+    """Collects faults so that a user sees all of them at once."""
+
+    found: list[Diagnostic] = field(default_factory=list)
+    warned: list[Diagnostic] = field(default_factory=list)
+    _known: set[Diagnostic] = field(default_factory=set, repr=False)
+
+    def error(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
+        """Note a fault and go on; the same fault at the same place is noted once."""
+        diagnostic = Diagnostic(message, source, hint)
+        if diagnostic not in self._known:
+            self._known.add(diagnostic)
+            self.found.append(diagnostic)
+
+    def warn(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
+        """Note what is legal and probably not meant."""
+        self.warned.append(Diagnostic(message, source, hint, is_warning=True))
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """Every warning, in the order of files, lines and columns."""
+        return tuple(sorted(self.warned, key=_position))
+
+    def take(self, error: InputError, source: SourceRef | None) -> None:
+        """Note the faults of another reader; those without a place belong to what asked for it, at `source`."""
+        for fault in error.diagnostics:
+            self.error(fault.message, fault.source or source, fault.hint)
+
+    def raise_if_any(self) -> None:
+        """Raise `InputError` with every fault, in the order of files, lines and columns."""
+        if self.found:
+            raise InputError(sorted(self.found, key=_position))
+
+
+def _position(diagnostic: Diagnostic) -> tuple[str, int, int]:
+    source = diagnostic.source
+    return (source.file, source.line, source.column) if source else ("", 0, 0)
+
+
+def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoReturn:
+    """Raise an `InputError` of a single fault, where nothing else can be checked behind it."""
+    raise InputError([Diagnostic(message, source, hint)])
+
+
+def nearest(word: str, choices: Iterable[str]) -> str:
+    """A hint for an unknown word: the nearest legal one, or the legal ones if none is near."""
+    legal = sorted(set(choices))
+    if near := closest(word, legal):
+        return f"did you mean '{near}'?"
+    if not legal:
+        return ""
+    shown = ", ".join(legal[:20]) + (", ..." if len(legal) > 20 else "")
+    return f"legal here: {shown}"
+
+
+def closest(word: str, choices: Iterable[str]) -> str | None:
+    """The word that was probably meant, whichever letters are capitals; None if none is near."""
+    lowered = {choice.lower(): choice for choice in sorted(set(choices))}
+    # Two letters exchanged are nearer than a letter lost: `clocsk` is `clocks`, not `clock`.
+    close = [choice for choice in lowered if sorted(choice) == sorted(word.lower())]
+    close = close or difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
+    return lowered[close[0]] if close else None

@@ -1,0 +1,82 @@
+"""Files that appear at once: no reader, on this machine or on another that shares the folder, sees half of one.
+
+Of Python's library no more is imported than a file needs, as an answer out of the store waits for it.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from contextlib import suppress
+
+TEMPORARY = ".new-"
+"""What the name of a file begins with that is not whole yet."""
+
+
+def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write a file beside its place, and put it there by one rename. Raises `OSError`."""
+    folder = os.path.dirname(os.fspath(path))
+    os.makedirs(folder or ".", exist_ok=True)
+    # A name that no process of any machine has; a process id is one's own only where it runs.
+    temporary = os.path.join(folder, f"{TEMPORARY}{os.urandom(8).hex()}")
+    try:
+        with open(temporary, "xb") as file:
+            file.write(data)
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool:
+    """Write a file, whole, unless it holds just that already; tell whether it was written.
+
+    An unchanged file keeps its time, so nothing behind it is built again. Raises `OSError`.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    if read_file(path) == data:
+        return False
+    write_whole(path, data)
+    return True
+
+
+def read_file(path: str | os.PathLike[str]) -> bytes | None:
+    """The content of a regular file; None if there is none that can be read. A pipe is not waited for."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            if not stat.S_ISREG(os.fstat(handle).st_mode):
+                return None
+            with open(handle, "rb", closefd=False) as file:
+                return file.read()
+        finally:
+            os.close(handle)
+    except OSError:
+        return None
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Whether a regular file is there; a path that no file can have, such as one that is too long, is none."""
+    return os.path.isfile(path)
+
+
+def read_regular(path: str | os.PathLike[str], most: int) -> bytes:
+    """The content of a regular file of at most `most` bytes.
+
+    Raises `OSError`, with its reason, for anything else: to open a FIFO would wait for its writer, and a device may
+    never end.
+    """
+    with open(path, "rb", opener=_open_at_once) as file:
+        mode = os.fstat(file.fileno()).st_mode
+        if not stat.S_ISREG(mode):
+            raise OSError(errno.EINVAL, "it is not a regular file", os.fspath(path))
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"it is larger than {most} bytes", os.fspath(path))
+    return data
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))

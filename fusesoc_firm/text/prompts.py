@@ -1,0 +1,124 @@
+"""Questions to a person at a terminal, or to a pipe: the same questions, the same rules for an answer.
+
+At a terminal prompt_toolkit asks: it completes, shows what a question means, and lets nobody past with a wrong answer.
+From a pipe each answer is a line; a wrong one ends it, with its line.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, TextIO
+
+from fusesoc_firm.text.diagnostics import fail, nearest
+
+if TYPE_CHECKING:
+    from prompt_toolkit import PromptSession
+    from prompt_toolkit.document import Document
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked: `name` in short, `meaning` in a sentence.
+
+    `words` complete an answer; if the question `is_choice`, there are no others. An empty answer means `default`, which
+    is empty where it may be left out, unless the question `is_required`. `check` says what is wrong with an answer.
+    """
+
+    name: str
+    meaning: str
+    words: Sequence[str] = ()
+    is_choice: bool = False
+    is_required: bool = False
+    default: str = ""
+    check: Callable[[str], str | None] = lambda _: None
+
+    def fault(self, answer: str) -> str | None:
+        """What is wrong with an answer."""
+        if not answer:
+            return f"'{self.name}' is needed: {self.meaning}" if self.is_required and not self.default else None
+        if self.is_choice and answer not in self.words:
+            return f"'{self.name}' cannot be '{answer}'; {nearest(answer, self.words)}"
+        return self.check(answer)
+
+    @property
+    def prompt(self) -> str:
+        """The question as it stands before the answer."""
+        ending = f" [{self.default}]" if self.default else "" if self.is_required else " (Enter: none)"
+        return f"{self.name}{ending}: "
+
+
+class Asker(Protocol):
+    """Whoever gets answers."""
+
+    def ask(self, question: Question) -> str:
+        """The answer, or the question's default; without blanks around it."""
+
+    def tell(self, text: str) -> None:
+        """Say something."""
+
+
+class PipeAsker:
+    """Takes an answer from each line of a stream; the questions go to another one, with their answers."""
+
+    def __init__(self, answers: Iterable[str], output: TextIO) -> None:
+        self._answers = enumerate(answers, start=1)
+        self._output = output
+
+    def ask(self, question: Question) -> str:
+        """Raises `InputError` for a wrong answer, and when there is none."""
+        line, text = next(self._answers, (0, ""))
+        if not line:
+            fail(f"the answers end before '{question.name}': {question.meaning}")
+        answer = text.strip()
+        print(f"{question.prompt}{answer}", file=self._output)
+        if fault := question.fault(answer):
+            fail(f"answer {line}: {fault}")
+        return answer or question.default
+
+    def tell(self, text: str) -> None:
+        """Say something, between the questions."""
+        print(text, file=self._output)
+
+
+class TerminalAsker:
+    """Asks a person."""
+
+    def __init__(self) -> None:
+        from prompt_toolkit import PromptSession
+
+        self._session: PromptSession[str] = PromptSession()
+
+    def ask(self, question: Question) -> str:
+        """Asks until the answer is right; Ctrl-D is as Ctrl-C."""
+        from prompt_toolkit.completion import FuzzyWordCompleter
+        from prompt_toolkit.validation import ValidationError, Validator
+
+        class Check(Validator):
+            def validate(self, document: Document) -> None:
+                if fault := question.fault(document.text.strip()):
+                    raise ValidationError(len(document.text), fault)
+
+        try:
+            answer = self._session.prompt(
+                question.prompt,
+                completer=FuzzyWordCompleter([*question.words]),
+                validator=Check(),
+                validate_while_typing=False,
+                bottom_toolbar=question.meaning,
+            )
+        except EOFError:
+            raise KeyboardInterrupt from None
+        return answer.strip() or question.default
+
+    def tell(self, text: str) -> None:
+        """Say something, between the questions."""
+        print(text)
+
+
+def asker() -> Asker:
+    """Whoever fits the standard input."""
+    if sys.stdin.isatty() and sys.stdout.isatty():
+        return TerminalAsker()
+    return PipeAsker(sys.stdin, sys.stdout)

@@ -1,0 +1,411 @@
+"""Strict mustache: a template and plain data in, text out, and an error wherever mustache would guess.
+
+Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks a key up in the outer
+scopes if the inner one lacks it. In hardware each of these is a fault that compiles. So chevron only parses the
+templates, and the tree is expanded here, by these rules:
+
+* `{{x}}` prints a string or an integer as it is. A bool or None has no agreed spelling.
+* `{{comment x}}` prints text of a user, quoted for where it stands in the language that the template's name ends with;
+  `quoting` has the ways of each language. A partial is in the language of the template that includes it.
+* `{{x-1}}` and `{{x+1}}` print an integer and a number more or less: `std_logic_vector({{width-1}} downto 0)`.
+* A key is looked up in the innermost scope and nowhere else; `../x` is the `x` of the scope around it. It must be
+  there, also in a part that is left out.
+* `{{#x}}` takes a bool (part or no part, same scope), a list (the part once an item), or a mapping or None (the part in
+  the mapping's scope, or no part). `{{^x}}` is the part for false, an empty list or None.
+* `{{#x?}}` is a part in the same scope, once, if there is an `x`: if it is not false, "", an empty list or None.
+* A list holds mappings, each the scope of its turn, or strings and integers, which `{{.}}` prints. Within it, `@first`
+  and `@last` are bools: whether this is the first turn, and the last.
+* `{{|}}` begins a column: in neighbouring lines, what follows it begins at the same place. `{{|20}}` begins it behind
+  20 characters at least. `{{|!}}` in a line parts it from those before.
+* `{{> name}}` includes `partials/name.mustache`; alone on a line, its indentation is that of every line included.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import groupby
+from pathlib import Path
+
+from chevron.tokenizer import ChevronError, tokenize
+
+from fusesoc_firm.text.quoting import QUOTES, Quote
+
+TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
+
+
+class TemplateError(Exception):
+    """A template and its context do not fit: a fault of this package, never of its user."""
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A template below `TEMPLATES`, and the context that it was rendered for."""
+
+    template: str
+    context: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class TracedLine:
+    """A line of a rendered text, the line of the template file it comes from, and the scope's path in the context."""
+
+    text: str
+    template: str
+    line: int
+    scope: str
+
+
+_RECORDS: list[dict[str, Rendering]] = []
+# Private characters, which no template holds, around the place of a line.
+_MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
+# A line that is left out as a whole, whatever it gives.
+_STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
+# Where a column begins, and behind how many characters at least.
+_COLUMN = re.compile("\ue002(\\d*)\ue003")
+_PARTED = "\ue004"
+_COLUMN_KEY = re.compile(r"\|(?P<least>\d*)")
+_PARTED_KEY = "|!"
+_SUM_KEY = re.compile(r"(?P<name>.+?)(?P<addend>[+-]\d+)")
+
+
+@dataclass(frozen=True)
+class _Literal:
+    text: str
+
+
+@dataclass(frozen=True)
+class _Value:
+    key: str
+    quote: str = ""
+    addend: int | None = None
+
+
+@dataclass(frozen=True)
+class _Section:
+    key: str
+    is_inverted: bool
+    body: tuple[_Node, ...]
+    is_question: bool = False
+
+
+@dataclass(frozen=True)
+class _Partial:
+    name: str
+    indentation: str
+
+
+_Node = _Literal | _Value | _Section | _Partial
+
+
+@dataclass(frozen=True)
+class _Scope:
+    """Where keys are looked up, and the way there from the context's root (`ports[3]`), for messages.
+
+    `turn` has `@first` and `@last` of the innermost list around.
+    """
+
+    data: object
+    path: str = ""
+    outer: _Scope | None = None
+    turn: Mapping[str, bool] = field(default_factory=dict)
+
+    def path_to(self, key: str) -> str:
+        if key == ".":
+            return self.path
+        if key.startswith("../") and self.outer:
+            return self.outer.path_to(key.removeprefix("../"))
+        return f"{self.path}.{key}" if self.path else key
+
+
+def render(template_name: str, context: Mapping[str, object], templates: Path = TEMPLATES) -> str:
+    """The text of `templates/<template_name>.mustache` for `context`.
+
+    The context may hold dict, list, str, int, bool and None only. Raises `TemplateError`, which names template, key and
+    scope, if the two do not fit.
+    """
+    try:
+        _require_plain(context, "")
+        expansion = _Expansion(templates, _quotes(template_name))
+        text = _in_columns(expansion.expand(_parse(template_name, templates), _Scope(context), True))
+    except TemplateError as error:
+        raise TemplateError(f"template {template_name}: {error}") from error
+    for renderings in _RECORDS:
+        renderings[text] = Rendering(template_name, context)
+    return text
+
+
+@contextmanager
+def recorded() -> Iterator[dict[str, Rendering]]:
+    """Within it, every text that is rendered is noted with what it is made of."""
+    renderings: dict[str, Rendering] = {}
+    _RECORDS.append(renderings)
+    try:
+        yield renderings
+    finally:
+        _RECORDS.remove(renderings)
+
+
+def traced_lines(rendering: Rendering) -> list[TracedLine]:
+    """Each line of what `render` makes of it, with where it comes from."""
+    name = rendering.template
+    expansion = _TracedExpansion(TEMPLATES, _quotes(name))
+    marked = expansion.expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
+    lines = marked.removesuffix("\n").split("\n")
+    texts = _in_columns(_MARK.sub("", "\n".join(lines))).split("\n")
+    traced: list[TracedLine] = []
+    place = (f"{name}.mustache", 1, "")
+    for line, text in zip(lines, texts, strict=True):
+        # A value may be of several lines, and a blank line has no mark: they belong to the one above.
+        if found := _MARK.search(line):
+            place = (found["file"], int(found["line"]), found["scope"])
+        traced.append(TracedLine(text, *place))
+    return traced
+
+
+def template_text(name: str, templates: Path = TEMPLATES) -> str:
+    """The text of `templates/<name>.mustache`. Raises `OSError`."""
+    return (templates / f"{name}.mustache").read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class _Expansion:
+    """One walk over a parsed template, whose language has `quotes`."""
+
+    templates: Path
+    quotes: Mapping[str, Quote]
+
+    def expand(self, nodes: tuple[_Node, ...], scope: _Scope, is_taken: bool) -> str:
+        """The text of `nodes`; none where they are not taken, but then too every key is looked up."""
+        text = "".join([self._node(node, scope, is_taken) for node in nodes])
+        return text if is_taken else ""
+
+    def _node(self, node: _Node, scope: _Scope, is_taken: bool) -> str:
+        match node:
+            case _Literal(text):
+                return self._literal(text, scope)
+            case _Value(key):
+                value = _look_up(key, scope)
+                return self._printed(node, value, scope.path_to(key)) if is_taken else ""
+            case _Section():
+                return self._section(node, scope, is_taken)
+            case _Partial(name, indentation):
+                text = self.expand(self._parse(f"partials/{name}"), scope, is_taken)
+                return _indented(text, indentation)
+
+    def _parse(self, name: str) -> tuple[_Node, ...]:
+        return _parse(name, self.templates)
+
+    def _literal(self, text: str, _: _Scope) -> str:
+        return text
+
+    def _printed(self, node: _Value, value: object, path: str) -> str:
+        number = value if node.addend is None else _sum(value, node.addend, path)
+        return self._quoted(node.quote, _printed(number, path))
+
+    def _quoted(self, quote: str, text: str) -> str:
+        if not quote:
+            return text
+        if quote not in self.quotes:
+            known = ", ".join(sorted(self.quotes)) or "none"
+            raise TemplateError(f"'{quote}' is no way to quote here; the template's language has {known}")
+        return self.quotes[quote](text)
+
+    def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
+        value = _look_up(section.key, scope)
+        path = scope.path_to(section.key)
+        if not section.is_question and not isinstance(value, bool | list | dict | None):
+            raise TemplateError(f"'{path}' is {_kind(value)}; a section takes a bool, a list, a mapping or None")
+        return "".join(
+            self.expand(section.body, inner, is_taken and is_inner_taken)
+            for inner, is_inner_taken in _turns(section, value, scope, path)
+        )
+
+
+class _TracedExpansion(_Expansion):
+    """A walk over a marked template: the marks get the scope's path."""
+
+    def _parse(self, name: str) -> tuple[_Node, ...]:
+        return _parse_marked(name, self.templates)
+
+    def _literal(self, text: str, scope: _Scope) -> str:
+        return text.replace("\ue001", f"{scope.path}\ue001")
+
+
+def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
+    """The scopes in which a section's body is expanded, each with whether its text counts."""
+    if section.is_inverted:
+        yield scope, not _is_there(value)
+    elif section.is_question or isinstance(value, bool):
+        yield scope, _is_there(value)
+    elif isinstance(value, list):
+        for number, item in enumerate(value):
+            turn = {"@first": number == 0, "@last": number == len(value) - 1}
+            yield _Scope(item, f"{path}[{number}]", scope, turn), True
+    elif value is not None:
+        yield _Scope(value, path, scope, scope.turn), True
+
+
+def _is_there(value: object) -> bool:
+    return not (value is None or value is False or value == [] or value == "")
+
+
+def _look_up(key: str, scope: _Scope) -> object:
+    while key.startswith("../"):
+        if scope.outer is None:
+            raise TemplateError(f"no scope is around {scope.path or 'the context'} for '{key}'")
+        key, scope = key.removeprefix("../"), scope.outer
+    if key == ".":
+        return scope.data
+    if key in scope.turn:
+        return scope.turn[key]
+    value, path = scope.data, scope.path
+    for step in key.split("."):
+        if not isinstance(value, dict) or step not in value:
+            legal = f"it has {', '.join(sorted(value))}" if isinstance(value, dict) else f"it is {_kind(value)}"
+            raise TemplateError(f"no '{key}' in {path or 'the context'}; {legal}")
+        value, path = value[step], f"{path}.{step}" if path else step
+    return value
+
+
+def _quotes(template_name: str) -> Mapping[str, Quote]:
+    """The ways to quote in a template's language: `vhdl/board.vhd`, or `board/pcf`."""
+    return QUOTES.get(template_name.rpartition("/")[2].rpartition(".")[2], {})
+
+
+def _printed(value: object, path: str) -> str:
+    if isinstance(value, bool) or not isinstance(value, str | int):
+        raise TemplateError(f"'{path}' is {_kind(value)}; only a string or an integer can be printed")
+    return str(value)
+
+
+def _sum(value: object, addend: int, path: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise TemplateError(f"'{path}' is {_kind(value)}; only to an integer can {addend} be added")
+    return value + addend
+
+
+def _kind(value: object) -> str:
+    return "None" if value is None else f"of type {type(value).__name__}"
+
+
+def _indented(text: str, indentation: str) -> str:
+    """Indent every line that is not empty; an empty one would only get blanks at its end."""
+    return "\n".join(indentation + line if line.strip() else line for line in text.split("\n"))
+
+
+def _in_columns(text: str) -> str:
+    """The text with its columns aligned, each run of lines that have some for itself."""
+    if not _COLUMN.search(text):
+        return text
+    lines: list[str] = []
+    rows = (_COLUMN.split(line) for line in text.split("\n"))
+    for has_columns, run in groupby(rows, key=lambda row: len(row) > 1):
+        block: list[list[str]] = []
+        for first, *others in run:
+            if _PARTED in first:
+                lines += _aligned(block)
+                block = []
+            block.append([first.replace(_PARTED, ""), *others])
+        lines += _aligned(block) if has_columns else [line for (line,) in block]
+    return "\n".join(lines)
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """The lines of rows of cells, between which stands how long the one before is at least."""
+    widths: dict[int, int] = {}
+    for row in rows:
+        for number, (cell, least) in enumerate(zip(row[:-1:2], row[1::2], strict=True)):
+            widths[number] = max(widths.get(number, 0), len(cell), int(least or 0))
+    for row in rows:
+        cells = (cell.ljust(widths[number]) for number, cell in enumerate(row[:-1:2]))
+        yield ("".join(cells) + row[-1]).rstrip()
+
+
+def _require_plain(value: object, path: str) -> None:
+    """Raise unless `value` is made of plain data: what is computed while it is rendered could not be printed before."""
+    # Exact types: a subclass may print itself in another way (an IntEnum does).
+    if value is None or type(value) in (str, int, bool):
+        return
+    if type(value) is list:
+        for number, item in enumerate(value):
+            _require_plain(item, f"{path}[{number}]")
+    elif type(value) is dict:
+        for key, item in value.items():
+            if type(key) is not str:
+                raise TemplateError(f"the key {key!r} in {path or 'the context'} is {_kind(key)}, not a string")
+            _require_plain(item, f"{path}.{key}" if path else key)
+    else:
+        raise TemplateError(f"'{path or 'the context'}' is {_kind(value)}; a context holds plain data only")
+
+
+@cache
+def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
+    """The tree of a template file."""
+    try:
+        return _tree(name, template_text(name, templates))
+    except OSError as error:
+        raise TemplateError(f"cannot read {name.rpartition('/')[2]}.mustache: {error.strerror}") from error
+
+
+def _parse_marked(name: str, templates: Path) -> tuple[_Node, ...]:
+    """The tree of a template file in which a mark begins every line that gives one, but for blank ones."""
+    lines = template_text(name, templates).split("\n")
+    marked = [
+        line if not line.strip() or _STANDALONE.fullmatch(line) else f"\ue000{name}.mustache:{number}:\ue001{line}"
+        for number, line in enumerate(lines, start=1)
+    ]
+    return _tree(name, "\n".join(marked))
+
+
+def _tree(name: str, text: str) -> tuple[_Node, ...]:
+    try:
+        tokens = iter(list(tokenize(text)))
+    except ChevronError as error:
+        raise TemplateError(f"{name.rpartition('/')[2]}.mustache: {' '.join(str(error).split())}") from error
+    return _nodes(tokens)
+
+
+def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
+    """The nodes up to the end of the section that `tokens` stands in, or of the file."""
+    nodes: list[_Node] = []
+    for kind, key in tokens:
+        match kind:
+            case "literal":
+                nodes.append(_Literal(key))
+            case "variable" | "no escape":
+                nodes.append(_value(key))
+            case "section" | "inverted section":
+                name, is_inverted = key.removesuffix("?"), kind == "inverted section"
+                nodes.append(_Section(name, is_inverted, _nodes(tokens), is_question=name != key))
+            case "partial":
+                nodes.append(_Partial(key, _take_indentation(nodes)))
+            case "end":
+                break
+    return tuple(nodes)
+
+
+def _value(key: str) -> _Node:
+    """What a tag prints: `x`, `comment x` or `x-1`, or the beginning of a column."""
+    if key == _PARTED_KEY:
+        return _Literal(_PARTED)
+    if column := _COLUMN_KEY.fullmatch(key):
+        return _Literal(f"\ue002{column['least']}\ue003")
+    quote, _, name = key.rpartition(" ")
+    if found := _SUM_KEY.fullmatch(name):
+        return _Value(found["name"], quote, int(found["addend"]))
+    return _Value(name, quote)
+
+
+def _take_indentation(nodes: list[_Node]) -> str:
+    """Take off and return the blanks with which the last line of `nodes` begins, if it holds nothing else."""
+    match nodes:
+        case [*before, _Literal(text)] if not (before and isinstance(before[-1], _Value) and "\n" not in text):
+            rest, newline, line = text.rpartition("\n")
+            if line.isspace():
+                nodes[-1] = _Literal(rest + newline)
+                return line
+    return ""

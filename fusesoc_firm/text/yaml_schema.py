@@ -1,0 +1,81 @@
+"""The grammar of a YAML file as a JSON Schema, which editors check and complete by.
+
+It says what a file's sections say (`yaml_sections`), no more: whether names are known is found by reading the file.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
+
+Schema = dict[str, Any]
+
+# Words may look like numbers to YAML.
+_WORD = {"type": ["string", "number", "boolean"]}
+
+
+def json_schema(section: type[Section], title: str) -> Schema:
+    """The schema of a file that is one section, in JSON Schema's draft 2020-12."""
+    definitions: dict[str, Schema] = {}
+    _define(section, definitions)
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": title,
+        "$ref": _reference(section),
+        "$defs": dict(sorted(definitions.items())),
+    }
+
+
+def _reference(section: type[Section]) -> str:
+    return f"#/$defs/{section.__name__}"
+
+
+def _define(section: type[Section], definitions: dict[str, Schema]) -> None:
+    """Add the schema of a section and of all within it."""
+    if section.__name__ in definitions:
+        return
+    definition: Schema = {"type": "object", "additionalProperties": False, "properties": {}}
+    definitions[section.__name__] = definition
+    for name, (_, entry) in keys_of(section).items():
+        if entry.section:
+            _define(entry.section, definitions)
+        for spelling in (name, *entry.aliases):
+            definition["properties"][spelling] = _property(entry)
+    if needed := [_spelt(name, entry) for name, (_, entry) in keys_of(section).items() if entry.is_required]:
+        definition["allOf"] = needed
+
+
+def _spelt(name: str, entry: Key) -> Schema:
+    """That a key is there, in one of its spellings."""
+    ways = [{"required": [spelling]} for spelling in (name, *entry.aliases)]
+    found = ways[0] if len(ways) == 1 else {"oneOf": ways}
+    if entry.unless is None:
+        return found
+    other, value = entry.unless
+    return {"anyOf": [{"properties": {other: {"const": value}}, "required": [other]}, found]}
+
+
+def _property(entry: Key) -> Schema:
+    """A key's value; one without is as good as none, unless it is required."""
+    value = _value(entry)
+    legal = value if entry.is_required else {"anyOf": [value, {"type": "null"}]}
+    return {"description": entry.meaning, **legal}
+
+
+def _value(entry: Key) -> Schema:
+    match entry.form:
+        case "section":
+            assert entry.section
+            return {"$ref": _reference(entry.section)}
+        case "sections":
+            assert entry.section
+            return {"type": "array", "items": {"$ref": _reference(entry.section)}}
+        case "texts":
+            return {"anyOf": [_WORD, {"type": "array", "minItems": 1, "items": _WORD}]}
+        case _ if entry.choices:
+            return {"enum": [*entry.choices]}
+        case "integer":
+            return {"type": "integer"}
+        case _:
+            return _WORD

@@ -1,0 +1,238 @@
+"""Typed sections of a YAML file: what a key is called, takes and means is said once, at its dataclass field.
+
+`read` turns a node into a section and reports whatever does not fit, with the place and what is legal. It goes
+on behind a fault: the section is there in any case, empty where nothing could be read, and says that it is not sound.
+So all faults of a file come at once, and who works on it can tell a fault from what only follows from one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import yaml
+
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest, nearest
+from fusesoc_firm.text.naming import text_fault
+from fusesoc_firm.text.yaml_text import Text, YamlText, integer, is_null, items, kind
+
+# What is wrong with a text, and what is legal; None if nothing is.
+TextRule = Callable[[str], tuple[str, str] | None]
+S = TypeVar("S", bound="Section")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A mapping of the file. Its places, and whether all of it could be read, are no keys."""
+
+    source: SourceRef
+    is_sound: bool = True
+    # Where the value of each key stands that was given, by the field's name.
+    places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
+
+    def place(self, field: str) -> SourceRef:
+        """Where the value of a field's key stands; of one that was not given, where the section does."""
+        return self.places.get(field, self.source)
+
+
+@dataclass(frozen=True)
+class Key:
+    """What the grammar says of a key.
+
+    `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list), the last two of type
+    `section`. `aliases` are other spellings of the key. `choices` are all legal values, if they can be listed.
+    A required key may be left out beside another one, by name, with a certain value: `unless`.
+    `only_of` is the kind of thing that may have the key, where its section tells of several kinds. A text must keep
+    the `rule`.
+    """
+
+    meaning: str
+    form: str = "text"
+    name: str = ""
+    aliases: tuple[str, ...] = ()
+    is_required: bool = False
+    unless: tuple[str, str] | None = None
+    choices: tuple[str | int, ...] = ()
+    section: type[Section] | None = None
+    only_of: str = ""
+    rule: TextRule = text_fault
+
+    def is_needed(self, others: Mapping[str, object]) -> bool:
+        """Whether the key must be there beside `others`, given as words."""
+        return self.is_required and (self.unless is None or others.get(self.unless[0]) != self.unless[1])
+
+
+def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
+    """A field of a section; without `is_required` it has `default` where the key is not given."""
+    made = Key(meaning, **facts)
+    if made.form in ("sections", "texts"):
+        default = ()
+    return dataclasses.field(default=default, metadata={"key": made})
+
+
+def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
+    """Field name and key by the key's name in the file, in the grammar's order."""
+    return {
+        (field.metadata["key"].name or field.name): (field.name, field.metadata["key"])
+        for field in dataclasses.fields(section)
+        if "key" in field.metadata
+    }
+
+
+def keys_only_of(section: type[Section], kind: str) -> list[str]:
+    """The names of the keys that only this kind of thing may have."""
+    return [name for name, (_, entry) in keys_of(section).items() if entry.only_of == kind]
+
+
+def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics, what: str) -> S:
+    """The section that a node of `file` holds, with all that is wrong in it noted.
+
+    `what` names the section in messages: "a block".
+    """
+    return _Reader(file, faults).section(section, node, what)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Reads the nodes of one file; whatever does not fit is noted, and read as None."""
+
+    file: YamlText
+    faults: Diagnostics
+
+    def section(self, section: type[S], node: yaml.Node, what: str) -> S:
+        """A section with all keys that could be read, and empty values for required ones that could not."""
+        before = len(self.faults.found)
+        source = self.file.source(node)
+        if not isinstance(node, yaml.MappingNode):
+            self._error(f"{what} must be a mapping of keys to values, not {kind(node)}", node, _words_of_keys(section))
+            return _empty(section, source)
+        known = keys_of(section)
+        given = self._given(known, node, what)
+        values = {known[name][0]: self._value(known[name][1], value, name) for name, value in given.items()}
+        found = {field: value for field, value in values.items() if value is not None}
+        blanks = _blanks(section, source)
+        needed = {known[name][0] for name in _needed(known, given)}
+        # What lies behind a fault of the file's form is not known.
+        is_sound = len(self.faults.found) == before and needed <= found.keys() and not self.file.is_cut
+        places = {known[name][0]: self.file.source(value) for name, value in given.items()}
+        return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
+
+    def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
+        """The nodes of the known keys that were given a value, by the key's own name."""
+        spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
+        given: dict[str, yaml.Node] = {}
+        meant: set[str] = set()
+        for text, key_node, value in items(self.file, node, self.faults):
+            name = spellings.get(text)
+            if name is None:
+                near = closest(text, spellings)
+                meant |= {spellings[near]} if near else set()
+                self._error(f"{what} has no key '{text}'", key_node, nearest(text, [near] if near else known))
+            elif name in given:
+                self._error(f"key '{name}' is given twice, here as '{text}'", key_node)
+            elif not is_null(value) or (known[name][1].is_required and not self.file.is_cut):
+                given[name] = value
+        needed = _needed(known, given)
+        for name in needed:
+            # A key that is only misspelt is no second fault.
+            if name not in given and not self.file.is_cut and name not in meant:
+                self._error(f"{what} needs the key '{name}': {known[name][1].meaning}", node)
+        return {name: value for name, value in given.items() if not is_null(value) or name in needed}
+
+    def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
+        """The value of a key in its form, or None if it does not fit."""
+        match entry.form:
+            case "section":
+                return self.section(_section_type(entry), node, f"'{name}'")
+            case "sections":
+                return self._sections(entry, node, name)
+            case "texts":
+                nodes = node.value if isinstance(node, yaml.SequenceNode) else [node]
+                texts = [self._text(item, entry, name) for item in nodes]
+                if not texts:
+                    self._error(f"'{name}' is an empty list", node, entry.meaning)
+                return None if None in texts else tuple(texts)
+            case "integer":
+                return self._chosen(entry, self._integer(node, entry, name), node, name)
+            case _:
+                return self._chosen(entry, self._text(node, entry, name), node, name)
+
+    def _sections(self, entry: Key, node: yaml.Node, name: str) -> tuple[Section, ...] | None:
+        if not isinstance(node, yaml.SequenceNode):
+            self._error(f"'{name}' must be a list, one '- ' an item, not {kind(node)}", node, entry.meaning)
+            return None
+        if not node.value and entry.is_required:
+            self._error(f"'{name}' is an empty list", node, entry.meaning)
+        return tuple(self.section(_section_type(entry), item, f"an item of '{name}'") for item in node.value)
+
+    def _text(self, node: yaml.Node, entry: Key, name: str) -> Text | None:
+        if isinstance(node, yaml.ScalarNode) and node.value and not is_null(node):
+            if fault := entry.rule(node.value):
+                self._error(f"'{name}' {fault[0]}", node, fault[1])
+                return None
+            return self.file.text(node)
+        self._error(f"'{name}' must be a word, not {kind(node)}", node, entry.meaning)
+        return None
+
+    def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
+        if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
+            # The tag may have been written there, of whatever.
+            with suppress(ValueError):
+                return integer(node.value)
+        self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
+        return None
+
+    def _chosen(self, entry: Key, value: Any, node: yaml.Node, name: str) -> Any:
+        if value is None or not entry.choices or value in entry.choices:
+            return value
+        choices = [str(choice) for choice in entry.choices]
+        hint = nearest(str(value), choices) if isinstance(value, str) else f"legal here: {', '.join(choices)}"
+        self._error(f"'{name}' cannot be '{value}'", node, hint)
+        return None
+
+    def _error(self, message: str, node: yaml.Node, hint: str = "") -> None:
+        self.faults.error(message, self.file.source(node), hint)
+
+
+def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:
+    """The names of the keys that must be there beside those that are given."""
+    words = {name: value.value for name, value in given.items()}
+    return [name for name, (_, entry) in known.items() if entry.is_needed(words)]
+
+
+def _blanks(section: type[Section], source: SourceRef) -> dict[str, Any]:
+    """An empty value for each required field."""
+    blanks: dict[str, Any] = {}
+    for field, entry in keys_of(section).values():
+        if entry.is_required:
+            blanks[field] = _blank(entry, source)
+    return blanks
+
+
+def _blank(entry: Key, source: SourceRef) -> Any:
+    match entry.form:
+        case "section":
+            return _empty(_section_type(entry), source)
+        case "sections" | "texts":
+            return ()
+        case _:
+            return Text("", source)
+
+
+def _empty(section: type[S], source: SourceRef) -> S:
+    return section(source=source, is_sound=False, **_blanks(section, source))
+
+
+def _words_of_keys(section: type[Section]) -> str:
+    """The keys that a section needs, or those that it may have if it needs none."""
+    keys = keys_of(section)
+    required = [name for name, (_, entry) in keys.items() if entry.is_required]
+    return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
+
+
+def _section_type(entry: Key) -> type[Section]:
+    assert entry.section is not None, "a section's key names its type"
+    return entry.section

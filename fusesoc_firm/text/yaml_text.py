@@ -1,0 +1,304 @@
+"""YAML that remembers where everything stands.
+
+PyYAML's own nodes hold the marks; here they become `SourceRef`s, and what a reader takes out of a file stays
+tied to its place: `Text` is a string that knows it.
+
+A file is bounded in bytes, levels and nodes before it is made into anything, as a few lines of aliases could mean more
+than any memory holds.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, byte_place, fail
+from fusesoc_firm.text.files import read_regular
+
+MOST_LEVELS = 64
+LONGEST_NUMBER = 40
+"""Characters of a number. Python itself refuses to read one of thousands of digits, with a `ValueError`."""
+
+_CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
+_REPLACEMENT = "\ufffd"
+# What PyYAML finds where a line's indentation fits none of those above it.
+_INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", "mapping values are not allowed here")
+# What a block may begin with: the dash of a list's item, or the first word of a line that is no comment.
+_BLOCK_BEGIN = re.compile(r" *(-(?= )|[^\s#:-][^\s:]*)")
+# The ends of lines that PyYAML counts.
+_LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """How large a file may be; an alias counts as what it stands for."""
+
+    bytes: int
+    nodes: int
+
+
+SMALL = Bounds(2**20, 50_000)
+"""A specification, a configuration, a board."""
+LARGE = Bounds(2**26, 5_000_000)
+"""Data, such as stimuli with images, and what others may have generated, such as a core."""
+
+
+class TooLargeError(Exception):
+    """A text is beyond its bounds: it has more than `what`, at `mark`."""
+
+    def __init__(self, what: str, mark: yaml.Mark) -> None:
+        super().__init__(f"more than {what}")
+        self.mark = mark
+
+
+class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
+    """Makes nodes of a parser's events, and raises `TooLargeError` at the first one beyond the bounds."""
+
+    def __init__(self, parser: Any, bounds: Bounds) -> None:
+        yaml.composer.Composer.__init__(self)
+        yaml.resolver.Resolver.__init__(self)
+        self.check_event, self.peek_event, self.get_event = parser.check_event, parser.peek_event, parser.get_event
+        self._bounds = bounds
+        self._nodes = self._level = 0
+        # The nodes within each anchor.
+        self._sizes: dict[str, int] = {}
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event, before = self.peek_event(), self._nodes
+        self._nodes += self._sizes.get(event.anchor or "", 1) if isinstance(event, yaml.AliasEvent) else 1
+        self._level += 1
+        if self._level > MOST_LEVELS:
+            raise TooLargeError(f"{MOST_LEVELS} levels", event.start_mark)
+        if self._nodes > self._bounds.nodes:
+            raise TooLargeError(f"{self._bounds.nodes} values", event.start_mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._level -= 1
+        if event.anchor and not isinstance(event, yaml.AliasEvent):
+            self._sizes[event.anchor] = self._nodes - before
+        return node
+
+
+class Text(str):
+    """A string of a file and the place where it was written."""
+
+    __slots__ = ("source",)
+
+    source: SourceRef | None
+
+    def __new__(cls, value: str, source: SourceRef | None = None) -> Text:
+        """`value`, written at `source`; None where it was written nowhere (a default)."""
+        text = super().__new__(cls, value)
+        text.source = source
+        return text
+
+
+@dataclass(frozen=True)
+class YamlText:
+    """A YAML file's lines and its root node; `file` is how it is called in messages.
+
+    `is_cut` tells that the text stops being YAML somewhere, and `root` holds only what stands above.
+    """
+
+    file: str
+    lines: tuple[str, ...]
+    root: yaml.Node | None
+    is_cut: bool = False
+
+    def source(self, node: yaml.Node) -> SourceRef:
+        """The place of a node; a node of several lines is shown by its first."""
+        start, end = node.start_mark, node.end_mark
+        text = self.lines[start.line] if start.line < len(self.lines) else ""
+        last = end.column if end.line == start.line else len(text.rstrip())
+        return SourceRef(self.file, start.line + 1, start.column + 1, text, max(1, last - start.column))
+
+    def text(self, node: yaml.ScalarNode) -> Text:
+        """A scalar's characters, whatever type YAML takes them for."""
+        return Text(str(node.value), self.source(node))
+
+
+def read_yaml(
+    path: Path, file: str | None = None, faults: Diagnostics | None = None, bounds: Bounds = SMALL
+) -> YamlText:
+    """Read a file within `bounds`, called `file` in messages.
+
+    Raises `InputError` if it cannot be read or is no YAML. With `faults`, what is no YAML is noted there, and what
+    stands above it is returned.
+    """
+    name = file or str(path)
+    try:
+        # Some editors put a byte order mark in front.
+        text = read_regular(path, bounds.bytes).decode("utf-8-sig")
+    except OSError as error:
+        fail(f"cannot read {name}: {error.strerror}")
+    except UnicodeDecodeError as error:
+        fail(f"byte 0x{error.object[error.start]:02x} is not UTF-8", byte_place(name, error.object, error.start))
+    noted = Diagnostics() if faults is None else faults
+    read = parse_yaml(text, name, noted, bounds)
+    if faults is None:
+        noted.raise_if_any()
+    return read
+
+
+def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL) -> YamlText:
+    """The nodes of a YAML text; where it stops being YAML is noted, and what stands above is kept."""
+    lines = tuple(_LINE_END.split(text.rstrip()))
+    _note_control_characters(text, file, faults)
+    text = _CONTROL_CHARACTERS.sub(_REPLACEMENT, text)
+    try:
+        return YamlText(file, lines, _composed(text, bounds))
+    except TooLargeError as error:
+        line, column = error.mark.line, error.mark.column
+        fail(f"the file is too large: {error}", SourceRef(file, line + 1, column + 1, lines[line]))
+    except yaml.MarkedYAMLError as error:
+        _note_syntax(error, file, lines, faults)
+        return YamlText(file, lines, _composed_above(error, text.splitlines(keepends=True)), is_cut=True)
+
+
+def _note_control_characters(text: str, file: str, faults: Diagnostics) -> None:
+    for number, line in enumerate(_LINE_END.split(text)):
+        for found in _CONTROL_CHARACTERS.finditer(line):
+            shown = _CONTROL_CHARACTERS.sub("?", line)
+            message = f"this is not YAML: it holds the control character 0x{ord(found.group()):02x}"
+            faults.error(message, SourceRef(file, number + 1, found.start() + 1, shown))
+
+
+def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...], faults: Diagnostics) -> None:
+    problem = error.problem or error.context or "syntax error"
+    context = error.context_mark
+    mark = error.problem_mark or context
+    # Where a word lacks its colon, or something is still open at the end, the fault is where that began.
+    is_late = problem.startswith("could not find expected ':'") or (mark is not None and mark.line >= len(lines))
+    if context is not None and is_late:
+        mark, context = context, None
+    hint = ""
+    if "'\\t'" in problem:
+        hint = "YAML is indented with blanks, never with tabs"
+    elif error.context and context is not None:
+        hint = f"{error.context}, which begins at {file}:{context.line + 1}:{context.column + 1}"
+    elif error.context and is_late:
+        hint = error.context
+    line, column = len(lines) - 1, max(0, len(lines[-1]) - 1)
+    if mark is not None and mark.line < len(lines):
+        line, column = mark.line, mark.column
+        if problem.startswith(_INDENTATION_PROBLEMS):
+            hint = _indentation_hint(lines, line) or hint
+    faults.error(f"this is not YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
+
+
+def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
+    """How far a line is indented, and how far what is still open above it; empty if it fits one of these."""
+    indent = len(lines[number]) - len(lines[number].lstrip(" "))
+    # What each open block begins with, by the blanks in front of it, the outermost first.
+    open_blocks: dict[int, str] = {}
+    for above, line in enumerate(lines[:number]):
+        for start, word in _block_begins(line):
+            open_blocks = {blanks: begin for blanks, begin in open_blocks.items() if blanks <= start}
+            open_blocks.setdefault(start, f"{word}, line {above + 1}")
+    if indent in open_blocks or not open_blocks:
+        return ""
+    legal = ", ".join(f"{blanks} ({begin})" for blanks, begin in open_blocks.items())
+    return f"the line is indented by {indent}, what is open above it by {legal}"
+
+
+def _block_begins(line: str) -> Iterator[tuple[int, str]]:
+    """The column, from 0, and the word of each block that may begin in a line: several behind the dash of an item."""
+    position = 0
+    while found := _BLOCK_BEGIN.match(line, position):
+        yield found.start(1), found[1]
+        if found[1] != "-":
+            return
+        position = found.end()
+
+
+def _composed(text: str, bounds: Bounds = SMALL) -> yaml.Node | None:
+    """The root node of a text. Raises `yaml.MarkedYAMLError`, in the words of Python's own parser."""
+    with suppress(yaml.YAMLError):
+        return _composed_by(getattr(yaml, "CSafeLoader", yaml.SafeLoader), text, bounds)
+    return _composed_by(yaml.SafeLoader, text, bounds)
+
+
+def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
+    """By one of PyYAML's parsers; that of libyaml is much faster, but does not say as well what is wrong."""
+    parser = loader(text)
+    try:
+        node: yaml.Node | None = _Composer(parser, bounds).get_single_node()
+        return node
+    finally:
+        parser.dispose()
+
+
+def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
+    """The root node of the lines above a fault or, if it lies in something still open, above that; None without any."""
+    for mark in (error.problem_mark, error.context_mark):
+        if mark is not None:
+            with suppress(yaml.YAMLError, TooLargeError):
+                return _composed("".join(lines[: mark.line]))
+    return None
+
+
+def integer(text: str) -> int:
+    """The integer that a plain scalar means to YAML, of at most `LONGEST_NUMBER` characters. Raises `ValueError`."""
+    if len(text) > LONGEST_NUMBER:
+        raise ValueError(f"more than {LONGEST_NUMBER} characters")
+    value = yaml.safe_load(text)
+    if type(value) is not int:
+        raise ValueError(f"'{text}' is not an integer")
+    return value
+
+
+def yaml_data(text: str) -> Any:
+    """What a text means: mappings, lists and scalars. Raises `yaml.YAMLError` for whatever means nothing."""
+    try:
+        return data_of(_composed(text, LARGE))
+    except TooLargeError as error:
+        raise yaml.YAMLError(str(error)) from error
+
+
+def data_of(root: yaml.Node | None) -> Any:
+    """What the nodes of a text mean. Raises `yaml.YAMLError` for whatever means nothing."""
+    try:
+        return None if root is None else yaml.SafeLoader("").construct_document(root)
+    except (ValueError, TypeError, LookupError, OverflowError) as error:
+        # A number of thousands of digits or of none, a date that is none, a key that is a list.
+        raise yaml.YAMLError(str(error)) from error
+
+
+def yaml_dump(data: Any) -> str:
+    """Data as a text for people to read: in its own order."""
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
+
+
+def is_null(node: yaml.Node) -> bool:
+    """Tell whether a key was written without a value, as listing 6.1 of the dissertation does with `type:`."""
+    return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"
+
+
+def kind(node: yaml.Node) -> str:
+    """What a node is, for messages: its word, "a list", "a mapping" or "nothing"."""
+    if is_null(node):
+        return "nothing"
+    if isinstance(node, yaml.MappingNode):
+        return "a mapping"
+    return "a list" if isinstance(node, yaml.SequenceNode) else f"'{node.value}'"
+
+
+def items(
+    yaml_text: YamlText, node: yaml.MappingNode, faults: Diagnostics
+) -> Iterator[tuple[Text, yaml.ScalarNode, yaml.Node]]:
+    """Key text, key node and value node of each item; a key that is no scalar, or comes twice, is a fault."""
+    seen: dict[str, SourceRef] = {}
+    for key, value in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            faults.error("a key must be a word", yaml_text.source(key))
+        elif key.value in seen:
+            first = f"the first is at {seen[key.value]}"
+            faults.error(f"key '{key.value}' is given twice", yaml_text.source(key), first)
+        else:
+            seen[key.value] = yaml_text.source(key)
+            yield yaml_text.text(key), key, value

@@ -1,0 +1,1 @@
+"""External programs, Python packages and worker processes."""

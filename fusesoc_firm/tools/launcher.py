@@ -1,0 +1,101 @@
+"""Starts the programs of a build for Edalize, as `firm tool` does.
+
+Edalize's makefiles put the launcher in front of each program. It finds a program on the path or as YoWASP's package
+from PyPI, says which package brings one that is missing, and notes in the build's manifest which one has run. A program
+that fails leaves no output: make, started again, would take it for a good one, such as the layout that nextpnr writes
+before it finds that the clock is too slow.
+
+`generators/launcher.mk` is the GNUmakefile of a build. Unless there is another launcher, it names `firm_launcher.sh`
+beside it, which starts this module for the first run of a program in a build.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.tools.interrupts import accept_interrupts
+from fusesoc_firm.tools.manifest import note
+from fusesoc_firm.tools.programs import find, ways
+
+# Options that name a program's output.
+_OUTPUTS = ("--asc", "--textcfg", "--write")
+# Set by `firm_launcher.sh`: the file from which it learns that a program was noted, and where that is.
+_NOTED = "FIRM_NOTED"
+
+
+def launch(program: str, arguments: Sequence[str]) -> int:
+    """Run a program to its end; its exit status. Raises `InputError` if it is not installed."""
+    path = find(program)
+    if path is None:
+        fail(f"the program '{program}' is not installed", hint=ways(program))
+    status = _run([str(path), *arguments])
+    note(program, Path())
+    if status:
+        for option, value in pairwise(arguments):
+            if option in _OUTPUTS:
+                Path(value).unlink(missing_ok=True)
+    # Killed by a signal, as a shell says it.
+    return status if status >= 0 else 128 - status
+
+
+def _run(command: Sequence[str]) -> int:
+    """The exit status of a command; who ends this process, as make does, ends it."""
+    program: subprocess.Popen[bytes] | None = None
+    is_wanted = True
+
+    def end(*_: object) -> None:
+        nonlocal is_wanted
+        is_wanted = False
+        if program:
+            program.terminate()
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        with subprocess.Popen(command) as program:
+            # The signal may have come while it was being started.
+            if not is_wanted:
+                program.terminate()
+            return program.wait()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
+    """Let `firm_launcher.sh` start a program from now on, unless a failure of it has to be cleaned up after."""
+    if not any(option in arguments for option in _OUTPUTS) and (path := shutil.which(arguments[0])):
+        noted.parent.mkdir(exist_ok=True)
+        noted.write_text(f"{path}\n", encoding="utf-8")
+
+
+def starts_everything() -> bool:
+    """Whether programs of this build are started here, and not by a launcher that may find them elsewhere."""
+    words = os.environ.get("EDALIZE_LAUNCHER", "").split()
+    return not words or words[-1] == "tool"
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The same as `firm tool`, which has other commands to get ready; a build starts a dozen programs."""
+    accept_interrupts()
+    noted = os.environ.pop(_NOTED, "")
+    try:
+        status = launch(arguments[0], arguments[1:])
+        if noted:
+            _leave_to_the_shell(arguments, Path(noted))
+        return status
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,28 @@
+"""Where the FuseSoC libraries of this package are: one of reusable cores and generators, one of demo systems.
+
+In a wheel the folders hold the files; in a checkout they lead by relative links to `cores`, `generators` and `specs`.
+Either way they hold nothing else: FuseSoC takes every `.core` below a library's folder, and a project that adds one
+never finds what a build or a virtual environment left in the checkout. `FUSESOC_IGNORE` beside them keeps them out of
+any other library, such as that of a project with its virtual environment in its own folder.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+
+
+def library_root() -> Path:
+    """The folder for `fusesoc library add firm FOLDER`, absolute."""
+    return _PACKAGE / "library"
+
+
+def demos_root() -> Path:
+    """The folder of the demo systems, for `fusesoc library add firm_demos FOLDER`, absolute."""
+    return _PACKAGE / "demos"
+
+
+def docs_root() -> Path:
+    """The folder of the documentation, absolute."""
+    return _PACKAGE / "docs"

@@ -1,0 +1,46 @@
+"""Graphs as pictures, drawn by Graphviz."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+from fusesoc_firm.text.diagnostics import fail
+from fusesoc_firm.text.outputs import check_output, write
+
+# What a graph becomes, by the ending of a file's name; DOT is Graphviz's own language.
+ENDINGS = (".svg", ".png", ".pdf", ".dot")
+# What is text, and can be printed.
+TEXTS = ("svg", "dot")
+
+
+def check_picture(path: Path | None, form: str | None) -> None:
+    """Raise `InputError` if no picture can be written to `path`, or if its name says another format than `form`."""
+    if path is None:
+        return
+    check_output(path, ENDINGS)
+    if form and path.suffix != f".{form}":
+        fail(
+            f"{path} is not a picture in the format {form}",
+            hint=f"without --format, the ending says it: {', '.join(ENDINGS)}",
+        )
+
+
+def draw(dot: str, path: Path | None, form: str | None) -> None:
+    """Write a graph in DOT as a picture to `path`, or print it in the `form`, SVG unless given. Raises `InputError`."""
+    if path:
+        write(path, picture(dot, path.suffix.removeprefix(".")))
+    else:
+        print(picture(dot, form or TEXTS[0]).decode(), end="")
+
+
+def picture(dot: str, form: str) -> bytes:
+    """A graph in DOT as `svg`, `png`, `pdf` or `dot`. Raises `InputError` if Graphviz is missing."""
+    if form == "dot":
+        return dot.encode()
+    try:
+        return subprocess.run(["dot", f"-T{form}"], input=dot.encode(), capture_output=True, check=True).stdout
+    except subprocess.CalledProcessError as error:
+        fail(f"Graphviz cannot draw this as {form}: {error.stderr.decode(errors='replace').strip()}")
+    except FileNotFoundError:
+        fail("pictures need the program 'dot' of Graphviz", hint="Debian and Ubuntu: apt install graphviz")

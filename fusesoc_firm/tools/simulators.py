@@ -1,0 +1,86 @@
+"""The simulators that systems are simulated with, as Edalize has them: a row for each.
+
+A new one is a row here, and one in `programs.PROGRAMS` for each program that it starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Live:
+    """How a simulator is built that another program starts, and how it is started (docs/transport.md).
+
+    `parameter` stands before `NAME=value` on its command line. Where FuseSoC's build makes nothing, the makefile's
+    target `made_by` does. What starts it is the line of the makefile's target `run` that begins with `started_by`, or
+    else the program `V<toplevel>`.
+    """
+
+    parameter: str
+    made_by: str = ""
+    started_by: str = ""
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """A simulator: its title, what to say of it beside the others, the programs that it starts.
+
+    One that does not read VHDL gets a netlist in Verilog, which GHDL makes. `options` are those of its flow in Edalize,
+    and `system_verilog` those that SystemVerilog needs. Functions in C++ need GHDL's own interface (VHPIDIRECT).
+    """
+
+    title: str
+    remark: str = ""
+    reads_vhdl: bool = False
+    calls_functions: bool = False
+    programs: tuple[str, ...] = ()
+    options: Mapping[str, str] = field(default_factory=dict)
+    system_verilog: Mapping[str, str] = field(default_factory=dict)
+    live: Live | None = None
+
+
+SIMULATORS: dict[str, Simulator] = {
+    "ghdl": Simulator(
+        "GHDL",
+        reads_vhdl=True,
+        calls_functions=True,
+        programs=("ghdl",),
+        options={"sim_options": "[--ieee-asserts=disable-at-0]"},
+        # FuseSoC builds nothing before it runs. The line of the makefile has the options of the analysis.
+        live=Live("-g", "analyze", "ghdl -r "),
+    ),
+    "icarus": Simulator(
+        "Icarus Verilog",
+        ", of the netlist that GHDL makes of the VHDL",
+        programs=("iverilog",),
+        system_verilog={"iverilog_options": "[-g2012]"},
+    ),
+    "verilator": Simulator(
+        "Verilator",
+        ", which is the fastest and takes the longest to build",
+        programs=("verilator", "g++", "make"),
+        options={
+            "mode": "cc",
+            "verilator_options": "[--main, --timing, --timescale 1ns/1ps, -Wno-lint, -Wno-style]",
+            "make_options": "[OPT_FAST=-O2]",
+        },
+        live=Live("+"),
+    ),
+}
+"""By Edalize's name, the one first that a system is simulated with where nothing else is said."""
+
+
+def default_simulator(*, has_verilog: bool = False, is_live: bool = False) -> str:
+    """The first that can simulate a system, one with accelerators in Verilog or another."""
+    return next(iter(fitting(has_verilog=has_verilog, is_live=is_live)))
+
+
+def fitting(*, has_verilog: bool = False, is_live: bool = False) -> dict[str, Simulator]:
+    """Those that can simulate a system, with accelerators in Verilog or without: none of them reads both languages."""
+    return {
+        name: item
+        for name, item in SIMULATORS.items()
+        if not (has_verilog and item.reads_vhdl) and (item.live or not is_live)
+    }

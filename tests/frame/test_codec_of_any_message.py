@@ -1,0 +1,212 @@
+"""What the codec takes, gives and refuses; test_every_message compares its bytes with those of others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from fusesoc_firm.frame.codec import CodecError, decode, encode, pack_frame, used_bytes
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
+from tests.frame.test_nodes import frame, standard
+
+HEADER = bytes.fromhex("00010000")
+
+
+def image(ros: Middleware, data: bytes) -> dict[str, Any]:
+    stamp = {"sec": 1, "nsec": 2} if ros is ROS1 else {"sec": 1, "nanosec": 2}
+    header = {"seq": 3, "stamp": stamp, "frame_id": "cam"} if ros is ROS1 else {"stamp": stamp, "frame_id": "cam"}
+    rest = {"height": 4, "width": 5, "encoding": "mono8", "is_bigendian": 0, "step": 5, "data": data}
+    return {"header": header, **rest}
+
+
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_a_large_image_keeps_its_bytes(ros: Middleware) -> None:
+    made = standard(ros, "sensor_msgs/Image")
+    value = image(ros, bytes(range(256)) * 4096)
+    payload = encode(made, value)
+    assert payload.endswith(value["data"])
+    found = decode(made, payload)
+    assert found == value
+    assert list(found) == list(value)
+    assert used_bytes(made, payload).endswith(b"\1" * 2**20)
+
+
+@pytest.mark.parametrize("data", [b"\0\xff", bytearray(b"\0\xff"), memoryview(b"\0\xff"), [0, 255], (0, 255)])
+@pytest.mark.parametrize("type_", ["uint8[]", "char[]", "uint8[2]"])
+def test_octets_are_bytes_or_a_list(type_: str, data: Any) -> None:
+    assert encode(frame(ROS1, f"{type_} x\n"), {"x": data}).endswith(b"\0\xff")
+
+
+@pytest.mark.parametrize(
+    ("ros", "text", "value", "payload"),
+    [
+        (ROS1, "string s\n", "hé", "03000000 68c3a9"),
+        (ROS2, "string s\n", "hé", "04000000 68c3a900"),
+        (ROS2, "string s\n", "", "01000000 00"),
+        # Bytes that are no UTF-8.
+        (ROS1, "string s\n", "a\udcff", "02000000 61ff"),
+        # UTF-16 in four bytes a unit, without a zero at the end.
+        (ROS2, "wstring s\n", "aé", "02000000 61000000 e9000000"),
+        (ROS2, "wstring s\n", "🤖", "02000000 3ed80000 16dd0000"),
+        (ROS2, "wstring s\n", "\ud83e", "01000000 3ed80000"),
+        (ROS2, "float64[] s\n", [], "00000000"),
+        (ROS2, "float64[] s\n", [1.0], "01000000 00000000 000000000000f03f"),
+        (ROS2, "bool[] s\n", [True, False], "02000000 0100"),
+        (ROS1, "byte[] s\n", [-1], "01000000 ff"),
+        (ROS1, "time[] s\n", [{"sec": 1, "nsec": 2}], "01000000 01000000 02000000"),
+        (ROS2, "string[] s\n", ["a", "b"], "02000000 02000000 6100 0000 02000000 6200"),
+        (ROS2, "string[2] s\n", ["a", "b"], "02000000 6100 0000 02000000 6200"),
+    ],
+)
+def test_bytes_of_a_value(ros: Middleware, text: str, value: Any, payload: str) -> None:
+    made = frame(ros, text)
+    expected = made.prefix + bytes.fromhex(payload)
+    assert encode(made, {"s": value}) == expected
+    assert decode(made, expected) == {"s": value}
+
+
+def test_bytes_for_octets_come_back_as_bytes() -> None:
+    made = frame(ROS2, "uint8[] a\nbyte[] b\nchar[] c\nint8[] d\nuint8[2] e\n")
+    value = {"a": b"\1", "b": b"\2", "c": b"\3", "d": [-4], "e": [5, 6]}
+    assert decode(made, encode(made, value)) == value
+
+
+# --- defaults ----------------------------------------------------------------------------------------------------
+
+DEFAULTS = """
+int32 number 5
+bool flag true
+string text "a b"
+float32[3] three [1, 2, 3]
+uint8[] octets [1, 2]
+string[] texts ["x", "y"]
+string[2] two ["v", "w"]
+Inner inner
+"""
+
+
+def test_missing_fields_have_their_defaults() -> None:
+    made = frame(ROS2, DEFAULTS, Inner="int8 deep -1\n")
+    expected = {
+        "number": 5,
+        "flag": True,
+        "text": "a b",
+        "three": [1.0, 2.0, 3.0],
+        "octets": b"\1\2",
+        "texts": ["x", "y"],
+        "two": ["v", "w"],
+        "inner": {"deep": -1},
+    }
+    assert decode(made, encode(made, {})) == expected
+    assert decode(made, encode(made, {"number": 6, "texts": ["z"]})) == {**expected, "number": 6, "texts": ["z"]}
+
+
+def test_elements_have_defaults_but_arrays_of_messages_none() -> None:
+    made = frame(ROS2, "Inner[] many\nInner[2] two\n", Inner="int8 deep -1\nstring text 'x'\n")
+    element = {"deep": -1, "text": "x"}
+    value = {"many": [{}], "two": [{}, {"deep": 2}]}
+    assert decode(made, encode(made, value)) == {"many": [element], "two": [element, {"deep": 2, "text": "x"}]}
+    for missing in ("many", "two"):
+        with pytest.raises(CodecError, match=f"^no value for '{missing}'"):
+            encode(made, {name: inner for name, inner in value.items() if name != missing})
+
+
+# --- refusals ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "error"),
+    [
+        ("float64 x\n", {}, "no value for 'x'"),
+        ("string s\n", {}, "no value for 's'"),
+        ("Inner a\n", {}, "no value for 'a.b'"),
+        ("Inner a\n", {"a": 1}, "no value for 'a.b'"),
+        ("Inner[] a\n", {"a": [{}]}, "no value for 'a.b'"),
+        ("Inner[2] a\n", {}, "no value for 'a.b'"),
+        ("uint8 x\n", {"x": 1, "y": 2}, "layout_msgs/Main has no field 'y'"),
+        ("Inner[] a\n", {"a": [{"b": 1, "c": 2}]}, "layout_msgs/Main has no field 'a.c'"),
+        ("Inner a\n", {"a": {"b": 1, "c": {"d": [2]}}}, "layout_msgs/Main has no field 'a.c.d'"),
+        ("uint8 x\n", {"x": 256}, "'x' takes a uint8, not 256"),
+        ("bool x\n", {"x": "False"}, "'x' takes a bool, not 'False'"),
+        ("float32 x\n", {"x": 1e39}, r"'x' takes a float32, not 1e\+39"),
+        ("uint8[] x\n", {"x": [1, -1]}, "'x' takes a uint8, not -1"),
+        ("int8[] x\n", {"x": b"a"}, "'x' takes a list, not b'a'"),
+        ("uint8[] x\n", {"x": "ab"}, "'x' takes a list, not 'ab'"),
+        ("uint8[3] x\n", {"x": b"ab"}, "'x' takes a list of 3, not b'ab'"),
+        ("uint8[<=2] x\n", {"x": b"abc"}, "'x' holds at most 2, not 3"),
+        ("string<=2 x\n", {"x": "aé"}, "'x' holds at most 2, not 3"),
+        ("wstring<=1 x\n", {"x": "🤖"}, "'x' holds at most 1, not 2"),
+        ("string[<=1] x\n", {"x": ["", ""]}, "'x' holds at most 1, not 2"),
+        ("string[2] x\n", {"x": [""]}, r"'x' takes a list of 2, not \[''\]"),
+        ("string[] x\n", {"x": "abc"}, "'x' takes a list, not 'abc'"),
+        ("string x\n", {"x": b"abc"}, "'x' takes a string, not b'abc'"),
+        ("string x\n", {"x": "\ud800"}, "'x' takes no lone surrogate"),
+    ],
+)
+def test_a_value_that_does_not_fit(text: str, value: dict[str, Any], error: str) -> None:
+    with pytest.raises(CodecError, match=f"^{error}"):
+        encode(frame(ROS2, text, Inner="uint8 b\n"), value)
+
+
+def test_a_long_value_is_cut_in_its_error() -> None:
+    with pytest.raises(CodecError) as caught:
+        encode(frame(ROS1, "int8[] x\n"), {"x": bytes(10**6)})
+    assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize(
+    ("text", "payload", "error"),
+    [
+        ("string s\n", "01000000 61", "unknown encoding 0100 of layout_msgs/Main"),
+        ("string s\n", "00000000 01000000 00", "unknown encoding 0000 of layout_msgs/Main"),
+        ("uint8 x\n", "00000000 01", "unknown encoding 0000 of layout_msgs/Main"),
+        ("uint8 x\n", "00010000", "layout_msgs/Main takes 5 bytes, not 4"),
+        ("uint8 x\n", "00010000 01 00000000", "layout_msgs/Main takes 5 bytes, not 9"),
+        ("string s\n", "", "unknown encoding  of layout_msgs/Main"),
+        ("string s\n", "000100", "the payload of layout_msgs/Main ends after 3 bytes"),
+        ("string s\n", "00010000 0200", "the payload of layout_msgs/Main ends within 's' after 6 bytes"),
+        ("string s\n", "00010000 03000000 6100", "the payload of layout_msgs/Main ends within 's' after 10 bytes"),
+        ("string s\n", "00010000 00000000", "'s' has no terminator"),
+        ("string s\n", "00010000 02000000 6161", "'s' does not end with a zero"),
+        ("string<=1 s\n", "00010000 03000000 616100", "'s' holds at most 1, not 2"),
+        ("wstring s\n", "00010000 01000000 00000100", "'s' holds a unit that is not UTF-16: 0x10000"),
+        ("float64[] s\n", "00010000 ffffffff 00000000", "the payload of layout_msgs/Main ends within 's'"),
+        ("uint8[<=2] s\n", "00010000 03000000 616161", "'s' holds at most 2, not 3"),
+        ("Inner[] s\n", "00010000 ffffffff 01000000", "the payload of layout_msgs/Main ends within 's.b'"),
+        ("string s\nuint32 t\n", "00010000 01000000 00 00000000", "the payload of layout_msgs/Main ends within 't'"),
+        ("string s\n", "00010000 01000000 00 00000000", "layout_msgs/Main ends after 9 bytes, but the payload has 13"),
+    ],
+)
+def test_a_payload_that_is_broken(text: str, payload: str, error: str) -> None:
+    with pytest.raises(CodecError, match=f"^{error}"):
+        decode(frame(ROS2, text, Inner="uint16 b\n"), bytes.fromhex(payload))
+
+
+def test_up_to_three_bytes_may_trail_in_ros_2() -> None:
+    made = frame(ROS2, "string s\n")
+    payload = HEADER + bytes.fromhex("01000000 00")
+    for trailing in range(4):
+        assert decode(made, payload + bytes(trailing)) == {"s": ""}
+        assert used_bytes(made, payload + bytes(trailing)) == b"\1" * 9 + bytes(trailing)
+
+
+def test_every_cut_of_a_payload_is_an_error() -> None:
+    made = frame(ROS2, "string s\nInner[] many\nfloat64[] numbers\nuint8 last\n", Inner="string t\nfloat64 x\n")
+    payload = encode(made, {"s": "a", "many": [{"t": "b", "x": 1.0}], "numbers": [2.0], "last": 3})
+    assert decode(made, payload)["last"] == 3
+    for length in range(len(payload)):
+        with pytest.raises(CodecError):
+            decode(made, payload[:length])
+
+
+def test_padding_is_not_used() -> None:
+    made: Frame = frame(ROS2, "string s\nuint32 x\nuint8 y\nuint16 z\n")
+    used = used_bytes(made, encode(made, {"s": "", "x": 1, "y": 2, "z": 3}))
+    assert used.hex() == "01" * 9 + "000000" + "01" * 5 + "00" + "0101"
+
+
+def test_pack_frame() -> None:
+    assert pack_frame(7, b"ab") == b"\7\2\0\0\0ab"

@@ -1,0 +1,161 @@
+"""GHDL for tests: analyse VHDL-93, simulate, synthesise to a netlist, find latches, simulate the netlist instead.
+
+    work = Library("firm", tmp_path)
+    work.analyse(core_files("axis/package", "axis/axis", "manager/manager"))
+    result = work.run("some_tb", generics={"SEED": 7})
+    assert result.exit_code == 0, result.output
+    work.replace_by_netlist("firm_manager", {"WIDTH": 8})      # from here on, benches see the netlist
+
+Several libraries may share a directory; GHDL finds one beside the other.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tests.processes import limited
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+CORES = REPOSITORY / "cores"
+
+# GHDL sets generics of these types from the command line; a real one would make no netlist.
+Generic = int | str | bool
+
+_CASE = re.compile(r"\bcase\b.*?\bendcase\b", re.DOTALL)
+_DEFAULT = re.compile(r"\bdefault\s*:")
+_CHOICE = re.compile(r"^\s*(\d+)'b[01]+\s*:", re.MULTILINE)
+
+
+class GhdlError(Exception):
+    """GHDL refused the input; the text is what it printed."""
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """A finished simulation: `output` is what it printed on both streams, in lines."""
+
+    exit_code: int
+    output: str
+
+
+@dataclass(frozen=True)
+class Library:
+    """A VHDL library by its logical name and the directory in which GHDL keeps it."""
+
+    name: str
+    directory: Path
+
+    def analyse(self, files: Iterable[Path]) -> None:
+        """Analyse files in this order as strict VHDL-93; raise `GhdlError` on a fault."""
+        self._ghdl("-a", *(str(file) for file in files))
+
+    def elaborate(self, entity: str) -> None:
+        """Bind and elaborate `entity` and all below it, without a simulation; raise `GhdlError` on a fault."""
+        self._ghdl("--elab-run", entity, "--no-run")
+
+    def run(
+        self,
+        entity: str,
+        generics: Mapping[str, Generic] | None = None,
+        *,
+        directory: Path | None = None,
+        options: Sequence[str] = (),
+        seconds: float = 120,
+    ) -> RunResult:
+        """Simulate `entity`, which may take so many seconds of a processor.
+
+        Its files are relative to `directory` (default: the library's).
+        """
+        command = [*limited(seconds), "ghdl", "-r", *self._options(), entity, *_generic_options(generics), *options]
+        process = subprocess.run(
+            command,
+            cwd=directory or self.directory,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            check=False,
+        )
+        return RunResult(process.returncode, process.stdout)
+
+    def synthesise(self, entity: str, generics: Mapping[str, Generic] | None = None, language: str = "vhdl") -> str:
+        """The netlist of `entity` as `vhdl` or `verilog`; raise `GhdlError` on a fault, a latch GHDL sees included."""
+        return self._ghdl("--synth", f"--out={language}", *_generic_options(generics), entity)
+
+    def latches(self, entity: str, generics: Mapping[str, Generic] | None = None) -> list[str]:
+        """What would become a latch in `entity`, empty if all is well.
+
+        GHDL reports a latch in the source itself. It makes new ones in its Verilog, though: it drops `when others`
+        of a `case`, and a Verilog `case` without `default` keeps the old value.
+        """
+        try:
+            netlist = self.synthesise(entity, generics, "verilog")
+        except GhdlError as error:
+            found = [line for line in str(error).splitlines() if "latch" in line]
+            if not found:
+                raise
+            return found
+        return [case for case in _CASE.findall(netlist) if not _is_complete(case)]
+
+    def replace_by_netlist(self, entity: str, generics: Mapping[str, Generic] | None = None) -> Path:
+        """Put the netlist of `entity` in its place in this library and return its file.
+
+        The netlist keeps the entity's name, generics and ports, so benches stay as they are; they must be analysed
+        again and use the same generics.
+        """
+        netlist = self.directory / f"{entity}_netlist.vhd"
+        netlist.write_text(self.synthesise(entity, generics), encoding="utf-8")
+        self.analyse([netlist])
+        return netlist
+
+    def _options(self) -> list[str]:
+        return ["--std=93", f"--work={self.name}", f"--workdir={self.directory}", f"-P{self.directory}"]
+
+    def _ghdl(self, command: str, *arguments: str) -> str:
+        process = subprocess.run(
+            ["ghdl", command, *self._options(), *arguments],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+        )
+        if process.returncode != 0:
+            raise GhdlError(process.stdout + process.stderr)
+        return process.stdout
+
+
+def _is_complete(case: str) -> bool:
+    """Whether a Verilog `case` says what happens for every value."""
+    choices = _CHOICE.findall(case)
+    return bool(_DEFAULT.search(case)) or (bool(choices) and len(choices) == 2 ** int(choices[0]))
+
+
+def core_files(*cores: str, fileset: str = "rtl") -> list[Path]:
+    """The files that the .core files name in `fileset`, in order: `core_files("axis/package", "axis/axis")`."""
+    files = []
+    for core in cores:
+        description = CORES / f"{core}.core"
+        files += [description.parent / name for name in core_description(description)["filesets"][fileset]["files"]]
+    return files
+
+
+@cache
+def core_description(path: Path) -> Any:
+    """What a .core file says; nobody may change it."""
+    return yaml.load(path.read_text(encoding="utf-8").removeprefix("CAPI=2:"), Loader=yaml.CSafeLoader)
+
+
+def _generic_options(generics: Mapping[str, Generic] | None) -> list[str]:
+    return [f"-g{name}={_generic_value(value)}" for name, value in (generics or {}).items()]
+
+
+def _generic_value(value: Generic) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

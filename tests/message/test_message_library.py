@@ -1,0 +1,268 @@
+"""Where definitions come from, in which order, and what a library says about the ones it cannot deliver."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.folders import interface_files
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import InterfaceKind, MessageName, MessageType, PrimitiveType
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.message.stores import DistributionStore, distributions
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef
+
+POINT = MessageName("geometry_msgs", "Point")
+
+
+def write(path: Path, text: str = "uint8 x\n") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def field_names(library: MessageLibrary, name: MessageName) -> list[str]:
+    return [field.name for field in library.get(name).fields]
+
+
+def own_names(library: MessageLibrary) -> list[str]:
+    """The names that come from files."""
+    return [str(name) for name in library.names() if library.files([name])]
+
+
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_common_messages_need_no_files(ros: Middleware) -> None:
+    library = MessageLibrary(ros)
+    assert field_names(library, POINT) == ["x", "y", "z"]
+    assert library.files([POINT]) == []
+    assert library.origin(POINT) == ("rosbags ros1_noetic" if ros is ROS1 else "rosbags ros2_jazzy")
+
+
+def test_a_store_speaks_the_types_of_its_version() -> None:
+    header = MessageName("std_msgs", "Header")
+    ros1 = {field.name: field.type for field in MessageLibrary(ROS1).get(header).fields}
+    ros2 = {field.name: field.type for field in MessageLibrary(ROS2).get(header).fields}
+    assert ros1["seq"] == PrimitiveType("uint32")
+    assert ros1["stamp"] == PrimitiveType("time")
+    assert ros2["stamp"] == MessageType(MessageName("builtin_interfaces", "Time"))
+    assert "seq" not in ros2
+    assert MessageName("builtin_interfaces", "Time") not in MessageLibrary(ROS1).names()
+
+
+def test_a_message_of_a_store_points_into_its_text() -> None:
+    source = MessageLibrary(ROS1).get(POINT).fields[1].source
+    assert str(source) == "<rosbags ros1_noetic>/geometry_msgs/Point:2:1"
+    assert source.text == "float64 y"
+
+
+def test_distributions() -> None:
+    assert distributions(1) == ["noetic"]
+    assert {"foxy", "humble", "jazzy"} <= set(distributions(2))
+    humble = MessageLibrary(ROS2, store="humble")
+    assert MessageName("service_msgs", "ServiceEventInfo") not in humble.names()
+    assert MessageName("service_msgs", "ServiceEventInfo") in MessageLibrary(ROS2, store="jazzy").names()
+
+
+def test_an_unknown_distribution() -> None:
+    with pytest.raises(InputError) as caught:
+        DistributionStore(2, "jazy")
+    assert str(caught.value) == "error: 'jazy' is not a distribution of ROS 2\n      = did you mean 'jazzy'?"
+
+
+def test_a_package_is_named_by_its_manifest(tmp_path: Path) -> None:
+    write(tmp_path / "package.xml", "<package format='2'><name> my_msgs </name></package>")
+    write(tmp_path / "msg" / "A.msg")
+    assert own_names(MessageLibrary(ROS2, [tmp_path])) == ["my_msgs/A"]
+    assert own_names(MessageLibrary(ROS2, [tmp_path / "msg"])) == ["my_msgs/A"]
+
+
+@pytest.mark.parametrize("manifest", ["", "<package><name>broken", "<package/>"])
+def test_a_package_without_a_usable_manifest_is_named_by_its_folder(tmp_path: Path, manifest: str) -> None:
+    write(tmp_path / "my_msgs" / "msg" / "A.msg")
+    if manifest:
+        write(tmp_path / "my_msgs" / "package.xml", manifest)
+    for folder in (tmp_path, tmp_path / "my_msgs", tmp_path / "my_msgs" / "msg"):
+        assert own_names(MessageLibrary(ROS2, [folder])) == ["my_msgs/A"]
+
+
+def test_a_relative_folder_knows_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path / "my_msgs" / "msg" / "A.msg")
+    monkeypatch.chdir(tmp_path / "my_msgs")
+    library = MessageLibrary(ROS2, [Path("msg")])
+    assert own_names(library) == ["my_msgs/A"]
+    assert library.origin(MessageName("my_msgs", "A")) == str(Path("msg", "A.msg"))
+
+
+def test_a_workspace(tmp_path: Path) -> None:
+    write(tmp_path / "src" / "repo" / "folder" / "package.xml", "<package><name>declared</name></package>")
+    write(tmp_path / "src" / "repo" / "folder" / "msg" / "A.msg")
+    write(tmp_path / "src" / "repo" / "folder" / "msg" / "deeper" / "B.msg")
+    write(tmp_path / "src" / "by_layout" / "msg" / "C.msg")
+    write(tmp_path / "flat" / "D.msg")
+    write(tmp_path / "install" / "COLCON_IGNORE", "")
+    write(tmp_path / "install" / "declared" / "share" / "declared" / "msg" / "A.msg")
+    write(tmp_path / ".git" / "hidden" / "msg" / "E.msg")
+    assert own_names(MessageLibrary(ROS2, [tmp_path])) == ["by_layout/C", "declared/A", "declared/B", "flat/D"]
+
+
+def test_links_are_followed_but_not_in_circles(tmp_path: Path) -> None:
+    write(tmp_path / "elsewhere" / "my_msgs" / "msg" / "A.msg")
+    workspace = tmp_path / "workspace"
+    workspace.mkdir()
+    (workspace / "my_msgs").symlink_to(tmp_path / "elsewhere" / "my_msgs")
+    (tmp_path / "elsewhere" / "my_msgs" / "back").symlink_to(workspace)
+    assert interface_files(workspace)[InterfaceKind.MESSAGE] == {
+        MessageName("my_msgs", "A"): [workspace / "my_msgs" / "msg" / "A.msg"],
+    }
+
+
+def test_precedence(tmp_path: Path) -> None:
+    first, second, installed = tmp_path / "first", tmp_path / "second", tmp_path / "opt" / "share"
+    write(first / "geometry_msgs" / "msg" / "Point.msg", "uint8 from_first\n")
+    for folder in (second, installed):
+        write(folder / "geometry_msgs" / "msg" / "Point.msg", f"uint8 from_{folder.name}\n")
+        write(folder / "geometry_msgs" / "msg" / "Pose.msg", f"uint8 from_{folder.name}\n")
+        write(folder / "geometry_msgs" / "msg" / "Twist.msg", f"uint8 from_{folder.name}\n")
+    (second / "geometry_msgs" / "msg" / "Twist.msg").unlink()
+    library = MessageLibrary(ROS2, [first, second], {"AMENT_PREFIX_PATH": str(tmp_path / "opt")})
+    found = {name: field_names(library, MessageName("geometry_msgs", name)) for name in ("Point", "Pose", "Twist")}
+    assert found == {"Point": ["from_first"], "Pose": ["from_second"], "Twist": ["from_share"]}
+    assert field_names(library, MessageName("geometry_msgs", "Vector3")) == ["x", "y", "z"]
+
+
+@pytest.mark.parametrize(
+    ("ros", "variable", "folder"), [(ROS1, "ROS_PACKAGE_PATH", "share"), (ROS2, "AMENT_PREFIX_PATH", ".")]
+)
+def test_the_environment_counts_only_if_it_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ros: Middleware, variable: str, folder: str
+) -> None:
+    name = MessageName("my_msgs", "A")
+    write(tmp_path / "share" / "my_msgs" / "msg" / "A.msg")
+    value = os.pathsep.join(["/does/not/exist", str(tmp_path / folder)])
+    monkeypatch.setenv(variable, value)
+    assert name not in MessageLibrary(ros).names()
+    assert name not in MessageLibrary(ros, environment={}).names()
+    assert name in MessageLibrary(ros, environment={variable: value}).names()
+
+
+def test_every_bad_folder_is_named(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError) as caught:
+        MessageLibrary(ROS1, [tmp_path / "empty", tmp_path / "missing"])
+    assert [diagnostic.message for diagnostic in caught.value.diagnostics] == [
+        f"message path '{tmp_path / 'empty'}' holds no .msg, .srv or .action file",
+        f"message path '{tmp_path / 'missing'}' is neither a folder nor a bag",
+    ]
+
+
+def test_two_files_of_one_message_in_a_folder(tmp_path: Path) -> None:
+    write(tmp_path / "a" / "my_msgs" / "msg" / "A.msg", "uint8 x\n")
+    other = write(tmp_path / "b" / "my_msgs" / "msg" / "A.msg", "uint8 x\n")
+    assert field_names(MessageLibrary(ROS2, [tmp_path]), MessageName("my_msgs", "A")) == ["x"]
+    other.write_text("uint8 y\n", encoding="utf-8")
+    with pytest.raises(InputError, match="'my_msgs/A' differs from"):
+        MessageLibrary(ROS2, [tmp_path]).get(MessageName("my_msgs", "A"))
+
+
+def test_a_file_is_read_once_and_only_when_asked_for(tmp_path: Path) -> None:
+    asked = write(tmp_path / "my_msgs" / "msg" / "A.msg")
+    write(tmp_path / "my_msgs" / "msg" / "Broken.msg", "nonsense\n")
+    library = MessageLibrary(ROS2, [tmp_path])
+    definition = library.get(MessageName("my_msgs", "A"))
+    asked.unlink()
+    assert library.get(MessageName("my_msgs", "A")) is definition
+
+
+def test_a_broken_file_is_reported_on_every_request(tmp_path: Path) -> None:
+    write(tmp_path / "my_msgs" / "msg" / "A.msg", "uint8 x\nnonsense\n")
+    library = MessageLibrary(ROS2, [tmp_path])
+    for _ in range(2):
+        with pytest.raises(InputError, match="2:1: error: 'nonsense' has no name behind it"):
+            library.get(MessageName("my_msgs", "A"))
+    diagnostics = Diagnostics()
+    definition = library.find(MessageName("my_msgs", "A"), diagnostics)
+    assert definition is not None
+    assert [field.name for field in definition.fields] == ["x"]
+    assert len(diagnostics.found) == 1
+
+
+def test_an_unknown_message_is_reported_where_it_is_named() -> None:
+    place = SourceRef("spec.yaml", 3, 12, "    message: geometry_msgs/Quaternoin", 23)
+    with pytest.raises(InputError) as caught:
+        MessageLibrary(ROS1).get(MessageName("geometry_msgs", "Quaternoin"), place)
+    assert str(caught.value).splitlines()[0] == "spec.yaml:3:12: error: unknown message 'geometry_msgs/Quaternoin'"
+    assert str(caught.value).splitlines()[-1] == (
+        "      = did you mean 'geometry_msgs/Quaternion'? looked in: rosbags ros1_noetic; "
+        "further places: 'paths' of the specification or core, --path"
+    )
+
+
+def test_a_closure_holds_each_message_behind_what_it_is_made_of(tmp_path: Path) -> None:
+    write(tmp_path / "my_msgs" / "msg" / "Leaf.msg", "geometry_msgs/Point[] points\n")
+    write(tmp_path / "my_msgs" / "msg" / "Tree.msg", "Leaf[2] left\nLeaf right\nfloat64 x\n")
+    library = MessageLibrary(ROS1, [tmp_path])
+    closure = library.closure(MessageName("my_msgs", "Tree"))
+    assert [str(name) for name in closure] == ["geometry_msgs/Point", "my_msgs/Leaf", "my_msgs/Tree"]
+    assert [path.name for path in library.files(closure)] == ["Leaf.msg", "Tree.msg"]
+
+
+def test_a_closure_of_ros1_has_no_message_for_time() -> None:
+    assert [str(name) for name in MessageLibrary(ROS1).closure(MessageName("std_msgs", "Header"))] == [
+        "std_msgs/Header"
+    ]
+
+
+def test_a_closure_reports_every_fault_in_every_file(tmp_path: Path) -> None:
+    write(tmp_path / "my_msgs" / "msg" / "A.msg", "B b\nMissing m\nA again\nuint8[0] bad\n")
+    write(tmp_path / "my_msgs" / "msg" / "B.msg", "A back\nother_msgs/Missing m\n")
+    with pytest.raises(InputError) as caught:
+        MessageLibrary(ROS2, [tmp_path]).closure(MessageName("my_msgs", "A"))
+    faults = [
+        (Path(d.source.file).name, d.source.line, d.message) for d in caught.value.diagnostics if d.source is not None
+    ]
+    assert faults == [
+        ("A.msg", 2, "unknown message 'my_msgs/Missing'"),
+        ("A.msg", 3, "message 'my_msgs/A' contains itself"),
+        ("A.msg", 4, "'0' is not a size"),
+        ("B.msg", 1, "message 'my_msgs/A' contains itself"),
+        ("B.msg", 2, "unknown message 'other_msgs/Missing'"),
+    ]
+
+
+def test_a_cycle_below_the_message_is_found(tmp_path: Path) -> None:
+    write(tmp_path / "my_msgs" / "msg" / "Top.msg", "A a\n")
+    write(tmp_path / "my_msgs" / "msg" / "A.msg", "B[] b\n")
+    write(tmp_path / "my_msgs" / "msg" / "B.msg", "A a\n")
+    with pytest.raises(InputError) as caught:
+        MessageLibrary(ROS2, [tmp_path]).closure(MessageName("my_msgs", "Top"))
+    (fault,) = caught.value.diagnostics
+    assert fault.hint == "my_msgs/A -> my_msgs/B -> my_msgs/A"
+
+
+@pytest.mark.parametrize(
+    ("ros", "words"), [(ROS1, ("any", "union", "map", "Any")), (ROS2, ("Any", "Optional", "Union"))]
+)
+def test_messages_may_be_called_like_what_msg_has_not(tmp_path: Path, ros: Middleware, words: tuple[str, ...]) -> None:
+    folder = tmp_path / "my_msgs" / "msg"
+    folder.mkdir(parents=True)
+    for word in words:
+        (folder / f"{word}.msg").write_text("uint8 any\nuint8 optional\nuint8 union\n")
+    (folder / "All.msg").write_text("".join(f"{word} f{n}\nmy_msgs/{word}[] g{n}\n" for n, word in enumerate(words)))
+    closure = MessageLibrary(ros, [tmp_path]).closure(MessageName("my_msgs", "All"))
+    assert {name.name for name in closure} == {*words, "All"}
+
+
+# --- messages of tf -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["tf2_msgs/TFMessage", "tf/tfMessage"])
+def test_the_transforms_of_ros1_are_known_by_both_names(name: str) -> None:
+    message = parse_name(name)
+    closure = MessageLibrary(ROS1).closure(message)
+    assert signature(message, closure) == "94810edda583a504dfda3829e70d7eec"  # as rosmsg md5 prints it
+    assert [str(field.type) for field in closure[message].fields] == ["geometry_msgs/TransformStamped[]"]

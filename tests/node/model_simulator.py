@@ -1,0 +1,131 @@
+"""A simulator's end of the pipe (docs/reference/transports.md) before a model of a system: each frame comes back.
+
+It is started as a command. `--fault` says what is to go wrong, when the frame with number `--at` has been taken.
+"""
+
+from __future__ import annotations
+
+import argparse
+import heapq
+import os
+import signal
+import sys
+import time
+from collections import deque
+from dataclasses import dataclass, field
+
+from fusesoc_firm.node.bursts import split_frame
+
+FAULTS = ("exit", "kill", "cut", "garbage", "hang", "unsent", "backwards", "long", "deaf", "error")
+
+
+@dataclass
+class Simulator:
+    """A frame of n beats takes n cycles to come in, a latency, and n cycles to go out, in bursts if asked."""
+
+    width: int
+    latency: int
+    run_beats: int
+    fault: str
+    at: int
+    cycle: int = 0
+    moved: int = 0
+    taken: int = 0
+    begun: int = 0
+    waiting: deque[bytes] = field(default_factory=deque)
+    events: list[tuple[int, int, bytes]] = field(default_factory=list)
+    out_free: int = 0
+
+    def beats(self, data: bytes) -> int:
+        return -(-len(data) * 8 // self.width)
+
+    def put(self, frame: bytes) -> None:
+        """A frame that is to be sent."""
+        if not self.waiting:
+            self.begun = self.cycle
+        self.waiting.append(frame)
+
+    def run(self, cycles: int) -> bytes:
+        """The reports of a run."""
+        end = self.cycle + cycles
+        taking = self.begun + self.beats(self.waiting[0]) if self.waiting else end + 1
+        leaving = self.events[0][0] if self.events else end + 1
+        first = min(taking, leaving)
+        if first > end:
+            self.cycle = end
+            return b""
+        self.moved = first
+        self.cycle = max(self.cycle, first + 1)
+        return self.take(first) if taking <= leaving else self.leave(first)
+
+    def take(self, now: int) -> bytes:
+        frame = self.waiting.popleft()
+        self.begun = now
+        runs = [self.run_beats] * ((self.beats(frame) - 1) // self.run_beats) if self.run_beats else []
+        out = max(now + self.latency, self.out_free)
+        for number, burst in enumerate(split_frame(frame, self.width, runs)):
+            out += self.beats(burst)
+            heapq.heappush(self.events, (out, number, burst))
+        self.out_free = out
+        report = b"T" + (now - self.beats(frame) + 1).to_bytes(8, "little") + now.to_bytes(8, "little")
+        if self.taken == self.at:
+            report += self.misbehave()
+        self.taken += 1
+        return report
+
+    def leave(self, now: int) -> bytes:
+        _, _, burst = heapq.heappop(self.events)
+        cycles = (now - self.beats(burst) + 1).to_bytes(8, "little") + now.to_bytes(8, "little")
+        return b"B" + burst[:1] + cycles + len(burst).to_bytes(4, "little") + burst
+
+    def misbehave(self) -> bytes:
+        """What goes wrong now, if it is not the end."""
+        if self.fault == "exit":
+            sys.exit(3)
+        if self.fault == "kill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if self.fault == "cut":
+            os.write(4, b"B\0" + bytes(16) + (100).to_bytes(4, "little") + b"half")
+            sys.exit(4)
+        if self.fault == "hang":
+            time.sleep(1000)
+        return {
+            "garbage": b"\xff" * 100,
+            "unsent": (b"T" + bytes(16)) * 100,
+            "backwards": b"S" + bytes(12),
+            "long": b"B\0" + bytes(16) + b"\xff" * 4,
+            "error": b"E\1\0" + self.cycle.to_bytes(8, "little") + b"E\xff\xff" + self.cycle.to_bytes(8, "little"),
+        }.get(self.fault, b"")
+
+    def standing(self) -> bytes:
+        leaves = any(last - self.beats(burst) <= self.cycle for last, _, burst in self.events)
+        quiet = 0 if self.waiting or leaves else min(self.cycle - self.moved, 2**32 - 1)
+        return b"S" + self.cycle.to_bytes(8, "little") + quiet.to_bytes(4, "little")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--width", type=int, default=8)
+    parser.add_argument("--latency", type=int, default=10, help="cycles")
+    parser.add_argument("--run-beats", type=int, default=0, help="beats of a burst; 0: frames are whole")
+    parser.add_argument("--fault", choices=FAULTS, default="")
+    parser.add_argument("--at", type=int, default=0)
+    arguments = parser.parse_args()
+    simulator = Simulator(arguments.width, arguments.latency, arguments.run_beats, arguments.fault, arguments.at)
+    with open(3, "rb") as requests, open(4, "wb") as reports:
+        while (letter := requests.read(1)) not in (b"", b"Q"):
+            number = int.from_bytes(requests.read(4), "little")
+            if letter == b"F":
+                simulator.put(requests.read(number))
+            elif letter == b"R":
+                reports.write(simulator.run(number) + simulator.standing())
+                reports.flush()
+            else:
+                sys.exit(f"request {letter!r} is none")
+        while arguments.fault == "deaf":
+            time.sleep(1)
+        reports.write(simulator.standing())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""The socket between a node's engine and its process of ROS: what is closed is closed."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.node.bridge import MESSAGE, Channel
+from fusesoc_firm.node.carrier import CarrierError, RosCarrier, RosOptions
+from fusesoc_firm.node.description import NodeDescription
+
+
+def test_a_channel_that_is_closed_holds_no_file() -> None:
+    mine, its = socket.socketpair()
+    number = mine.fileno()
+    with its:
+        channel = Channel(mine)
+        channel.close()
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.fstat(number)
+        assert its.recv(1) == b""
+        assert channel.receive() is None
+        channel.close()
+
+
+def test_closing_ends_a_thread_that_receives() -> None:
+    mine, its = socket.socketpair()
+    with its:
+        channel, received = Channel(mine), []
+        Channel(its).send(MESSAGE, 3, b"data", 5)
+        first = threading.Event()
+
+        def receive() -> None:
+            while parcel := channel.receive():
+                received.append(parcel)
+                first.set()
+
+        thread = threading.Thread(target=receive)
+        thread.start()
+        assert first.wait(30)
+        channel.close()
+        thread.join(30)
+        assert not thread.is_alive()
+        assert received == [(MESSAGE, 3, 5, b"data")]
+
+
+def test_a_python_of_ros_that_cannot_be_started(tmp_path: Path) -> None:
+    nothing = str(tmp_path / "python")
+    before = len([*Path("/proc/self/fd").iterdir()])
+    with pytest.raises(CarrierError, match=f"the Python of ROS 1, {nothing}, cannot be started: No such file"):
+        RosCarrier(1, NodeDescription("robot", 8, (), (), ()), RosOptions("robot", python=nothing))
+    assert len([*Path("/proc/self/fd").iterdir()]) == before

@@ -1,0 +1,205 @@
+"""Frames, bursts, queues and back ends in C, beside what Python makes of the same bytes."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.frame.codec import pack_frame
+from fusesoc_firm.node.bursts import BurstError, BurstJoiner
+from fusesoc_firm.node.queues import ClosedError, EmptyError, SubscriberQueues
+from tests.node.drivers import C_FOLDER, HERE, Driver, compile_c_driver
+from tests.node.test_bursts import _interleaved
+
+SEED = 20261124
+LONGEST = 60
+IDS = 3
+DEPTH = 2
+WIDTHS = (8, 32, 64)
+STAND_IN = HERE / "freertos_stand_in"
+# What Python says, and the name of it in C.
+WORDS = {
+    "the burst is empty": "empty",
+    "the id is": "bad_id",
+    "tid is": "bad_tid",
+    "holds nothing but the id": "only_id",
+    "ends within a beat": "within_beat",
+    "longer than it announces": "longer",
+    "the longest has": "too_long",
+}
+
+
+@pytest.fixture(scope="module", params=["bare_metal", "freertos"])
+def drivers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> dict[int, Driver]:
+    """A driver for each width of the stream; FreeRTOS' headers are stand-ins of our own."""
+    port = C_FOLDER / "ports" / request.param
+    sources = [f"firm/firm_{name}.c" for name in ("frame", "bursts", "queues")]
+    sources += ["ports/zynq.c", f"ports/{request.param}/firm_port.c"]
+    sizes = {"FIRM_PUBLISHERS": IDS, "FIRM_SUBSCRIBERS": IDS}
+    sizes |= {"FIRM_LONGEST_PAYLOAD": LONGEST, "FIRM_QUEUE_DEPTH": DEPTH}
+    if request.param == "freertos":
+        sizes["STAND_IN"] = 1
+    return {
+        width: compile_c_driver(
+            "frames", tmp_path_factory.mktemp("c"), sources, [port, STAND_IN], {**sizes, "FIRM_WIDTH": width}
+        )
+        for width in WIDTHS
+    }
+
+
+@pytest.fixture(scope="module")
+def devices(tmp_path_factory: pytest.TempPathFactory) -> Driver:
+    sources = [f"firm/firm_{name}.c" for name in ("frame", "dma", "uart")]
+    port = C_FOLDER / "ports" / "bare_metal"
+    return compile_c_driver(
+        "devices", tmp_path_factory.mktemp("devices"), sources, [port], {"FIRM_DMA_BUFFER_BYTES": 128}
+    )
+
+
+def test_frames_are_packed_alike(drivers: dict[int, Driver]) -> None:
+    print(f"seed {SEED}")
+    source = random.Random(SEED)
+    messages = [(source.randrange(256), source.randbytes(size)) for size in range(LONGEST + 2)]
+    lines = [f"encode {identifier} {payload.hex()}" for identifier, payload in messages]
+    expected = [pack_frame(*message).hex() if len(message[1]) <= LONGEST else "" for message in messages]
+    assert drivers[8].answers(lines) == expected
+
+
+def test_a_row_of_bytes_becomes_frames(drivers: dict[int, Driver]) -> None:
+    print(f"seed {SEED}")
+    source = random.Random(SEED)
+    frames = [pack_frame(source.randrange(IDS), source.randbytes(source.randint(0, LONGEST))) for _ in range(200)]
+    row = b"".join(frames)
+    lines = [f"decoder {IDS} {LONGEST + 5}"]
+    while row:
+        size = source.randint(1, 90)
+        lines.append(f"bytes {row[:size].hex()}")
+        row = row[size:]
+    answers = drivers[8].answers(lines)[1:]
+    found = [word for answer in answers for word in answer.split()[1:]]
+    assert found == [frame.hex() for frame in frames]
+
+
+@pytest.mark.parametrize(
+    ("row", "word"), [("03", "bad_id"), ("02ff", "decoded"), ("023d000000", "too_long"), ("00ffffffff", "too_long")]
+)
+def test_bytes_that_are_no_frame_are_told(drivers: dict[int, Driver], row: str, word: str) -> None:
+    answers = drivers[8].answers([f"decoder {IDS} {LONGEST + 5}", f"bytes {row}", "bytes 0000000000"])
+    assert answers[1].split()[-1] == word
+    if word != "decoded":
+        assert answers[2] == "decoded 0000000000"
+
+
+def _python_pushes(width: int, pushes: list[tuple[int | None, bytes]]) -> Iterator[str]:
+    joiner = BurstJoiner(IDS, width, LONGEST)
+    for tid, burst in pushes:
+        try:
+            frame = joiner.push(burst, tid)
+            yield f"frame {pack_frame(frame.id, frame.payload).hex()}" if frame else "more"
+        except BurstError as error:
+            yield next(word for text, word in WORDS.items() if text in str(error))
+    yield f"closed {len(joiner.unfinished)}"
+
+
+def _lines(pushes: list[tuple[int | None, bytes]]) -> list[str]:
+    words = (("-" if tid is None else str(tid), burst.hex()) for tid, burst in pushes)
+    return ["joiner", *(f"push {tid} {burst}" for tid, burst in words), "close"]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_bursts_are_joined_alike(drivers: dict[int, Driver], width: int) -> None:
+    print(f"seed {SEED}")
+    source = random.Random(SEED + width)
+    for _ in range(20):
+        bursts, _ = _interleaved(source, IDS, width)
+        pushes: list[tuple[int | None, bytes]] = [(burst[0], burst) for burst in bursts]
+        assert drivers[width].answers(_lines(pushes))[1:] == [*_python_pushes(width, pushes)]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_garbage_is_told_alike(drivers: dict[int, Driver], width: int) -> None:
+    print(f"seed {SEED}")
+    source = random.Random(SEED + width)
+    found = set()
+    for _ in range(60):
+        pushes: list[tuple[int | None, bytes]] = []
+        for _ in range(30):
+            burst = bytes([source.randint(0, IDS), source.choice([0, 5, 25, LONGEST, 200]), 0, 0, 0])
+            burst += bytes(source.choice([source.randint(0, 20), 3 * LONGEST]))
+            tid = source.choice([None, None, None, 0, 1])
+            pushes.append((tid, burst[: source.choice([len(burst), source.randint(0, len(burst))])]))
+        answers = drivers[width].answers(_lines(pushes))[1:]
+        assert answers == [*_python_pushes(width, pushes)]
+        found |= {answer.split()[0] for answer in answers}
+    # At 8 bits, every burst ends with a beat.
+    assert found == {"frame", "more", "closed", *WORDS.values()} - ({"within_beat"} if width == 8 else set())
+
+
+def test_queues_serve_alike(drivers: dict[int, Driver]) -> None:
+    print(f"seed {SEED}")
+    source = random.Random(SEED)
+    queues: SubscriberQueues[bytes] = SubscriberQueues(IDS, DEPTH)
+    lines, expected = ["queues"], ["ready"]
+    for _ in range(600):
+        if source.random() < 0.55:
+            subscriber, payload = source.randrange(IDS), source.randbytes(source.randint(0, LONGEST))
+            queues.put(subscriber, pack_frame(subscriber, payload))
+            lines.append(f"put {subscriber} {payload.hex()}")
+            expected.append(f"kept {queues.dropped(subscriber)}")
+        else:
+            lines.append("get")
+            try:
+                subscriber, frame = queues.get(0)
+                expected.append(f"{subscriber} {frame.hex()}")
+            except (EmptyError, ClosedError):
+                expected.append("empty")
+    lines += [f"put {IDS} 00", f"put 0 {bytes(LONGEST + 1).hex()}"]
+    expected += ["refused 0", "refused 0"]
+    assert drivers[8].answers(lines) == expected
+    assert sum(queues.dropped(subscriber) for subscriber in range(IDS)) > 20
+
+
+@pytest.mark.parametrize("longest", [100, 1000, 20000])
+def test_frames_go_through_the_dma_and_back(devices: Driver, longest: int) -> None:
+    """Also those that are longer than a buffer, and than all of them; caches are as the model has them."""
+    print(f"seed {SEED}")
+    assert devices.answers([], "dma", "200", str(longest), str(SEED), "none", "0") == ["ok 200 0 0"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "answer"),
+    [
+        ("decode", "error 8 41 0"),
+        ("slave", "error 7 0 21"),
+        ("room", "too_long 0 0 0"),
+        ("simple", "no_sg 0 1 1"),
+        ("reset", "stuck 0 1 1"),
+    ],
+)
+def test_errors_of_the_dma_are_told(devices: Driver, fault: str, answer: str) -> None:
+    assert devices.answers([], "dma", "100", "2000", "1", fault, "7") == [answer]
+
+
+def test_frames_come_from_the_uart(devices: Driver) -> None:
+    """What begins before the line was silent is no frame; a frame that is broken costs what comes before a silence."""
+    frames = deque(pack_frame(number % 2, bytes([number])).hex() for number in range(6))
+    first, second, third, fourth, fifth, sixth = frames
+    words = [first, "-", second + third, "ff", ",", fourth, "-", fifth, "0004000000aa", "-", "-", sixth]
+    answer = devices.answers([], "uart", *words)[0]
+    assert answer == f"{second} {third} {fifth} {sixth} errors 2 breaks 3 sent 0001000000aa"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("FIRM_WIDTH", 24), ("FIRM_PUBLISHERS", 257), ("FIRM_DMA_BUFFER_BYTES", 100)]
+)
+def test_illegal_sizes_are_not_compiled(tmp_path: Path, name: str, value: int) -> None:
+    include = ["-I", str(C_FOLDER / "firm"), "-I", str(C_FOLDER / "ports" / "bare_metal")]
+    command = ["gcc", "-std=c99", *include, "-c", str(C_FOLDER / "firm" / "firm_bursts.c"), "-o", str(tmp_path / "o")]
+    assert subprocess.run(command, check=False).returncode == 0
+    done = subprocess.run([*command, f"-D{name}={value}"], capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "firm_config.h" in done.stderr

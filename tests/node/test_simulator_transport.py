@@ -1,0 +1,231 @@
+"""The two ways to use a simulator at the end of a pipe, with scripts in its place that say what it must not."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.node.transport.open_transport import open_transport
+from fusesoc_firm.node.transport.simulator import Event, Pace, Simulator, SimulatorTransport, Taken
+from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
+
+# An echo: a frame is taken and comes back a cycle after it; of the bytes of a frame's payload, some are orders.
+_MODEL = """
+import os, struct, sys, time
+requests, reports = open(3, "rb"), open(4, "wb")
+cycle = quiet = 0
+frames = []
+def say(*parts):
+    reports.write(b"".join(parts))
+while kind := requests.read(1):
+    if kind == b"F":
+        frames.append(requests.read(int.from_bytes(requests.read(4), "little")))
+        if b"die" in frames[-1]:
+            print("the model dies", file=sys.stderr)
+            sys.exit(3)
+        if b"garbage" in frames[-1]:
+            say(b"!!!!")
+        if b"half" in frames[-1]:
+            say(b"B\\0", bytes(16), (100).to_bytes(4, "little"), b"half a burst")
+            reports.flush()
+            os.kill(os.getpid(), 9)
+    elif kind == b"R":
+        left = int.from_bytes(requests.read(4), "little")
+        if frames and frames[0].endswith(b"wait"):
+            cycle, quiet = cycle + left, quiet + left
+        elif frames and left:
+            frame = frames.pop(0)
+            say(b"T", struct.pack("<QQ", cycle, cycle), b"B\\7", struct.pack("<QQI", cycle, cycle, len(frame)), frame)
+            cycle, quiet = cycle + 1, 0
+        else:
+            cycle, quiet = cycle + left, quiet + left
+        say(b"S", struct.pack("<QI", cycle, min(quiet, 2**31 - 1)))
+    elif kind == b"Q":
+        say(b"S", struct.pack("<QI", cycle, quiet))
+        reports.flush()
+        sys.exit(int(sys.argv[1]) if len(sys.argv) > 1 else 0)
+    reports.flush()
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> list[str]:
+    path = tmp_path / "a model.py"
+    path.write_text(_MODEL)
+    return [sys.executable, str(path)]
+
+
+def wait_until(condition: object) -> None:
+    assert callable(condition)
+    while not condition():
+        time.sleep(0.01)
+
+
+def test_step_by_step(model: list[str]) -> None:
+    with Simulator(model) as simulator:
+        simulator.request(b"one")
+        simulator.request(b"two")
+        assert simulator.run(10) == [Taken(0, 0), Burst(b"one", 7, 0, 0)]
+        assert (simulator.cycle, simulator.quiet) == (1, 0)
+        assert simulator.run(10) == [Taken(1, 1), Burst(b"two", 7, 1, 1)]
+        assert simulator.run(10) == []
+        assert (simulator.cycle, simulator.quiet) == (12, 10)
+        simulator.quit()
+    with pytest.raises(TransportError):
+        simulator.run(1)
+
+
+def test_what_cannot_be_requested(model: list[str]) -> None:
+    with Simulator(model) as simulator:
+        with pytest.raises(ValueError, match="a frame of 0 bytes"):
+            simulator.request(b"")
+        with pytest.raises(ValueError, match="2147483648 cycles"):
+            simulator.run(2**31)
+
+
+@pytest.mark.parametrize(
+    ("frame", "message"),
+    [
+        (b"die", "the simulator ended with status 3; it printed:\nthe model dies"),
+        (b"garbage", "the simulator sent 0x21 where a report begins"),
+        (b"half", "the simulator was killed by signal 9"),
+    ],
+)
+def test_a_simulator_that_ends_unasked(model: list[str], frame: bytes, message: str) -> None:
+    with Simulator(model) as simulator:
+        simulator.request(frame)
+        with pytest.raises(TransportError) as caught:
+            simulator.run(10)
+        assert str(caught.value) == message
+
+
+def test_a_simulator_that_does_not_end_well_or_start(model: list[str], tmp_path: Path) -> None:
+    with Simulator([*model, "5"]) as simulator, pytest.raises(TransportError, match="ended with status 5"):
+        simulator.quit()
+    with Simulator(["/none/there"]) as simulator, pytest.raises(TransportError, match="/none/there"):
+        simulator.run(1)
+    with pytest.raises(TransportError, match="cannot be started in"):
+        Simulator(model, tmp_path / "none")
+
+
+@pytest.fixture
+def transport(model: list[str]) -> Iterator[Transport]:
+    with open_transport(f"pipe:{shlex.join(model)}") as opened:
+        yield opened
+
+
+def test_a_thread_runs_it_while_there_is_work(transport: Transport) -> None:
+    frames = [bytes([number]) * (number + 1) for number in range(200)]
+
+    def send() -> None:
+        for frame in frames:
+            transport.send(frame)
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    received = [transport.receive(60) for _ in frames]
+    sender.join()
+    assert [burst and burst.data for burst in received] == frames
+    assert transport.receive(0.01) is None
+
+
+def test_at_rest_it_sleeps_and_is_woken(model: list[str]) -> None:
+    events: list[Event] = []
+    with Simulator(model) as simulator, SimulatorTransport(lambda: simulator, observe=events.append) as transport:
+        wait_until(lambda: simulator.quiet >= 100_000)
+        cycle = simulator.cycle
+        time.sleep(0.2)
+        assert simulator.cycle == cycle
+        transport.send(b"wake")
+        assert (burst := transport.receive(60)) and burst.data == b"wake"
+        wait_until(lambda: len(events) == 2)
+        assert events == [Taken(cycle, cycle), burst]
+
+
+def test_idle_stepping(model: list[str]) -> None:
+    with (
+        Simulator(model) as simulator,
+        SimulatorTransport(lambda: simulator, Pace(rest_cycles=1, idle_seconds=0.01)),
+    ):
+        wait_until(lambda: simulator.quiet >= 10)
+        cycle = simulator.cycle
+        wait_until(lambda: simulator.cycle > cycle)
+
+
+def test_frames_that_are_not_taken_hold_the_sender(transport: Transport) -> None:
+    sent: list[int | str] = []
+
+    def send() -> None:
+        try:
+            for number in range(5):
+                transport.send(b"wait")
+                sent.append(number)
+        except TransportError as error:
+            sent.append(str(error))
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    wait_until(lambda: len(sent) == 2)
+    time.sleep(0.1)
+    assert sent == [0, 1]
+    transport.close()
+    sender.join()
+    assert sent == [0, 1, "the transport is closed"]
+
+
+def test_bursts_that_nobody_takes_hold_the_simulator(model: list[str]) -> None:
+    with SimulatorTransport(lambda: Simulator(model), Pace(most_bytes=1000, most_frames=100)) as transport:
+        for number in range(20):
+            transport.send(bytes([number]) * 300)
+        wait_until(lambda: transport.waiting_bytes == 1200)
+        time.sleep(0.1)
+        assert transport.waiting_bytes == 1200
+        assert [(burst := transport.receive(60)) and burst.data[0] for _ in range(20)] == list(range(20))
+
+
+def test_closing_wakes_who_waits(transport: Transport) -> None:
+    found: list[Burst | None] = []
+    receiver = threading.Thread(target=lambda: found.append(transport.receive()))
+    receiver.start()
+    time.sleep(0.05)
+    transport.close()
+    transport.close()
+    receiver.join()
+    assert found == [None]
+    with pytest.raises(TransportError, match="the transport is closed"):
+        transport.send(b"late")
+
+
+def test_the_end_of_the_simulator_is_told_to_both_sides(model: list[str]) -> None:
+    transport = SimulatorTransport(lambda: Simulator(model))
+    transport.send(b"right")
+    wait_until(lambda: transport.waiting_bytes == len(b"right"))
+    transport.send(b"die")
+    # What came before is there before it.
+    assert (burst := transport.receive(60)) and burst.data == b"right"
+    with pytest.raises(TransportError, match="status 3; it printed:\nthe model dies"):
+        transport.receive(60)
+    with pytest.raises(TransportError, match="status 3"):
+        transport.send(b"more")
+    with pytest.raises(TransportError, match="status 3"):
+        transport.receive(60)
+    transport.close()
+
+
+def test_another_simulator_takes_its_place_on_request(model: list[str]) -> None:
+    with SimulatorTransport(lambda: Simulator(model), Pace(restarts=1)) as transport:
+        transport.send(b"half")
+        with pytest.raises(TransportResetError, match="killed by signal 9"):
+            transport.receive(60)
+        transport.send(b"whole")
+        assert (burst := transport.receive(60)) and burst.data == b"whole"
+        transport.send(b"die")
+        with pytest.raises(TransportError, match="status 3") as caught:
+            transport.receive(60)
+        assert not isinstance(caught.value, TransportResetError)

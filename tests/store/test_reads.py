@@ -1,0 +1,44 @@
+"""Noting what is read."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from fusesoc_firm.store.own_code import PACKAGE
+
+# A process of its own, so that nothing has asked for Python's paths yet. Since Python 3.13, `sysconfig` opens files to
+# answer; here it does so in every version.
+PROGRAM = """
+import sys
+import sysconfig
+from fusesoc_firm.store.reads import Reads, noted
+
+asked = sysconfig.get_paths
+
+def get_paths(*arguments, **options):
+    open(sys.argv[1]).close()
+    return asked(*arguments, **options)
+
+sysconfig.get_paths = get_paths
+reads = Reads()
+with noted(reads):
+    open(sys.argv[2]).close()
+print(*reads.files)
+"""
+
+
+def test_what_noting_itself_reads_does_not_call_it_again(tmp_path: Path) -> None:
+    files = [tmp_path / "of_python", tmp_path / "of_the_user"]
+    for file in files:
+        file.touch()
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *files],
+        env={"PYTHONPATH": str(PACKAGE.parent)},
+        text=True,
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == (f"{files[1]}\n", "")

@@ -1,0 +1,96 @@
+"""A system on a board: its top level in simulation, and its bitstream."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.tools import manifest
+from fusesoc_firm.tools.programs import missing
+from tests.hdl.ghdl import REPOSITORY, Library
+from tests.system.simulated.systems import build, call
+
+OBSTACLE = REPOSITORY / "specs" / "obstacle"
+
+
+def _needs(*programs: str) -> pytest.MarkDecorator:
+    absent = missing(programs)
+    return pytest.mark.skipif(bool(absent), reason=f"not installed: {' '.join(absent)}")
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Library:
+    folder = tmp_path_factory.mktemp("board")
+    request = call(OBSTACLE / "obstacle.yaml", OBSTACLE / "stimuli.yaml", OBSTACLE / "model.py", board="icebreaker")
+    system = build(request, folder)
+    # It instantiates what is generated, so it is no file that could be read alone.
+    bench = folder / "board_tb.vhd"
+    bench.write_text((Path(__file__).parent / "board_tb.vhd.mustache").read_text(encoding="utf-8"), encoding="utf-8")
+    system.work.analyse([bench])
+    return system.work
+
+
+@pytest.mark.one_in(2)
+@pytest.mark.parametrize("pressed", [0, 300])
+def test_a_board_answers_over_its_serial_line(work: Library, pressed: int) -> None:
+    result = work.run("board_tb", {"PRESSED_CYCLES": pressed, "SEED": 5})
+    assert result.exit_code == 0, result.output
+    assert result.output.splitlines()[-1] == "PASS 19/19"
+
+
+def test_the_light_shows_a_broken_frame(work: Library, tmp_path: Path) -> None:
+    """A payload of one byte is no sensor_msgs/Range."""
+    (tmp_path / "stimulus.txt").write_text("> broken\n  00 01000000 00\n", encoding="ascii")
+    (tmp_path / "expected.txt").write_text("", encoding="ascii")
+    result = work.run("board_tb", {}, directory=tmp_path)
+    assert result.exit_code != 0
+    assert "frame_error(0) pulses" in result.output
+
+
+@pytest.mark.check
+@pytest.mark.parametrize(
+    "board",
+    [
+        pytest.param("icebreaker", marks=_needs("yosys", "nextpnr-ice40", "icepack")),
+        pytest.param("tangnano9k", marks=[_needs("yosys", "nextpnr-himbaechel", "gowin_pack"), pytest.mark.thorough]),
+        pytest.param("ulx3s", marks=[_needs("yosys", "nextpnr-ecp5", "ecppack"), pytest.mark.thorough]),
+    ],
+)
+def test_a_bitstream_is_the_same_again(tmp_path: Path, board: str) -> None:
+    builds = [_build(tmp_path / name, board) for name in ("first", "second")]
+    streams = [_bitstream(work) for work in builds]
+    assert streams[0] == streams[1]
+    assert len(streams[0]) > 100_000
+    # Made by the same tools, and both say so.
+    manifests = [manifest.read(work) for work in builds]
+    assert manifests[0] == manifests[1]
+    assert {"ghdl", "yosys"} < manifests[0].keys()
+    for report in (json.loads((work / "report.json").read_text(encoding="utf-8")) for work in builds):
+        assert all(clock["achieved"] >= clock["constraint"] for clock in report["fmax"].values())
+
+
+def _build(folder: Path, board: str) -> Path:
+    """The work folder of obstacle's bitstream."""
+    command = [sys.executable, "-m", "fusesoc.main", "run", "--setup", "--build", f"--build-root={folder}"]
+    done = subprocess.run(
+        [*command, f"--target={board}", "robot:sys:obstacle"],
+        cwd=REPOSITORY,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "FUSESOC_FIRM_CACHE": str(folder.parent / "store")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    (work,) = folder.glob(f"*/{board}")
+    return work
+
+
+def _bitstream(work: Path) -> bytes:
+    (stream,) = (path for path in work.iterdir() if path.suffix in (".bin", ".bit", ".fs"))
+    return stream.read_bytes()

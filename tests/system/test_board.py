@@ -1,0 +1,226 @@
+"""Boards: their files, the faults in them, and what becomes of a system on one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.system.boards.board import (
+    BOARD_TEMPLATE,
+    FLOWS,
+    Board,
+    board_configuration,
+    boards,
+    check_fits,
+    on_board,
+    read_board,
+)
+from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.derived.model import DerivedSystem
+from fusesoc_firm.system.written.specification import read_specification
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError
+from fusesoc_firm.text.render import render
+
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
+SPECIFICATION = """
+project: {{name: robot, clock: 100 MHz, scheduler: {scheduler}}}
+blocks:
+  - {{name: in, middleware: ROS, mode: subscriber, message: geometry_msgs/Point, outgoing: [{{name: out}}]}}
+  - {{name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point, period: 1 ms}}
+"""
+WITH_PINS = """\
+project: {name: robot, clock: 100 MHz}
+accelerators:
+  - name: copy
+    type: VHDL
+    sources: copy.vhd
+    interface:
+      input: [{middleware: ROS, message: geometry_msgs/Point}]
+      output: [{middleware: ROS, message: geometry_msgs/Point}]
+    pins: [{name: lamp, direction: out}]
+blocks:
+  - {name: in, middleware: ROS, mode: subscriber, message: geometry_msgs/Point, outgoing: [{name: block}]}
+  - {name: block, type: copy, outgoing: [{name: out}]}
+  - {name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point}
+"""
+BOARD = """
+description: A board
+flow: trellis
+clock: 25 MHz
+interconnect: uart
+pins:
+  - {port: clk, site: A1}
+  - {port: uart_rxd, site: A2}
+  - {port: uart_txd, site: A3}
+"""
+
+
+def on(tmp_path: Path, board: Board, scheduler: str = "edf_resources") -> DerivedSystem:
+    path = tmp_path / "spec.yaml"
+    path.write_text(SPECIFICATION.format(scheduler=scheduler), encoding="utf-8")
+    faults = Diagnostics()
+    specification = read_specification(path, path.name, faults)
+    return derive(on_board(specification, board), tmp_path, LIBRARIES, faults)
+
+
+def written(tmp_path: Path, text: str) -> Board:
+    (tmp_path / "board.yaml").write_text(text, encoding="utf-8")
+    return read_board("board.yaml", tmp_path)
+
+
+BOARDS = {name: read_board(name, Path()) for name in boards()}
+
+
+@pytest.mark.parametrize("name", [name for name, board in BOARDS.items() if board.is_linked])
+def test_every_board_takes_a_system(tmp_path: Path, name: str) -> None:
+    board = read_board(name, tmp_path)
+    system = on(tmp_path, board, "fixed_priority")
+    assert system.link is not None
+    assert system.link.kind.value == board.interconnect
+    configuration = board_configuration(system, board)
+    assert f"entity robot_{name} is" in render(BOARD_TEMPLATE, configuration)
+    form, _ = FLOWS[board.flow]
+    constraints = render(f"board/{form}", configuration)
+    for pin in board.pins:
+        assert pin.port in constraints
+        assert pin.site in constraints
+
+
+def test_times_are_those_of_the_boards_clock(tmp_path: Path) -> None:
+    """A millisecond is 12,000 cycles at 12 MHz."""
+    system = on(tmp_path, written(tmp_path, BOARD.replace("25 MHz", "12 MHz")), "fixed_priority")
+    assert [times.period for times in system.scheduling.times] == [12_000]
+
+
+def test_constraints_of_each_form(tmp_path: Path) -> None:
+    texts = {}
+    for flow, (form, _) in FLOWS.items():
+        board = written(tmp_path, BOARD.replace("trellis", flow) + "standard: LVCMOS33\n")
+        configuration = board_configuration(on(tmp_path, board, "fixed_priority"), board)
+        texts[form] = render(f"board/{form}", configuration).splitlines()
+    assert 'FREQUENCY PORT "clk" 25 MHZ;' in texts["lpf"]
+    assert 'LOCATE COMP "clk" SITE "A1";' in texts["lpf"]
+    assert 'IOBUF PORT "clk" IO_TYPE=LVCMOS33;' in texts["lpf"]
+    assert "set_io clk A1" in texts["pcf"]
+    assert "set_frequency clk 25" in texts["pcf"]
+    assert 'IO_LOC "clk" A1;' in texts["cst"]
+    assert 'IO_PORT "clk" IO_TYPE=LVCMOS33;' in texts["cst"]
+
+
+def test_a_board_of_spi(tmp_path: Path) -> None:
+    pins = "".join(f"  - {{port: spi_{name}, site: B{number}}}\n" for number, name in enumerate(["sclk", "cs_n"]))
+    text = BOARD.replace("uart\n", "spi\n").split("  - {port: uart_rxd")[0] + pins
+    with pytest.raises(InputError, match="the board has no pin for 'spi_miso'"):
+        written(tmp_path, text)
+    board = written(tmp_path, f"{text}  - {{port: spi_miso, site: C1}}\n  - {{port: spi_mosi, site: C2}}\n")
+    text = render(BOARD_TEMPLATE, board_configuration(on(tmp_path, board, "fixed_priority"), board))
+    assert "CLOCK_HZ" not in text
+    assert "spi_irq" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (BOARD.replace("{port: uart_rxd, site: A2}", "{port: led, site: A2}"), "the board has no pin for 'uart_rxd'"),
+        (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' has a pin already"),
+        (BOARD + "  - {port: Clk, site: A4}\n", "port 'Clk' has a pin already"),
+        (BOARD.replace("trellis", "ise"), "'flow' cannot be 'ise'"),
+        (BOARD.split("pins:", maxsplit=1)[0], "the board has no pin for 'clk'"),
+        (BOARD.replace("uart\n", "axi_stream\n"), "flow 'trellis' has no processor to take streams"),
+        (BOARD.replace("trellis", "vivado"), "flow 'vivado' takes streams"),
+        (BOARD.replace("trellis", "vivado"), "flow 'vivado' takes no pins"),
+        (BOARD.replace("trellis", "vivado"), "a board of flow 'vivado' needs the key 'part'"),
+        (BOARD.replace("trellis", "vivado"), "a board of flow 'vivado' needs the key 'processor'"),
+        (BOARD.replace("trellis", "quartus"), "a board of flow 'quartus' needs the key 'deviceFamily'"),
+        (BOARD + "processor: microblaze\n", "'processor' cannot be 'microblaze'"),
+        (BOARD.replace("clock: 25 MHz\n", ""), "a board needs the key 'clock'"),
+        (BOARD.replace("flow:", "flows:"), "did you mean 'flow'"),
+        ("", "board.yaml is empty; a board needs the keys"),
+    ],
+)
+def test_a_wrong_board_is_explained(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        written(tmp_path, text)
+
+
+def test_an_unknown_board_names_the_nearest(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"there is no board 'ulx3'[^?]*did you mean 'ulx3s'"):
+        read_board("ulx3", tmp_path)
+
+
+def test_a_preemptive_scheduler_does_not_fit_on_a_link(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot carry the bursts of scheduler 'lst'"):
+        on(tmp_path, written(tmp_path, BOARD), "lst")
+
+
+def with_pins(tmp_path: Path, board: Board, pins: str, block: str = "Block") -> DerivedSystem:
+    (tmp_path / "copy.vhd").write_text("entity copy is end;", encoding="ascii")
+    text = WITH_PINS.replace("{name: lamp, direction: out}", pins).replace("name: block", f"name: {block}")
+    (tmp_path / "spec.yaml").write_text(text, encoding="utf-8")
+    faults = Diagnostics()
+    specification = read_specification(tmp_path / "spec.yaml", "spec.yaml", faults)
+    return derive(on_board(specification, board), tmp_path, LIBRARIES, faults)
+
+
+def test_a_board_has_one_clock(tmp_path: Path) -> None:
+    board = written(tmp_path, BOARD + "  - {port: block_lamp, site: A4}\n")
+    text = WITH_PINS.replace("clock: 100 MHz", "clock: 100 MHz, clocks: [{name: fast, frequency: 200 MHz}]")
+    (tmp_path / "copy.vhd").write_text("entity copy is end;", encoding="ascii")
+    (tmp_path / "spec.yaml").write_text(text.replace("type: copy,", "type: copy, clock: fast,"), encoding="utf-8")
+    faults = Diagnostics()
+    specification = read_specification(tmp_path / "spec.yaml", "spec.yaml", faults)
+    system = derive(on_board(specification, board), tmp_path, LIBRARIES, faults)
+    with pytest.raises(InputError) as raised:
+        check_fits(system, board)
+    assert str(raised.value) == "error: board 'board' has no clock 'fast'\n      = a board has one clock, clk"
+
+
+PINS = "{name: Lamp, direction: out}, {name: level, direction: in, bits: 2}"
+
+
+@pytest.mark.parametrize("flow", FLOWS)
+def test_pins_of_accelerators_lead_to_sites(tmp_path: Path, flow: str) -> None:
+    """In the case that a netlist has, whatever the specification and the board say."""
+    places = {"BLOCK_lamp": "B1", "block_level[0]": "B2", "block_level[1]": "B3"}
+    text = BOARD.replace("trellis", flow) + "".join(
+        f"  - {{port: '{name}', site: {places[name]}}}\n" for name in places
+    )
+    board = written(tmp_path, text)
+    system = with_pins(tmp_path, board, PINS)
+    check_fits(system, board)
+    configuration = board_configuration(system, board)
+    top = [" ".join(line.split()) for line in render(BOARD_TEMPLATE, configuration).splitlines()]
+    assert "block_lamp : out std_logic;" in top
+    assert "block_level : in std_logic_vector(1 downto 0)" in top
+    assert {"block_lamp => block_lamp,", "block_level => block_level,"} <= set(top)
+    lines = render(f"board/{FLOWS[flow][0]}", configuration).splitlines()
+    for name, site in places.items():
+        (line,) = (line for line in lines if site in line)
+        assert name.lower() in line.replace('"', "")
+
+
+def test_pins_without_a_place_and_places_without_a_pin(tmp_path: Path) -> None:
+    board = written(tmp_path, BOARD + "  - {port: 'block_level[0]', site: B2}\n  - {port: block_lmp, site: B3}\n")
+    with pytest.raises(InputError) as raised:
+        check_fits(with_pins(tmp_path, board, PINS), board)
+    said = str(raised.value)
+    assert "spec.yaml:9:19: error: pin 'Lamp' of 'Block' has no place on board 'board'" in said
+    assert "give a board file of your own a '{port: block_lamp, site: ...}'" in said
+    assert "error: pin 'level' of 'Block' has no place on board 'board'" in said
+    assert "'{port: block_level[1], site: ...}'" in said
+    assert "error: nothing of the system is called 'block_lmp'" in said
+    assert "did you mean 'block_lamp'?" in said
+
+
+def test_a_pin_is_not_called_as_a_port_of_the_board(tmp_path: Path) -> None:
+    board = written(tmp_path, BOARD)
+    with pytest.raises(InputError, match="pin 'n' of 'led' is called 'led_n', as a port of every board may be"):
+        check_fits(with_pins(tmp_path, board, "{name: n, direction: out}", "led"), board)
+
+
+def test_a_clock_that_is_none(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="'clock' cannot be 'fast'"):
+        on(tmp_path, written(tmp_path, BOARD.replace("25 MHz", "fast")), "fixed_priority")

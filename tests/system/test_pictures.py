@@ -1,0 +1,115 @@
+"""What can be shown of a system: its diagram, its lines, and the grammar as a JSON Schema."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import jsonschema
+import pytest
+import yaml
+
+from fusesoc_firm.system.system_core import load_system
+from fusesoc_firm.system.views.diagram import diagram
+from fusesoc_firm.system.views.report import Report, report
+from fusesoc_firm.system.written.specification import Specification
+from fusesoc_firm.text.diagnostics import InputError
+from fusesoc_firm.text.yaml_schema import json_schema
+from fusesoc_firm.tools.pictures import picture
+from tests.system.systems import LIBRARIES, accelerator, converter, derived, instance, specification
+
+ROOT = Path(__file__).resolve().parents[2]
+SPECS = [path for path in sorted(ROOT.glob("specs/*/*.yaml")) if "blocks:" in path.read_text(encoding="utf-8")]
+BLOCKS = (
+    converter("sub", "subscriber", "Point", "acc", "copy")
+    + instance("acc", "mix", "pub")
+    + converter("pub", "publisher", "Vector3")
+    + converter("copy", "publisher", "Point")
+    + converter("image_in", "subscriber", "sensor_msgs/Image", "image_out")
+    + converter("image_out", "publisher", "sensor_msgs/Image")
+)
+TEXT = specification(BLOCKS, accelerator("mix", "Point", "Vector3"))
+
+needs_dot = pytest.mark.skipif(not shutil.which("dot"), reason="no dot; make test installs Graphviz")
+
+
+def test_the_diagram_has_every_block_and_connection(tmp_path: Path) -> None:
+    text = diagram(derived(tmp_path, TEXT))
+    edges = re.findall(r'"block (\w+)" -> "block (\w+)"', text)
+    assert edges == [("sub", "acc"), ("sub", "copy"), ("acc", "pub"), ("image_in", "image_out")]
+    for what in ("geometry_msgs/Point\n192 bits", "mix (VHDL)", "id 2", "streams of 8 bits", "streams: ", "ROS 1"):
+        assert what in text.replace("\\n", "\n"), what
+
+
+@needs_dot
+def test_the_picture_is_the_same_each_time(tmp_path: Path) -> None:
+    found = picture(diagram(derived(tmp_path, TEXT)), "svg")
+    assert found == picture(diagram(derived(tmp_path, TEXT)), "svg")
+    labels = [element.text for element in ET.fromstring(found).iter() if element.tag.endswith("}text")]
+    assert {"sub", "acc", "mix (VHDL)", "sensor_msgs/Image"} <= set(labels)
+
+
+def test_missing_graphviz_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InputError, match="apt install graphviz"):
+        picture(diagram(derived(tmp_path, TEXT)), "svg")
+
+
+def test_lines_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "spec.yaml"
+    path.write_text(f"# a comment\n\n{TEXT}", encoding="utf-8")
+    (tmp_path / "acc.vhd").touch()
+    found = report(path, load_system(path, LIBRARIES))
+    assert found.written == len(TEXT.splitlines())
+    assert found.wrappers == 0 < found.components < found.converters < found.generated
+    assert found.ratio == found.generated / found.written
+
+
+def test_a_report_is_a_table() -> None:
+    found = Report("robot", written=4, configuration=1, wrappers=2, converters=3, components=4)
+    assert (found.generated, found.ratio) == (10, 2.5)
+    assert str(found).splitlines()[-1].split() == ["generated", "for", "each", "line", "written", "2.50"]
+
+
+def test_a_wrapper_counts(tmp_path: Path) -> None:
+    path = ROOT / "specs" / "quat2euler" / "quat2euler_hls.yaml"
+    assert report(path, load_system(path, LIBRARIES)).wrappers > 0
+
+
+SCHEMA = json_schema(Specification, "title")
+
+
+def test_the_schema_is_one() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["$ref"] == "#/$defs/Specification"
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)
+def test_good_specifications_keep_to_the_schema(path: Path) -> None:
+    jsonschema.validate(yaml.safe_load(path.read_text(encoding="utf-8")), SCHEMA)
+
+
+def test_only_software_may_have_no_sources() -> None:
+    for kind, is_right in (("ROS-SW", True), ("VHDL", False), ("HLS", False)):
+        text = TEXT.replace("type: VHDL, sources: [acc.vhd]", f"type: {kind}")
+        assert jsonschema.Draft202012Validator(SCHEMA).is_valid(yaml.safe_load(text)) is is_right
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("project:", "projekt:"),
+        ("name: robot", "label: robot"),
+        ("mode: publisher", "mode: sender"),
+        ("type: VHDL", "type: Chisel"),
+        ("sources: [acc.vhd]", "sources: []"),
+        ("{name: robot}", "{name: robot, width: wide}"),
+        ("{name: robot}", "{name: robot, width: 24}"),
+    ],
+)
+def test_bad_specifications_do_not(before: str, after: str) -> None:
+    assert before in TEXT
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(yaml.safe_load(TEXT.replace(before, after)), SCHEMA)
