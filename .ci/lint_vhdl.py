@@ -25,8 +25,8 @@ from pathlib import Path
 import yaml
 
 from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.loop import loop_text
 
@@ -87,7 +87,7 @@ def write_skeletons() -> None:
 def write_loop() -> None:
     """Write the bench of `firm message verify`."""
     name = parse_name("sensor_msgs/LaserScan")
-    text = loop_text(frame_of(name, MessageLibrary(RosVersion.ROS2).closure(name)), 64)
+    text = loop_text(frame_of(name, MessageLibrary(ROS2).closure(name)), 64)
     SAMPLES.mkdir(parents=True, exist_ok=True)
     (SAMPLES / "loop.vhd").write_text(text, encoding="ascii")
 

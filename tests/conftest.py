@@ -21,6 +21,7 @@ import psutil
 import pytest
 from hypothesis import settings
 
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.tools.interrupts import accept_interrupts
 from tests.shared import SHARED
 
@@ -65,6 +66,11 @@ def pytest_configure(config: pytest.Config) -> None:
         # FuseSoC looks up a generator's interpreter there.
         os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)])
     os.environ.update({f"DASK_DISTRIBUTED__{name}": value for name, value in _QUIET_DASK.items()})
+
+
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """A middleware is called by its number in the names of tests."""
+    return str(val.number) if isinstance(val, Middleware) else None
 
 
 # Before cases are left out by their markers.

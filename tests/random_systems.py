@@ -19,8 +19,10 @@ import yaml
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.scheduling.policies import POLICIES
 
 # The longest payload that is stored, and how often a thing is done that may be done.
@@ -33,7 +35,7 @@ _MOST_INPUTS, _MOST_OUTPUTS, _MOST_SINKS = 2, 2, 3
 class Message:
     """A message, its fields at the top and whether all of its payloads have one size."""
 
-    ros: RosVersion
+    ros: Middleware
     name: MessageName
     fields: tuple[str, ...]
     is_fixed_size: bool
@@ -46,7 +48,7 @@ class Message:
     @property
     def keys(self) -> dict[str, Any]:
         """How a specification names it."""
-        return {"middleware": f"ROS{int(self.ros)}", "message": str(self.name)}
+        return {"middleware": f"ROS{self.ros.number}", "message": str(self.name)}
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,7 @@ def random_system(chance: random.Random, blocks: int, messages: int) -> RandomSy
 
 
 @cache
-def known_messages(ros: RosVersion) -> tuple[Message, ...]:
+def known_messages(ros: Middleware) -> tuple[Message, ...]:
     """Every message that an accelerator may be made of: those of services and such without fields are left out."""
     library = MessageLibrary(ros)
     found = []
@@ -101,7 +103,7 @@ class _Maker:
     def __init__(self, chance: random.Random, blocks: int, messages: int) -> None:
         self.chance = chance
         self.blocks = blocks
-        both = [*known_messages(RosVersion.ROS1), *known_messages(RosVersion.ROS2)]
+        both = [*known_messages(ROS1), *known_messages(ROS2)]
         names = chance.sample(sorted({message.name for message in both}), messages)
         # A message in one ROS version: a system has one entity of each name.
         self.messages = [chance.choice([message for message in both if message.name == name]) for name in names]

@@ -11,14 +11,14 @@ from typing import Any, TypeVar
 from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.message.bags import BAGS, Bag, Stream, open_bag
 from fusesoc_firm.message.joint import signature_of_text
-from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived.model import Topic, absolute_name
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
 AnyTopic = TypeVar("AnyTopic", bound=Topic)
-Message = tuple[RosVersion, MessageName]
+Message = tuple[Middleware, MessageName]
 
 
 @dataclass(frozen=True)
@@ -140,9 +140,9 @@ def _meant(topic: Topic) -> MessageName:
     return _present(topic.frame.message, topic.frame.ros)
 
 
-def _present(name: MessageName, ros: RosVersion) -> MessageName:
+def _present(name: MessageName, ros: Middleware) -> MessageName:
     """The present name of a message that may have had another one."""
-    return middleware_of(ros).aliases.get(name, name)
+    return ros.aliases.get(name, name)
 
 
 def _spelled(stream: Stream) -> str:

@@ -74,9 +74,9 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
     """The messages that the arguments mean."""
     from fusesoc_firm.message.library import MessageLibrary
-    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.message.middleware import middleware_of
 
-    return MessageLibrary(RosVersion(ros), arguments.path, environment=os.environ, store=arguments.distro)
+    return MessageLibrary(middleware_of(ros), arguments.path, environment=os.environ, store=arguments.distro)
 
 
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:

@@ -165,13 +165,13 @@ def _write_core(arguments: argparse.Namespace) -> None:
 
 
 def _write_node(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.message.middleware import middleware_of
     from fusesoc_firm.text.outputs import write
 
     loaded = load(arguments, needs_sources=False)
     folder: Path = arguments.output or Path(f"{loaded.system.name}_node")
     place = Place(folder, arguments.spec, arguments.path, core_folders)
-    ros = RosVersion(arguments.ros) if arguments.ros else None
+    ros = middleware_of(arguments.ros) if arguments.ros else None
     for path, text in LANGUAGES[arguments.language](loaded, ros, place).items():
         write(folder / path, text)
     print(folder)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.message.model import MIDDLEWARES
+from fusesoc_firm.message.middleware import MIDDLEWARES
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 from fusesoc_firm.text.naming import PREFIX_RULE, identifier, is_prefix
 from fusesoc_firm.text.yaml_sections import Section, key, read

@@ -14,8 +14,8 @@ from typing import Any
 
 from fusesoc_firm.converter.vhdl import vhdl_type, wrapped
 from fusesoc_firm.frame.model import COUNT_BYTES
-from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import Constant, MessageName, RosVersion, StringType, nested_message
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import Constant, MessageName, StringType, nested_message
 from fusesoc_firm.message.signature import Definitions, signature
 from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER
 from fusesoc_firm.text.naming import distinct_constants, entity_name, prefixed
@@ -50,9 +50,9 @@ class _Placed:
         return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
 
 
-def constants_package(name: MessageName, ros: RosVersion | None = None, prefix: str = "") -> str:
+def constants_package(name: MessageName, ros: Middleware | None = None, prefix: str = "") -> str:
     """`<prefix>_<pkg>_<type>_pkg`, or `..._ros<N>_pkg` where packages of both versions lie side by side."""
-    version = [] if ros is None else [f"ros{int(ros)}"]
+    version = [] if ros is None else [f"ros{ros.number}"]
     return prefixed(prefix, "_".join([entity_name(name.package, name.name), *version, "pkg"]))
 
 
@@ -99,9 +99,9 @@ def _collect(name: MessageName, definitions: Definitions, found: list[MessageNam
             _collect(nested, definitions, found)
 
 
-def _value(item: _Placed, name: str, ros: RosVersion) -> dict[str, Any]:
+def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
     """A number or a bool, as the bits that it has at a port."""
-    wire = middleware_of(ros).rules.scalars[str(item.constant.type)]
+    wire = ros.rules.scalars[str(item.constant.type)]
     digits = struct.pack(f">{wire.code}", item.constant.value).hex()
     is_bit = wire.bits == 1
     return {

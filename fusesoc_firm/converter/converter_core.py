@@ -19,7 +19,8 @@ from fusesoc_firm.converter.order import Order, Selection, order_of_config, orde
 from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.store.reads import Input
@@ -97,7 +98,7 @@ def order_of_request(request: Request) -> Order:
     if config is not None:
         return order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
     assert isinstance(ros, int) and isinstance(width, int)
-    library = MessageLibrary(RosVersion(ros), *library_sources(request))
+    library = MessageLibrary(middleware_of(ros), *library_sources(request))
     message, direction = str(request.parameters["message"]), str(request.parameters["direction"])
     selection = Selection(request.listed("include"), request.listed("exclude"))
     order = order_of_message(message, direction, width, library, selection)

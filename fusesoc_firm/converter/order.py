@@ -16,7 +16,8 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Paths, select
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
+from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import Definitions, signature
 from fusesoc_firm.store.reads import Input
@@ -43,7 +44,7 @@ class Wanted:
         return self.frame.message
 
     @property
-    def ros(self) -> RosVersion:
+    def ros(self) -> Middleware:
         """Whose message it is."""
         return self.frame.ros
 
@@ -105,7 +106,7 @@ def _check_no_selection(selection: Selection, text: str) -> None:
         fail(f"'{text}' is several messages, of which no fields can be selected", source, "name one of them instead")
 
 
-def order_of_config(path: Path, libraries: Mapping[RosVersion, MessageLibrary]) -> Order:
+def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) -> Order:
     """The converters that a configuration file lists. Raises `InputError` with all faults of the file."""
     faults = Diagnostics()
     config = read_config(path, faults)
@@ -119,7 +120,7 @@ def order_of_config(path: Path, libraries: Mapping[RosVersion, MessageLibrary]) 
 
 
 def _wanted(
-    entry: MessageInterfaces, libraries: Mapping[RosVersion, MessageLibrary], faults: Diagnostics
+    entry: MessageInterfaces, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Wanted | None:
     """The message of an item of the file; None if a fault was noted."""
     if not entry.type or not entry.name:
@@ -139,7 +140,7 @@ def _wanted(
 
 def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
     """Each message once, with all its interfaces."""
-    joined: dict[tuple[RosVersion, MessageName], Wanted] = {}
+    joined: dict[tuple[Middleware, MessageName], Wanted] = {}
     for wanted in messages:
         first = joined.get((wanted.ros, wanted.message))
         interfaces = dict(first.interfaces) if first else {}

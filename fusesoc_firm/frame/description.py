@@ -15,7 +15,7 @@ def description(frame: Frame) -> dict[str, Any]:
     length = length_of(frame)
     return {
         "message": str(frame.message),
-        "ros": int(frame.ros),
+        "ros": frame.ros.number,
         "prefix": frame.prefix.hex(),
         "trailing_bytes": frame.trailing_bytes,
         "payload_bytes": {

@@ -21,7 +21,6 @@ from fusesoc_firm.frame.model import (
     Step,
 )
 from fusesoc_firm.frame.position import Position
-from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import (
     ArrayType,
     DefaultValue,
@@ -43,7 +42,7 @@ Definitions = Mapping[MessageName, MessageDefinition]
 def frame_of(name: MessageName, definitions: Definitions) -> Frame:
     """The frame of message `name`; `definitions` holds it and every message below it."""
     definition = definitions[name]
-    rules = middleware_of(definition.ros).rules
+    rules = definition.ros.rules
     walk = _Walk(_Types(rules, definitions), Position(rules.max_alignment, frozenset({0})), size=len(rules.prefix))
     walk.message(definition, ())
     return Frame(

@@ -17,7 +17,8 @@ from enum import Enum
 from functools import cached_property
 from math import prod
 
-from fusesoc_firm.message.model import DefaultValue, MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import DefaultValue, MessageName
 from fusesoc_firm.message.wire import WireType
 from fusesoc_firm.text.diagnostics import SourceRef
 
@@ -177,7 +178,7 @@ class Frame:
     """
 
     message: MessageName
-    ros: RosVersion
+    ros: Middleware
     prefix: bytes
     checked_prefix: int
     nodes: tuple[Node, ...]

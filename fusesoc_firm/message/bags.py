@@ -25,8 +25,10 @@ from rosbags.rosbag2 import Reader as Rosbag2Reader
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_mcap import McapReader
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.joint import separate_texts
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.store.reads import in_part
 from fusesoc_firm.text.diagnostics import InputError, fail
@@ -54,9 +56,9 @@ class Form(Enum):
     MCAP = "mcap"
 
     @property
-    def ros(self) -> RosVersion:
+    def ros(self) -> Middleware:
         """Whose messages it holds."""
-        return RosVersion.ROS1 if self is Form.ROS1 else RosVersion.ROS2
+        return ROS1 if self is Form.ROS1 else ROS2
 
 
 class Stream(NamedTuple):
@@ -115,7 +117,7 @@ class Bag:
 class BagDefinitions:
     """What a bag says of messages: whose they are, and the texts of each by which the bag defines it."""
 
-    ros: RosVersion
+    ros: Middleware
     texts: Mapping[MessageName, tuple[str, ...]]
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, MutableMapping
 from dataclasses import dataclass
 
-from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
@@ -83,7 +82,7 @@ def _extent(definition: MessageDefinition, known: Mapping[MessageName, Extent]) 
     if len(definition.constants) > MOST_CONSTANTS:
         what = f"'{definition.name}' has {len(definition.constants)} constants"
         fail(what, definition.constants[MOST_CONSTANTS].source, f"legal here: up to {MOST_CONSTANTS}")
-    rules = middleware_of(definition.ros).rules
+    rules = definition.ros.rules
     extent = Extent(levels=1, bytes=0 if definition.fields else rules.empty_bytes)
     for field in definition.fields:
         extent = extent.joined(_of_type(field.type, rules, known))

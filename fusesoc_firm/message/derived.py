@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message import ROS1
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName
 from fusesoc_firm.message.parser import action_names, parse_message, parse_sections, service_names
 from fusesoc_firm.text.diagnostics import Diagnostics
 
@@ -51,7 +53,7 @@ class Interface:
 
     name: MessageName
     kind: InterfaceKind
-    ros: RosVersion
+    ros: Middleware
     has_events: bool
 
     def __str__(self) -> str:
@@ -67,12 +69,12 @@ class Interface:
     def exchanged(self) -> tuple[MessageName, ...]:
         """Those that the two ends exchange: all but the events, which ROS 2 itself publishes about a service."""
         events = {self._suffixed(suffix) for suffix in (*_ROS2_SERVICE_EVENT, *_ROS2_ACTION_EVENTS)}
-        return tuple(name for name in self.messages if self.ros is RosVersion.ROS1 or name not in events)
+        return tuple(name for name in self.messages if self.ros is ROS1 or name not in events)
 
     @property
     def has_signature(self) -> bool:
         """Whether its version of ROS gives it one: ROS 2 knows no hashes before events."""
-        return self.ros is RosVersion.ROS1 or self.has_events
+        return self.ros is ROS1 or self.has_events
 
     def parse(self, text: str, file: str, diagnostics: Diagnostics) -> dict[MessageName, MessageDefinition]:
         """Its messages, by the text of its file; every fault goes to `diagnostics`, what is right to the result."""
@@ -88,7 +90,7 @@ class Interface:
     @property
     def _wrappers(self) -> _Wrappers:
         is_action = self.kind is InterfaceKind.ACTION
-        if self.ros is RosVersion.ROS1:
+        if self.ros is ROS1:
             return _ROS1_ACTION if is_action else {}
         wrappers, events = (_ROS2_ACTION, _ROS2_ACTION_EVENTS) if is_action else ({}, _ROS2_SERVICE_EVENT)
         return {**wrappers, **events} if self.has_events else wrappers

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.naming import LONGEST_TEXT
 
 LARGEST_SIZE = 2**32 - 1  # the wire counts elements and characters in a uint32
@@ -28,11 +28,11 @@ class NameRule:
         """Whether all of `name` is legal."""
         return len(name) <= LONGEST_TEXT and self.pattern.fullmatch(name) is not None
 
-    def fault(self, name: str, ros: RosVersion) -> str:
+    def fault(self, name: str, title: str) -> str:
         """What is wrong with a name that is not accepted."""
         if len(name) > LONGEST_TEXT:
             return f"a {self.kind} has at most {LONGEST_TEXT} characters, not {len(name)}"
-        return f"'{name}' is not a legal {self.kind} in {ros.title}" if name else f"the {self.kind} is missing"
+        return f"'{name}' is not a legal {self.kind} in {title}" if name else f"the {self.kind} is missing"
 
     @property
     def hint(self) -> str:
@@ -44,7 +44,7 @@ class NameRule:
 class Dialect:
     """The rules of one version. `integer_ranges` hold the smallest and the largest value, both legal."""
 
-    ros: RosVersion
+    title: str
     package_name: NameRule
     message_name: NameRule
     field_name: NameRule
@@ -65,6 +65,9 @@ class Dialect:
     # ROS 1's string constant takes the rest of the line, `#` included.
     has_comments_behind_strings: bool
     smallest_array: int
+    # What stands between the name of a service and `Request`; and whether `pkg/msg/Type` is a type.
+    joint: str
+    has_long_types: bool
 
     @property
     def primitives(self) -> frozenset[str]:
@@ -98,7 +101,7 @@ _UPPER_CAMEL = re.compile(
 _UPPER_CAMEL_TEXT = "letters and digits and starts with a capital"
 
 ROS1 = Dialect(
-    ros=RosVersion.ROS1,
+    title="ROS 1",
     package_name=NameRule("package name", _ANY_CASE, _ANY_CASE_TEXT),
     message_name=NameRule("message name", _ANY_CASE, _ANY_CASE_TEXT),
     field_name=NameRule("field name", _ANY_CASE, _ANY_CASE_TEXT),
@@ -115,10 +118,12 @@ ROS1 = Dialect(
     has_quoted_strings=False,
     has_comments_behind_strings=False,
     smallest_array=0,
+    joint="",
+    has_long_types=False,
 )
 
 ROS2 = Dialect(
-    ros=RosVersion.ROS2,
+    title="ROS 2",
     package_name=NameRule("package name", _LOWER_SNAKE, _LOWER_SNAKE_TEXT),
     message_name=NameRule("message name", _UPPER_CAMEL, _UPPER_CAMEL_TEXT),
     field_name=NameRule("field name", _LOWER_SNAKE, _LOWER_SNAKE_TEXT),
@@ -138,9 +143,6 @@ ROS2 = Dialect(
     has_quoted_strings=True,
     has_comments_behind_strings=True,
     smallest_array=1,
+    joint="_",
+    has_long_types=True,
 )
-
-
-def dialect_of(ros: RosVersion) -> Dialect:
-    """The rules of a version."""
-    return ROS1 if ros is RosVersion.ROS1 else ROS2

@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES
-from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
+from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.text.files import read_regular
 
 # What catkin, colcon and ament leave out; colcon puts one into `build`, `install` and `log` itself.
@@ -43,10 +43,13 @@ def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_S
     return found
 
 
-def environment_folders(ros: RosVersion, environment: Mapping[str, str]) -> list[Path]:
-    """The folders that a sourced ROS names, in its own order of precedence; missing ones are skipped, as ROS does."""
-    if ros is RosVersion.ROS1:
-        return [path for path in _entries(environment.get("ROS_PACKAGE_PATH", "")) if path.is_dir()]
+def ros1_folders(environment: Mapping[str, str]) -> list[Path]:
+    """The folders that a sourced ROS 1 names, in its own order of precedence; missing ones are skipped, as ROS does."""
+    return [path for path in _entries(environment.get("ROS_PACKAGE_PATH", "")) if path.is_dir()]
+
+
+def ros2_folders(environment: Mapping[str, str]) -> list[Path]:
+    """Those of a sourced ROS 2."""
     prefixes = _entries(environment.get("AMENT_PREFIX_PATH", ""))
     return [share for prefix in prefixes if (share := prefix / "share").is_dir()]
 

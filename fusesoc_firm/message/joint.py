@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
 
 from fusesoc_firm.message.bounds import check_extents
-from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion, nested_message
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageDefinition, MessageName, nested_message
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.signature import signature
@@ -35,10 +35,10 @@ def separate_texts(name: MessageName, text: str) -> dict[MessageName, str]:
     return {name: first} | {parse_name(word): part for word, part in pairs}
 
 
-def signature_of_text(name: MessageName, text: str, ros: RosVersion) -> str | None:
+def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | None:
     """The signature of a message that is defined by such a text; None if that is faulty, or not all is there."""
     faults = Diagnostics()
-    parse = middleware_of(ros).parse
+    parse = ros.parse
     try:
         texts = separate_texts(name, text)
         definitions = {each: parse(part, each, ros, str(each), faults) for each, part in texts.items()}

@@ -14,17 +14,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
 from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files
-from fusesoc_firm.message.middleware import known_suffixes, middleware_of
-from fusesoc_firm.message.model import (
-    InterfaceKind,
-    MessageDefinition,
-    MessageName,
-    RosVersion,
-    nested_message,
-)
+from fusesoc_firm.message.middleware import Middleware, known_suffixes, middlewares
+from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, nested_message
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.unsupported import unsupported_word
 from fusesoc_firm.store.reads import Input, Part
@@ -60,14 +55,13 @@ class MessageLibrary:
 
     def __init__(
         self,
-        ros: RosVersion,
+        ros: Middleware,
         paths: Sequence[Path] = (),
         environment: Mapping[str, str] | None = None,
         store: str | None = None,
     ) -> None:
         self.ros = ros
-        self._middleware = middleware_of(ros)
-        self._store = self._middleware.store(store)
+        self._store = self.ros.store(store)
         self._places: list[Path] = []
         self._sources: dict[MessageName, _Source] = {}
         self._interfaces: dict[Interface, Path] = {}
@@ -75,7 +69,7 @@ class MessageLibrary:
         # A definition or None, with the faults of its text: a faulty file is reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
         self._extents: dict[MessageName, Extent] = {}
-        self._put_before(dict.fromkeys(paths), self._middleware.folders(environment) if environment is not None else [])
+        self._put_before(dict.fromkeys(paths), self.ros.folders(environment) if environment is not None else [])
 
     def before(self, paths: Mapping[Path, SourceRef | None]) -> MessageLibrary:
         """The same library with further folders and bags, each with its place, which go before all others.
@@ -168,7 +162,7 @@ class MessageLibrary:
     @cached_property
     def _has_events(self) -> bool:
         # Only if a service asks: whoever speaks the other ROS does without the time that a distribution takes to load.
-        return self.ros is RosVersion.ROS2 and (EVENT_INFO in self._messages or EVENT_INFO in self._store.names)
+        return self.ros is ROS2 and (EVENT_INFO in self._messages or EVENT_INFO in self._store.names)
 
     def _is_message(self, name: MessageName) -> bool:
         return name in self._sources or name in self._store.names
@@ -177,7 +171,7 @@ class MessageLibrary:
         """Take in what folders and bags hold; the user's `paths` go before `installed` ones, both before all else."""
         faults = Diagnostics()
         places = [*paths, *installed]
-        found = {place: interface_files(place, self._middleware.suffixes) for place in places}
+        found = {place: interface_files(place, self.ros.suffixes) for place in places}
         # New ones, since a copy of this library may have these.
         self._sources, self._interfaces, self._parsed = dict(self._sources), dict(self._interfaces), {}
         self._extents = {}
@@ -234,7 +228,7 @@ class MessageLibrary:
             if interface:
                 found = interface.parse(text, file, faults)
             else:
-                found = {name: self._middleware.parse(text, name, self.ros, file, faults)}
+                found = {name: self.ros.parse(text, name, self.ros, file, faults)}
         for each in interface.messages if interface else (name,):
             # One of a service's messages may come from a `.msg` file, which goes before the service.
             if self._sources.get(each) is source:
@@ -242,7 +236,7 @@ class MessageLibrary:
 
     def _check_equal(self, name: MessageName, source: _Source, file: str, faults: Diagnostics) -> None:
         """Note it if a bag's definitions of a message differ in what they mean."""
-        parsed = (self._middleware.parse(text, name, self.ros, file, Diagnostics()) for text in source.texts)
+        parsed = (self.ros.parse(text, name, self.ros, file, Diagnostics()) for text in source.texts)
         if len({to_text(definition) for definition in parsed}) > 1:
             faults.error(f"'{name}' is defined in several ways", SourceRef(file, 1, 1), "name the folder of one")
 
@@ -286,7 +280,7 @@ class MessageLibrary:
         same_type = [known for known in self.names() if known.name == name.name]
         if same_type:
             return str(same_type[0])
-        builtin_types = sorted(self._middleware.builtin_types)
+        builtin_types = sorted(self.ros.builtin_types)
         primitives = difflib.get_close_matches(name.name, builtin_types, n=1, cutoff=0.8)
         names = [str(known) for known in (*self.names(), *(interface.name for interface in self._interfaces))]
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
@@ -294,12 +288,12 @@ class MessageLibrary:
 
 def libraries(
     paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None
-) -> dict[RosVersion, MessageLibrary]:
+) -> dict[Middleware, MessageLibrary]:
     """A library of each middleware, for those who speak several.
 
     `store` is a distribution of one of them; the other keeps its default. Raises `InputError` as `MessageLibrary` does.
     """
-    known = {ros: middleware_of(ros).distributions() for ros in RosVersion}
+    known = {ros: ros.distributions() for ros in middlewares()}
     if store is not None and not any(store in names for names in known.values()):
         fail(f"'{store}' is not a distribution of ROS", hint=nearest(store, itertools.chain(*known.values())))
     return {

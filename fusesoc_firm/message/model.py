@@ -6,63 +6,14 @@ frozen, so a definition can be a dictionary key and can be shared.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 from fusesoc_firm.text.diagnostics import SourceRef
 
-
-class _Collected(type):
-    """Makes a class the collection of its objects, in the order of their numbers, as an enumeration is."""
-
-    known: dict[int, RosVersion]
-
-    def __iter__(cls) -> Iterator[RosVersion]:
-        return iter([cls.known[number] for number in sorted(cls.known)])
-
-    def __len__(cls) -> int:
-        return len(cls.known)
-
-    def __contains__(cls, number: object) -> bool:
-        return number in cls.known
-
-
-class RosVersion(int, metaclass=_Collected):
-    """A middleware by its number: 1 and 2 are the versions of ROS, `add` makes others.
-
-    It decides the legal types and the layout on the wire; `middleware` has the rules of each. As with an enumeration,
-    there is one object of each number, and a number that has none is a ValueError.
-    """
-
-    ROS1: ClassVar[RosVersion]
-    ROS2: ClassVar[RosVersion]
-    known: ClassVar[dict[int, RosVersion]] = {}
-    title: str
-
-    def __new__(cls, number: int) -> RosVersion:
-        """The middleware of this number."""
-        if number not in cls.known:
-            raise ValueError(f"there is no middleware {number}")
-        return cls.known[number]
-
-    @classmethod
-    def add(cls, number: int, title: str) -> RosVersion:
-        """A new middleware; people read the title in comments and messages."""
-        if number in cls.known:
-            raise ValueError(f"{number} is {cls.known[number].title}")
-        made = int.__new__(cls, number)
-        made.title = title
-        cls.known[number] = made
-        return made
-
-
-RosVersion.ROS1 = RosVersion.add(1, "ROS 1")
-RosVersion.ROS2 = RosVersion.add(2, "ROS 2")
-
-# What the files of users call a middleware; `middleware.register` enters the words.
-MIDDLEWARES: dict[str, RosVersion] = {}
+if TYPE_CHECKING:
+    from fusesoc_firm.message.middleware import Middleware
 
 
 class InterfaceKind(StrEnum):
@@ -186,7 +137,7 @@ class MessageDefinition:
     """
 
     name: MessageName
-    ros: RosVersion
+    ros: Middleware
     fields: tuple[Field, ...]
     constants: tuple[Constant, ...]
     source: SourceRef

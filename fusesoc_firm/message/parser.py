@@ -16,7 +16,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from fusesoc_firm.message.dialect import LARGEST_SIZE, Dialect, NameRule, dialect_of
+from fusesoc_firm.message.dialect import LARGEST_SIZE, Dialect, NameRule
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     Constant,
@@ -29,7 +30,6 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
     StringType,
 )
@@ -60,15 +60,21 @@ def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
     return InterfaceKind(kind) if kind else None, MessageName(package, name)
 
 
+def dialect_of(ros: Middleware) -> Dialect:
+    """The rules of a version's `.msg` files."""
+    assert ros.dialect is not None, f"{ros.title} has no .msg files"
+    return ros.dialect
+
+
 def parse_message(
-    text: str, name: MessageName, ros: RosVersion, file: str, diagnostics: Diagnostics
+    text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics
 ) -> MessageDefinition:
     """The definition in the text of a `.msg` file; every fault goes to `diagnostics`, what is right to the result."""
-    return _parse_lines(read_lines(text, file), name, dialect_of(ros), file, diagnostics)
+    return _parse_lines(read_lines(text, file), name, ros, file, diagnostics)
 
 
 def parse_sections(
-    text: str, names: Sequence[MessageName], ros: RosVersion, file: str, diagnostics: Diagnostics
+    text: str, names: Sequence[MessageName], ros: Middleware, file: str, diagnostics: Diagnostics
 ) -> list[MessageDefinition]:
     """The definitions in a `.srv` or `.action` file, whose sections are parted by `---`: one for each of `names`."""
     sections: list[list[Piece]] = [[]]
@@ -83,38 +89,34 @@ def parse_sections(
         diagnostics.error(
             f"{len(sections)} of {len(names)} sections found", SourceRef(file, 1, 1), f"'{_SEPARATOR}' parts sections"
         )
-    return [
-        _parse_lines(section, name, dialect_of(ros), file, diagnostics)
-        for section, name in zip(sections, names, strict=False)
-    ]
+    return [_parse_lines(section, name, ros, file, diagnostics) for section, name in zip(sections, names, strict=False)]
 
 
-def service_names(name: MessageName, ros: RosVersion) -> tuple[MessageName, ...]:
+def service_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
     """The names of a service's request and response, as the version calls them."""
     return _derived_names(name, ros, ("Request", "Response"))
 
 
-def action_names(name: MessageName, ros: RosVersion) -> tuple[MessageName, ...]:
+def action_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
     """The names of an action's goal, result and feedback, as the version calls them."""
     return _derived_names(name, ros, ("Goal", "Result", "Feedback"))
 
 
-def _derived_names(name: MessageName, ros: RosVersion, suffixes: Iterable[str]) -> tuple[MessageName, ...]:
-    joint = "" if ros is RosVersion.ROS1 else "_"
-    return tuple(MessageName(name.package, f"{name.name}{joint}{suffix}") for suffix in suffixes)
+def _derived_names(name: MessageName, ros: Middleware, suffixes: Iterable[str]) -> tuple[MessageName, ...]:
+    return tuple(MessageName(name.package, f"{name.name}{dialect_of(ros).joint}{suffix}") for suffix in suffixes)
 
 
 def _parse_lines(
-    lines: Iterable[Piece], name: MessageName, dialect: Dialect, file: str, diagnostics: Diagnostics
+    lines: Iterable[Piece], name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics
 ) -> MessageDefinition:
-    source = SourceRef(file, 1, 1)
+    source, dialect = SourceRef(file, 1, 1), dialect_of(ros)
     for rule, word in ((dialect.package_name, name.package), (dialect.message_name, name.name)):
         if not rule.accepts(word):
-            diagnostics.error(rule.fault(word, dialect.ros), source, rule.hint)
+            diagnostics.error(rule.fault(word, dialect.title), source, rule.hint)
     reader = _Reader(name, dialect, diagnostics)
     for line in lines:
         reader.read(line)
-    return MessageDefinition(name, dialect.ros, tuple(reader.fields), tuple(reader.constants), source)
+    return MessageDefinition(name, ros, tuple(reader.fields), tuple(reader.constants), source)
 
 
 class _Reader:
@@ -163,7 +165,7 @@ class _Reader:
             self._diagnostics.error(
                 f"unexpected '{default.text}' behind field '{name.text}'",
                 default.source,
-                f"{self._dialect.ros.title} has no default values; a constant is 'type NAME=value'",
+                f"{self._dialect.title} has no default values; a constant is 'type NAME=value'",
             )
             return None
         return None if field_type is None else read_default(default, field_type, self._dialect, self._diagnostics)
@@ -195,7 +197,7 @@ class _Reader:
             # A default such as `s "a=b"` ends up here: the reference takes the line for a constant, too.
             is_default = len(name.text.split()) > 1
             hint = "a line with '=' is a constant, even if the '=' is in quotes" if is_default else rule.hint
-            self._diagnostics.error(rule.fault(name.text, self._dialect.ros), name.source, hint)
+            self._diagnostics.error(rule.fault(name.text, self._dialect.title), name.source, hint)
             return False
         if first := self._first_line.get(name.text):
             self._diagnostics.error(f"'{name.text}' is declared twice", name.source, f"first in line {first}")
@@ -228,7 +230,7 @@ class _Reader:
     def _bound(self, piece: Piece) -> int | None:
         """The number behind `<=`, with which `piece` starts."""
         if not self._dialect.has_bounds:
-            self._diagnostics.error(f"{self._dialect.ros.title} has no bounds like '{piece.text}'", piece.source)
+            self._diagnostics.error(f"{self._dialect.title} has no bounds like '{piece.text}'", piece.source)
             return None
         return self._size(piece.part(2), smallest=1)
 
@@ -258,7 +260,7 @@ class _Reader:
 
     def _message_type(self, piece: Piece) -> MessageType | None:
         parts = piece.text.split("/")
-        if len(parts) == 3 and parts[1] == "msg" and self._dialect.ros is RosVersion.ROS2:
+        if len(parts) == 3 and parts[1] == "msg" and self._dialect.has_long_types:
             del parts[1]
         package, name = (self._package, parts[0]) if len(parts) == 1 else (parts[0], "/".join(parts[1:]))
         is_package = len(parts) == 1 or self._dialect.package_name.accepts(package)

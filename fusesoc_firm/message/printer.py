@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from fusesoc_firm.message.model import (
-    Constant,
-    DefaultValue,
-    MessageDefinition,
-    MessageName,
-    RosVersion,
-    Scalar,
-)
+from fusesoc_firm.message import ROS1
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import Constant, DefaultValue, MessageDefinition, MessageName, Scalar
 
 # What parts a message's text from those of the messages within it, in ROS' bags and connection headers.
 _SEPARATOR = "=" * 80
@@ -43,9 +38,9 @@ def _aligned(rows: Sequence[tuple[str, str, str]]) -> list[str]:
     return [f"{kind:{widths[0]}} {name:{widths[1]}} {value}".rstrip() for kind, name, value in rows]
 
 
-def _constant(constant: Constant, ros: RosVersion) -> str:
+def _constant(constant: Constant, ros: Middleware) -> str:
     # ROS 1's MD5 sum is one of the value's text, and must be the same for the printed message.
-    return constant.text if ros is RosVersion.ROS1 else _scalar(constant.value)
+    return constant.text if ros is ROS1 else _scalar(constant.value)
 
 
 def _default(value: DefaultValue | None) -> str:

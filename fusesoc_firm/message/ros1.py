@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from fusesoc_firm.message import dialect, folders, parser, signature, stores
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import InterfaceKind, MessageName, RosVersion
+from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.message.wire import INTEGER_AND_FLOAT, WireRules
 
 _uint32, _int32 = INTEGER_AND_FLOAT["uint32"], INTEGER_AND_FLOAT["int32"]
@@ -29,16 +29,18 @@ _RULES = WireRules(
 )
 
 MIDDLEWARE = Middleware(
-    ros=RosVersion.ROS1,
+    number=1,
+    title=dialect.ROS1.title,
     # ROS was once all there was.
     words=("ROS", "ROS1"),
     rules=_RULES,
     parse=parser.parse_message,
+    dialect=dialect.ROS1,
     signature=signature.md5,
     builtin_types=dialect.ROS1.builtin_types,
     suffixes={kind.value: kind for kind in InterfaceKind},
-    folders=partial(folders.environment_folders, RosVersion.ROS1),
-    distributions=partial(stores.distributions, RosVersion.ROS1),
-    store=partial(stores.DistributionStore, RosVersion.ROS1),
+    folders=folders.ros1_folders,
+    distributions=partial(stores.distributions, 1),
+    store=partial(stores.DistributionStore, 1),
     aliases=MappingProxyType({MessageName("tf", "tfMessage"): MessageName("tf2_msgs", "TFMessage")}),
 )

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from fusesoc_firm.message import dialect, folders, parser, signature, stores
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import InterfaceKind, RosVersion
+from fusesoc_firm.message.model import InterfaceKind
 from fusesoc_firm.message.wire import INTEGER_AND_FLOAT, WireRules
 
 _RULES = WireRules(
@@ -27,14 +27,16 @@ _RULES = WireRules(
 )
 
 MIDDLEWARE = Middleware(
-    ros=RosVersion.ROS2,
+    number=2,
+    title=dialect.ROS2.title,
     words=("ROS2",),
     rules=_RULES,
     parse=parser.parse_message,
+    dialect=dialect.ROS2,
     signature=signature.rihs01,
     builtin_types=dialect.ROS2.builtin_types,
     suffixes={kind.value: kind for kind in InterfaceKind},
-    folders=partial(folders.environment_folders, RosVersion.ROS2),
-    distributions=partial(stores.distributions, RosVersion.ROS2),
-    store=partial(stores.DistributionStore, RosVersion.ROS2),
+    folders=folders.ros2_folders,
+    distributions=partial(stores.distributions, 2),
+    store=partial(stores.DistributionStore, 2),
 )

@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
@@ -56,8 +55,7 @@ _ONLY_MEMBER = ("structure_needs_at_least_one_member", PrimitiveType("uint8"))
 
 def signature(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
     """The signature that the definitions' middleware has: `md5` and `rihs01` are those of ROS."""
-    ros = next(iter(definitions.values())).ros
-    return middleware_of(ros).signature(name, definitions, kind)
+    return next(iter(definitions.values())).ros.signature(name, definitions, kind)
 
 
 def md5(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:

@@ -7,16 +7,16 @@ from functools import cached_property
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.text.diagnostics import fail, nearest
 
 # The newest distributions with long-term support that FIRM's round trips are tested against.
-_DEFAULTS = {RosVersion.ROS1: "noetic", RosVersion.ROS2: "jazzy"}
+_DEFAULTS = {1: "noetic", 2: "jazzy"}
 _TRANSFORMS = "geometry_msgs/TransformStamped[] transforms\n"
 # What rosbags' tables lack of a version: messages of tf2 and tf, which every robot's bags hold.
 _ADDED = {
-    RosVersion.ROS1: {
+    1: {
         MessageName("tf2_msgs", "TFMessage"): _TRANSFORMS,
         MessageName("tf", "tfMessage"): _TRANSFORMS,
     }
@@ -25,13 +25,14 @@ _ADDED = {
 _NEXT_DEFINITION = "=" * 80
 
 
-def distributions(ros: RosVersion) -> list[str]:
+def distributions(version: int) -> list[str]:
     """The names of the distributions of a version, such as `jazzy`."""
-    return sorted(store.value.removeprefix(_prefix(ros)) for store in Stores if store.value.startswith(_prefix(ros)))
+    prefix = _prefix(version)
+    return sorted(store.value.removeprefix(prefix) for store in Stores if store.value.startswith(prefix))
 
 
-def _prefix(ros: RosVersion) -> str:
-    return f"ros{int(ros)}_"
+def _prefix(version: int) -> str:
+    return f"ros{version}_"
 
 
 class DistributionStore:
@@ -41,14 +42,14 @@ class DistributionStore:
     default values are lost, and ROS 1's `Header` is written in full. What the tables lack (`_ADDED`) is here, too.
     """
 
-    def __init__(self, ros: RosVersion, distribution: str | None = None) -> None:
-        """`distribution` is one of `distributions(ros)`; None takes the default. Raises `InputError` for another."""
-        chosen = _DEFAULTS[ros] if distribution is None else distribution
-        if chosen not in distributions(ros):
-            fail(f"'{chosen}' is not a distribution of {ros.title}", hint=nearest(chosen, distributions(ros)))
-        self._ros = ros
-        self.title = f"rosbags {_prefix(ros)}{chosen}"
-        self._name = f"{_prefix(ros)}{chosen}"
+    def __init__(self, version: int, distribution: str | None = None) -> None:
+        """`distribution` is one of `distributions`; None takes the default. Raises `InputError` for another."""
+        chosen = _DEFAULTS[version] if distribution is None else distribution
+        if chosen not in distributions(version):
+            fail(f"'{chosen}' is not a distribution of ROS {version}", hint=nearest(chosen, distributions(version)))
+        self._version = version
+        self.title = f"rosbags {_prefix(version)}{chosen}"
+        self._name = f"{_prefix(version)}{chosen}"
 
     @cached_property
     def _typestore(self) -> Typestore:
@@ -59,17 +60,17 @@ class DistributionStore:
         """All messages of the distribution."""
         names = {parse_name(name) for name in self._typestore.fielddefs} | self._added.keys()
         # rosbags keeps ROS 1's primitives `time` and `duration` as messages of ROS 2.
-        return frozenset(name for name in names if self._ros is RosVersion.ROS2 or name.package != "builtin_interfaces")
+        return frozenset(name for name in names if self._version == 2 or name.package != "builtin_interfaces")
 
     @property
     def _added(self) -> dict[MessageName, str]:
-        return _ADDED.get(self._ros, {})
+        return _ADDED.get(self._version, {})
 
     def text(self, name: MessageName) -> str:
         """The definition of one of `names` as `.msg` text."""
         if name in self._added:
             return self._added[name]
-        text, _ = self._typestore.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=int(self._ros))
+        text, _ = self._typestore.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=self._version)
         return text.partition(_NEXT_DEFINITION)[0]
 
     def file(self, name: MessageName) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.simulation.software import sent_elsewhere, taken_elsewhere, way_to
@@ -126,16 +126,16 @@ def _once(topics: Iterable[Topic]) -> list[Topic]:
 
 def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
     frame = topic.frame
-    if frame.ros not in (RosVersion.ROS1, RosVersion.ROS2):
+    if frame.ros not in (ROS1, ROS2):
         fail(f"'{topic.block}' is of {frame.ros.title}, which no node speaks", hint="a node speaks ROS 1 and ROS 2")
     definitions = loaded.libraries[frame.ros].closure(frame.message)
-    is_first = frame.ros is RosVersion.ROS1
+    is_first = frame.ros is ROS1
     name = frame.message
     return NodeTopic(
         topic.block,
         topic.ros_name,
         str(name) if is_first else f"{name.package}/{definitions[name].kind}/{name.name}",
-        int(frame.ros),
+        frame.ros.number,
         signature(name, definitions),
         topic.id if isinstance(topic, Converter) else None,
         closure_text(name, definitions) if is_first else "",

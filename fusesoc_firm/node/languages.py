@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fusesoc_firm.message.model import RosVersion
+    from fusesoc_firm.message.middleware import Middleware
     from fusesoc_firm.system.system_core import CoreFolders, LoadedSystem
 
 
@@ -25,13 +25,13 @@ class Place:
     core_folders: CoreFolders
 
 
-def _cpp(loaded: LoadedSystem, ros: RosVersion | None, _: Place) -> Mapping[str, str]:
+def _cpp(loaded: LoadedSystem, ros: Middleware | None, _: Place) -> Mapping[str, str]:
     from fusesoc_firm.node.package import cpp_package
 
     return cpp_package(loaded, ros)
 
 
-def _python(loaded: LoadedSystem, ros: RosVersion | None, place: Place) -> Mapping[str, str]:
+def _python(loaded: LoadedSystem, ros: Middleware | None, place: Place) -> Mapping[str, str]:
     from fusesoc_firm.node.source import python_node
     from fusesoc_firm.system.beside import sources_of
 
@@ -41,7 +41,7 @@ def _python(loaded: LoadedSystem, ros: RosVersion | None, place: Place) -> Mappi
     return python_node(loaded, ros, place.specification, place.folder, sources.paths)
 
 
-LANGUAGES: Mapping[str, Callable[[LoadedSystem, RosVersion | None, Place], Mapping[str, str]]] = {
+LANGUAGES: Mapping[str, Callable[[LoadedSystem, Middleware | None, Place], Mapping[str, str]]] = {
     "cpp": _cpp,
     "python": _python,
 }

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware, middleware_of
 from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
 from fusesoc_firm.node.software_process import software_ports
 from fusesoc_firm.request.request import GeneratedFile
@@ -57,7 +57,7 @@ def headers() -> list[Path]:
     return sorted(HEADERS.rglob("*.hpp"))
 
 
-def cpp_package(loaded: LoadedSystem, ros: RosVersion | None = None) -> dict[str, str]:
+def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str, str]:
     """The files of the node in C++, by path within the package.
 
     Raises `InputError` if the system's topics are not those of one version of ROS, or not of `ros` where it is given.
@@ -87,21 +87,22 @@ def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
     """The node as a part of the generated system; nothing for a system that no one node in C++ can serve."""
     system = loaded.system
     topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
-    spoken = {item.frame.ros for item in topics}
+    spoken = {item.frame.ros.number for item in topics}
     if len(spoken) != 1 or not spoken <= {*_DIALECTS}:
         return {}
     return {f"node/{path}": GeneratedFile(text, "user") for path, text in cpp_package(loaded).items()}
 
 
-def _only_version(description: NodeDescription, ros: RosVersion | None) -> int:
+def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
     """The version of ROS that all topics have. Raises `InputError`."""
     found = description.versions
     if len(found) > 1:
-        titles = " and ".join(RosVersion(version).title for version in found)
+        titles = " and ".join(middleware_of(version).title for version in found)
         fail(f"the topics of '{description.name}' are of {titles}, but a node in C++ speaks one of them")
-    if ros is not None and ros != found[0]:
+    if ros is not None and ros.number != found[0]:
+        title = middleware_of(found[0]).title
         hint = "the hardware is made for the bytes of one version: 'middleware' of blocks and interfaces says which"
-        fail(f"the topics of '{description.name}' are of {RosVersion(found[0]).title}, not of {ros.title}", hint=hint)
+        fail(f"the topics of '{description.name}' are of {title}, not of {ros.title}", hint=hint)
     return found[0]
 
 
@@ -119,7 +120,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
     """The table."""
     return {
         "name": description.name,
-        "ros": RosVersion(description.versions[0]).title,
+        "ros": middleware_of(description.versions[0]).title,
         "header": dialect.header,
         "middleware": dialect.middleware,
         "signature": dialect.signature,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.node.description import NodeDescription, NodeTopic, describe
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail
@@ -20,7 +20,7 @@ _TEMPLATE = "node/node.py"
 
 
 def python_node(
-    loaded: LoadedSystem, ros: RosVersion | None, specification: Path, folder: Path, paths: Sequence[Path] = ()
+    loaded: LoadedSystem, ros: Middleware | None, specification: Path, folder: Path, paths: Sequence[Path] = ()
 ) -> dict[str, str]:
     """The file, by its name in `folder`.
 
@@ -28,7 +28,7 @@ def python_node(
     are named as they lie from the folder. Raises `InputError` if the system has no topic of `ros`.
     """
     description = describe(loaded)
-    if ros is not None and int(ros) not in description.versions:
+    if ros is not None and ros.number not in description.versions:
         fail(f"system '{description.name}' has no topic of {ros.title}")
     has_software = any(block.type.accelerator.sources for block in loaded.system.software.blocks)
     name = f"{description.name}_node.py"

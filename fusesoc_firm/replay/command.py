@@ -15,7 +15,8 @@ from tqdm import tqdm
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
 from fusesoc_firm.message.bags import Bag, Form, Recorded, Stream, open_bag
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.transport.transport import TransportError
@@ -265,6 +266,6 @@ def _routes(
     return routes
 
 
-def _signatures(loaded: LoadedSystem, topics: Sequence[Topic]) -> dict[tuple[RosVersion, MessageName], str]:
+def _signatures(loaded: LoadedSystem, topics: Sequence[Topic]) -> dict[tuple[Middleware, MessageName], str]:
     frames = dict.fromkeys((item.frame.ros, item.frame.message) for item in topics)
     return {(ros, name): signature(name, loaded.libraries[ros].closure(name)) for ros, name in frames}

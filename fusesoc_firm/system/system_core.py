@@ -15,7 +15,8 @@ from fusesoc_firm.converter.converter_core import VHDL, constants_configurations
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import Definitions
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.store.reads import Input
@@ -79,7 +80,7 @@ class LoadedSystem:
 
     specification: Specification
     folder: Path
-    libraries: dict[RosVersion, MessageLibrary]
+    libraries: dict[Middleware, MessageLibrary]
     system: DerivedSystem
     board: Board | None = None
     warnings: tuple[Diagnostic, ...] = ()
@@ -107,7 +108,7 @@ class LoadedSystem:
 
 def load_system(
     path: Path,
-    libraries: dict[RosVersion, MessageLibrary],
+    libraries: dict[Middleware, MessageLibrary],
     *,
     needs_sources: bool = True,
     board: Board | None = None,
@@ -129,12 +130,12 @@ def load_system(
 
 
 def with_paths(
-    known: dict[RosVersion, MessageLibrary],
+    known: dict[Middleware, MessageLibrary],
     paths: Mapping[str, SourceRef | None],
     folder: Path,
     core_folders: CoreFolders,
     faults: Diagnostics,
-) -> dict[RosVersion, MessageLibrary]:
+) -> dict[Middleware, MessageLibrary]:
     """The libraries with the `paths` of a specification in `folder` before all else.
 
     Raises `InputError` with all `faults` if one of these paths is wrong, since unknown messages would follow from it.

@@ -9,7 +9,8 @@ from typing import Any
 
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_full_name
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.tools.workers import Workers
@@ -36,7 +37,7 @@ class Entry:
     """
 
     name: MessageName
-    ros: RosVersion
+    ros: Middleware
     result: Result
     statistics: Statistics | None = None
     same_as: MessageName | None = None

@@ -80,7 +80,7 @@ def _keep(entry: Entry, folder: Path | None) -> None:
     """Write the work folder of a message that failed."""
     if folder is None or not entry.result.files:
         return
-    below = folder / f"ros{int(entry.ros)}_{entry.name.package}_{entry.name.name}"
+    below = folder / f"ros{entry.ros.number}_{entry.name.package}_{entry.name.name}"
     below.mkdir(parents=True, exist_ok=True)
     for name, text in entry.result.files.items():
         (below / name).write_text(text, encoding="utf-8")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.model import (
     ArrayType,
     ElementType,
@@ -16,7 +17,6 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
     StringType,
 )
@@ -48,7 +48,7 @@ def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefin
 def with_wide_arrays(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
     """The same of ROS 2 with `uint32[]` in place of each wstring: the units of UTF-16, in 32 bits each."""
     field = Field(_UNITS, SequenceType(PrimitiveType("uint32")), _PLACE)
-    made = {_WIDE: MessageDefinition(_WIDE, RosVersion.ROS2, (field,), (), _PLACE)}
+    made = {_WIDE: MessageDefinition(_WIDE, ROS2, (field,), (), _PLACE)}
     for name, definition in definitions.items():
         fields = tuple(replace(field, type=_without_wide(field.type), default=None) for field in definition.fields)
         made[name] = replace(definition, fields=fields)

@@ -10,7 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from fusesoc_firm.frame.codec import MessageValue
-from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message import ROS2
+from fusesoc_firm.message.model import MessageDefinition, MessageName
 from fusesoc_firm.verify import genpy_judge, mcap_judge, rosbags_judge
 from fusesoc_firm.verify.definitions import NoJudgementError, with_wide_arrays, with_wide_units
 
@@ -32,7 +33,7 @@ def judge(name: MessageName, definitions: Definitions, values: Sequence[MessageV
     Raises:
         NoJudgementError: no installed serialiser can read the message, or two of them disagree.
     """
-    if definitions[name].ros is RosVersion.ROS2:
+    if definitions[name].ros is ROS2:
         return _judge_ros2(name, definitions, values)
     refusals = []
     for title, serialise in ros1_judges():

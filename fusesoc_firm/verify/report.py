@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm import __version__
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware, middlewares
 from fusesoc_firm.text.outputs import write
 from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.campaign import Entry, Settings
@@ -55,7 +55,7 @@ class Report:
 
 def make_report(entries: Iterable[Entry], settings: Settings, seconds: float) -> Report:
     """A report with its entries in the order of names and the versions of what judged them."""
-    ordered = tuple(sorted(entries, key=lambda entry: (entry.ros, entry.name)))
+    ordered = tuple(sorted(entries, key=lambda entry: (entry.ros.number, entry.name)))
     tools = {"fusesoc-firm": __version__, "GHDL": ghdl_version(), "Python": platform.python_version(), **versions()}
     return Report(ordered, settings, round(seconds, 1), tools)
 
@@ -85,7 +85,7 @@ def as_data(report: Report) -> dict[str, Any]:
 
 def _entry(entry: Entry) -> dict[str, Any]:
     result = entry.result
-    found: dict[str, Any] = {"name": str(entry.name), "ros": int(entry.ros)}
+    found: dict[str, Any] = {"name": str(entry.name), "ros": entry.ros.number}
     if entry.statistics:
         found |= {name: int(value) for name, value in vars(entry.statistics).items()}
     if entry.same_as:
@@ -106,7 +106,7 @@ def _entry(entry: Entry) -> dict[str, Any]:
 def as_html(report: Report) -> str:
     """The report as a page that needs no other file."""
     settings = report.settings
-    versions_of_ros = [ros for ros in RosVersion if any(entry.ros is ros for entry in report.entries)]
+    versions_of_ros = [ros for ros in middlewares() if any(entry.ros is ros for entry in report.entries)]
     return render(
         _TEMPLATE,
         {
@@ -128,7 +128,7 @@ def as_html(report: Report) -> str:
     )
 
 
-def _groups(entries: Sequence[Entry], versions_of_ros: Sequence[RosVersion]) -> list[tuple[str, list[Entry]]]:
+def _groups(entries: Sequence[Entry], versions_of_ros: Sequence[Middleware]) -> list[tuple[str, list[Entry]]]:
     """The rows of the table of totals: all, and each level, of each version."""
     rows = []
     for ros in versions_of_ros:
@@ -153,7 +153,7 @@ def _table(title: str, verdict: Verdict, entries: Sequence[Entry]) -> dict[str, 
             rows.append(
                 {
                     "name": f"{entry.name}{same}",
-                    "ros": int(entry.ros),
+                    "ros": entry.ros.number,
                     "level": int(entry.statistics.level) if entry.statistics else "",
                     "detail": entry.result.detail,
                 }
@@ -180,7 +180,7 @@ def histogram(values: Sequence[int], first: int, step: int, most: int) -> Histog
     )
 
 
-def _figures(entries: Sequence[Entry], ros: RosVersion) -> list[dict[str, Any]]:
+def _figures(entries: Sequence[Entry], ros: Middleware) -> list[dict[str, Any]]:
     """Figures 5.8 to 5.10 of the dissertation, of one version."""
     known = [entry.statistics for entry in entries if entry.ros is ros and entry.statistics]
     figures = (

@@ -13,6 +13,8 @@ from rosbags.typesys.base import normalize_fieldname
 from rosbags.typesys.store import Typestore
 
 from fusesoc_firm.frame.codec import MessageValue
+from fusesoc_firm.message import ROS1
+from fusesoc_firm.message.middleware import Middleware, middlewares
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
@@ -20,7 +22,6 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
 )
 from fusesoc_firm.verify.definitions import NoJudgementError, plain_text
@@ -43,11 +44,11 @@ def serialise(
     """The payload of each value; the padding of CDR is zero. Raises `NoJudgementError` if rosbags cannot read it."""
     ros = definitions[name].ros
     texts = {other: plain_text(definition) for other, definition in definitions.items()}
-    if ros is RosVersion.ROS1:
+    if ros is ROS1:
         texts |= dict.fromkeys(_TIMES.values(), _TIME_TEXT)
     with _lock:
         store = _stores[ros].holding(texts)
-        write = store.serialize_ros1 if ros is RosVersion.ROS1 else store.serialize_cdr
+        write = store.serialize_ros1 if ros is ROS1 else store.serialize_cdr
         return [bytes(write(_message(store, name, definitions, value), _long(name))) for value in values]
 
 
@@ -72,7 +73,7 @@ class _Store:
         return self._store
 
 
-_stores = {ros: _Store() for ros in RosVersion}
+_stores = {ros: _Store() for ros in middlewares()}
 _lock = threading.Lock()
 
 
@@ -96,7 +97,7 @@ def _argument(
     store: Typestore,
     type_: FieldType,
     definitions: Mapping[MessageName, MessageDefinition],
-    ros: RosVersion,
+    ros: Middleware,
     value: Any,
 ) -> Any:
     match type_:
@@ -121,7 +122,7 @@ def _time(store: Typestore, name: str, value: MessageValue) -> object:
     )
 
 
-def _dtype(name: str, ros: RosVersion) -> np.dtype[Any]:
+def _dtype(name: str, ros: Middleware) -> np.dtype[Any]:
     if name == "byte":
-        return np.dtype("i1" if ros is RosVersion.ROS1 else "u1")
+        return np.dtype("i1" if ros is ROS1 else "u1")
     return np.dtype({"char": "u1", "bool": "?"}.get(name, name))

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from itertools import chain, cycle, islice
 from typing import Any
 
+from fusesoc_firm.message import ROS1
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
@@ -16,7 +18,6 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
     StringType,
 )
@@ -52,7 +53,7 @@ class Stimuli:
     """
 
     definitions: Mapping[MessageName, MessageDefinition]
-    ros: RosVersion
+    ros: Middleware
     chance: random.Random
     longest: int = 4
     _sizes: dict[MessageName, int] = field(default_factory=dict, compare=False, repr=False)
@@ -115,7 +116,7 @@ class Stimuli:
         return self._plain(name) == "uint8"
 
     def _plain(self, name: str) -> str:
-        byte = "int8" if self.ros is RosVersion.ROS1 else "uint8"
+        byte = "int8" if self.ros is ROS1 else "uint8"
         return {"byte": byte, "char": "uint8"}.get(name, name)
 
     def _count(self, bound: int | None, kind: str, most: int) -> int:

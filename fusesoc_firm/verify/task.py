@@ -14,7 +14,8 @@ from fusesoc_firm.converter.converter_core import publisher_files, subscriber_fi
 from fusesoc_firm.frame.codec import CodecError, MessageValue, encode, pack_frame, used_bytes
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageDefinition, MessageName
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.verify.definitions import NoJudgementError
 from fusesoc_firm.verify.judge import judge
@@ -48,13 +49,13 @@ class Task:
     keeps_files: bool = False
 
     @property
-    def ros(self) -> RosVersion:
+    def ros(self) -> Middleware:
         """The version of ROS that the message is of."""
         return self.definitions[self.name].ros
 
     def chance(self) -> random.Random:
         """The randomness of this message, the same in whatever company it is verified."""
-        return random.Random(f"{self.seed} {self.name} {int(self.ros)}")
+        return random.Random(f"{self.seed} {self.name} {self.ros.number}")
 
 
 @dataclass(frozen=True)

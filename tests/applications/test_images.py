@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.derived.analysis import derive
 from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics
@@ -198,7 +198,7 @@ def test_one_word_is_another_policy(tmp_path: Path) -> None:
     for policy in ("fixed_priority_preemptive", "round_robin", "edf_latency"):
         spec.write_text(re.sub(r"scheduler: \w+", f"scheduler: {policy}", text), encoding="utf-8")
         faults = Diagnostics()
-        libraries = {ros: MessageLibrary(ros) for ros in RosVersion}
+        libraries = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
         found = derive(read_specification(spec, spec.name, faults), spec.parent, libraries, faults).scheduling
         assert (found.policy, found.is_preemptive) == (policy, policy != "round_robin")
         assert [times.period for times in found.times] == [1_000_000, 2_500_000, 3_333_333]

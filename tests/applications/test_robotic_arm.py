@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 import yaml
 
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.request.request import Plain
 from fusesoc_firm.verify.stimuli import TYPICAL, Stimuli
 from tests.applications.applications import SPECS, for_ros2, simulation
@@ -91,8 +92,8 @@ def test_the_state_as_franka_ros_publishes_it(tmp_path: Path) -> None:
     """The same answers to franka_msgs/FrankaState: our states within messages whose other fields are at random."""
     print(f"seed {SEED}")
     name = MessageName("franka_msgs", "FrankaState")
-    closure = MessageLibrary(RosVersion.ROS1, [ARM / "franka_msgs"]).closure(name)
-    draw = Stimuli(closure, RosVersion.ROS1, random.Random(SEED))
+    closure = MessageLibrary(ROS1, [ARM / "franka_msgs"]).closure(name)
+    draw = Stimuli(closure, ROS1, random.Random(SEED))
     messages = []
     for stimulus in states(6):
         state = stimulus["state"]

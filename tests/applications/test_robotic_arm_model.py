@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import md5
 from tests import corpus
 
@@ -154,7 +155,7 @@ def test_the_model_and_the_hardware_have_the_same_parameters() -> None:
 
 
 def md5_of(folder: Path) -> str:
-    return md5(STATE, MessageLibrary(RosVersion.ROS1, [folder]).closure(STATE))
+    return md5(STATE, MessageLibrary(ROS1, [folder]).closure(STATE))
 
 
 def test_the_state_has_the_fields_of_franka_ros() -> None:

@@ -18,9 +18,11 @@ from rosbags.typesys import Stores, get_typestore
 from fusesoc_firm.bags.routes import routes_of
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.bags import open_bag
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
@@ -35,11 +37,11 @@ POINT, VECTOR, STRING = "geometry_msgs/msg/Point", "geometry_msgs/msg/Vector3", 
 Recording = tuple[str, str, float, int]
 
 
-def version(kind: str) -> RosVersion:
-    return RosVersion.ROS1 if kind == "ros1" else RosVersion.ROS2
+def version(kind: str) -> Middleware:
+    return ROS1 if kind == "ros1" else ROS2
 
 
-def subscriber(block: str, message: str, ros: RosVersion, number: int = 0, topic: str = "") -> Converter:
+def subscriber(block: str, message: str, ros: Middleware, number: int = 0, topic: str = "") -> Converter:
     name = parse_name(message)
     return Converter(block, frame_of(name, MessageLibrary(ros).closure(name)), number, given_name=topic)
 
@@ -117,13 +119,13 @@ def test_a_damaged_bag(tmp_path: Path, kind: str, share: float) -> None:
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", version(kind))])
 
 
-@pytest.mark.parametrize(("kind", "ros"), [("ros1", RosVersion.ROS2), ("mcap", RosVersion.ROS1)])
-def test_a_bag_of_the_other_version(tmp_path: Path, kind: str, ros: RosVersion) -> None:
+@pytest.mark.parametrize(("kind", "ros"), [("ros1", ROS2), ("mcap", ROS1)])
+def test_a_bag_of_the_other_version(tmp_path: Path, kind: str, ros: Middleware) -> None:
     path = write(tmp_path, kind, [("/p", POINT, 1.0, 0), ("/q", POINT, 1.0, 0)])
     with pytest.raises(InputError) as raised:
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", ros)])
     assert str(raised.value).splitlines() == [
-        f"error: topic /{topic} of {path} is of ROS {version(kind)}, but 'p' speaks ROS {ros}" for topic in "pq"
+        f"error: topic /{topic} of {path} is of {version(kind).title}, but 'p' speaks {ros.title}" for topic in "pq"
     ]
 
 
@@ -150,12 +152,12 @@ def test_a_bag_without_a_message_for_anybody(tmp_path: Path, kind: str) -> None:
 def test_what_is_no_bag(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"This is no bag, whatever it is called.\n" * 10)
     with pytest.raises(InputError, match=r"is not a bag that can be read: .*\n +=? .*YAML"):
-        read_stimuli(tmp_path / name, [subscriber("p", "geometry_msgs/Point", RosVersion.ROS1)])
+        read_stimuli(tmp_path / name, [subscriber("p", "geometry_msgs/Point", ROS1)])
 
 
 def test_a_folder_that_is_no_bag(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is not a bag that can be read"):
-        read_stimuli(tmp_path, [subscriber("p", "geometry_msgs/Point", RosVersion.ROS1)])
+        read_stimuli(tmp_path, [subscriber("p", "geometry_msgs/Point", ROS1)])
 
 
 # --- bags as recorders leave them ------------------------------------------------------------------------------------
@@ -288,7 +290,7 @@ def test_a_topic_whose_definition_or_sum_is_ours(tmp_path: Path, digest: str, te
         connection = writer.add_connection("/p", POINT, msgdef=text, md5sum=digest)
         writer.write(connection, 0, bytes(24))
     name = parse_name("geometry_msgs/Point")
-    ours = signature(name, MessageLibrary(RosVersion.ROS1).closure(name))
+    ours = signature(name, MessageLibrary(ROS1).closure(name))
     assert routed(tmp_path / "a.bag", "ros1", ours) == [""]
 
 
@@ -310,7 +312,7 @@ def test_a_topic_that_nobody_takes(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("theirs", ["tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"])
 def test_transforms_under_either_name_of_their_message(tmp_path: Path, ours: str, theirs: str) -> None:
     store = typestore(Stores.ROS1_NOETIC)
-    taker = subscriber("transforms", ours, RosVersion.ROS1, topic="/tf")
+    taker = subscriber("transforms", ours, ROS1, topic="/tf")
     payload = encode(taker.frame, {"transforms": []})
     with Rosbag1Writer(tmp_path / "drive.bag") as writer:
         connection = writer.add_connection("/tf", theirs, typestore=store)
@@ -320,11 +322,11 @@ def test_transforms_under_either_name_of_their_message(tmp_path: Path, ours: str
     assert (route.misfit, route.subscribers) == ("", (taker,))
     assert stream.signature == "94810edda583a504dfda3829e70d7eec"
     # By its type alone, too.
-    (found,) = read_stimuli(tmp_path / "drive.bag", [subscriber("transforms", ours, RosVersion.ROS1)])
+    (found,) = read_stimuli(tmp_path / "drive.bag", [subscriber("transforms", ours, ROS1)])
     assert found.payload == payload
 
 
-def signatures_of(topics: Iterable[Converter]) -> dict[tuple[RosVersion, MessageName], str]:
+def signatures_of(topics: Iterable[Converter]) -> dict[tuple[Middleware, MessageName], str]:
     names = [topic.frame.message for topic in topics]
-    library = MessageLibrary(RosVersion.ROS1)
-    return {(RosVersion.ROS1, name): signature(name, library.closure(name)) for name in names}
+    library = MessageLibrary(ROS1)
+    return {(ROS1, name): signature(name, library.closure(name)) for name in names}

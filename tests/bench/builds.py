@@ -10,8 +10,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.tools.library_path import library_root
 from tests.bench.systems import processor_time
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
@@ -71,7 +71,7 @@ def measure(tell: Tell) -> list[Table]:
 
 def write_library(folder: Path, cores: int) -> None:
     """A library of so many cores, which have all the converters generated."""
-    names = [str(name) for name in MessageLibrary(RosVersion.ROS2).names()][: CONVERTERS // len(WIDTHS)]
+    names = [str(name) for name in MessageLibrary(ROS2).names()][: CONVERTERS // len(WIDTHS)]
     wanted = [(name, width) for width in WIDTHS for name in names]
     (folder / "fusesoc.conf").write_text(
         f"[library.firm]\nlocation = {library_root()}\n[library.bench]\nlocation = library\n"

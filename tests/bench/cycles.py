@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import middleware_of
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, NotConvertedError
 from tests.bench.model import (
     PUBLISHER_ID,
@@ -150,7 +150,7 @@ def _ends(valid: Sequence[int], streams: Sequence[tuple[int, int, int]], count: 
 
 def _latency(converter: Converter, seed: int, folder: Path) -> tuple[str, ...]:
     source = random.Random(seed)
-    payloads = Payloads(RosVersion(converter.ros), converter.message)
+    payloads = Payloads(middleware_of(converter.ros), converter.message)
     data = [payloads.draw(source) for _ in range(MESSAGES)]
     found = cycles_of(_model(converter, folder), converter.width, folder, payloads, *data)
     slowest = max(found, key=lambda each: (each.beat_cycles, each.message_cycles))
@@ -163,7 +163,7 @@ def _image(converter: Converter, seed: int, folder: Path) -> tuple[str, ...]:
     source = np.random.default_rng(seed)
     height, width = _SIZE
     pixels = source.integers(0, 256, height * width * _PIXEL_BYTES, dtype=np.uint8)
-    payloads = Payloads(RosVersion(converter.ros), converter.message)
+    payloads = Payloads(middleware_of(converter.ros), converter.message)
     model = _model(converter, folder)
     given = {"height": height, "width": width, "step": width * _PIXEL_BYTES, "encoding": "rgb8", "data": pixels}
     found = {}

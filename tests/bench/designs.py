@@ -11,8 +11,9 @@ from fusesoc_firm.converter.converter_core import publisher_files, subscriber_fi
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.text.diagnostics import InputError
 from tests.hdl.ghdl import REPOSITORY, Library, core_files
@@ -60,8 +61,8 @@ class Converter:
 
     def frame(self) -> Frame:
         """The message's frame."""
-        ros, name = RosVersion(self.ros), parse_name(self.message)
-        library = MessageLibrary(ros, [_FURTHER] if ros is RosVersion.ROS1 else [])
+        ros, name = middleware_of(self.ros), parse_name(self.message)
+        library = MessageLibrary(ros, [_FURTHER] if ros is ROS1 else [])
         frame = frame_of(name, library.closure(name))
         return select(frame, dict.fromkeys(self.include)) if self.include else frame
 

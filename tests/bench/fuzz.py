@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import islice, zip_longest
 from pathlib import Path
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import middleware_of
 from tests.bench.designs import SUBSCRIBER, Converter, NotConvertedError
 from tests.bench.model import FrameError, Message, ModelError, Subscriber, subscriber_model
 from tests.bench.payloads import BrokenPayloadError, Payloads
@@ -94,7 +94,7 @@ def measure(seed: int, tell: Tell, broken: int = BROKEN_FRAMES) -> list[Table]:
 def fuzz(converter: Converter, folder: Path, broken: int, seed: int, tell: Tell) -> Tally:
     """Send frames until `broken` of them were broken; raises `NotConvertedError`."""
     model = subscriber_model(converter, folder)
-    frames = troubled_frames(Payloads(RosVersion(converter.ros), converter.message), converter.width, seed)
+    frames = troubled_frames(Payloads(middleware_of(converter.ros), converter.message), converter.width, seed)
     total = Tally()
     while total.broken < broken and not total.fault:
         batch = [*islice(frames, min(BATCH, 2 * (broken - total.broken) + 2))]

@@ -1,6 +1,6 @@
 """Payloads of a message and what its ports must show, judged by the types that rosbags knows and by no code of ours.
 
-    payloads = Payloads(RosVersion.ROS2, "sensor_msgs/Image")
+    payloads = Payloads(ROS2, "sensor_msgs/Image")
     payload = payloads.draw(random.Random(7))        # rosbags serialises it
     payloads.shown(payload)                          # {"height": b"...", "encoding_axis": b"...", ...}
 
@@ -21,12 +21,13 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.base import normalize_fieldname
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 
-_STORES = {RosVersion.ROS1: Stores.ROS1_NOETIC, RosVersion.ROS2: Stores.ROS2_JAZZY}
+_STORES = {ROS1: Stores.ROS1_NOETIC, ROS2: Stores.ROS2_JAZZY}
 _ENCODING = b"\x00\x01"
 _PREFIX_BYTES = 4
-_LONGEST_TAIL = {RosVersion.ROS1: 0, RosVersion.ROS2: 3}
+_LONGEST_TAIL = {ROS1: 0, ROS2: 3}
 _LONGEST_ARRAY = 6
 _COUNT_BYTES = 4
 # rosbags names both halves of ROS 1's time as ROS 2 does.
@@ -41,7 +42,7 @@ class BrokenPayloadError(Exception):
 class Payloads:
     """The payloads of a message; of strings and arrays of numbers and messages, without wstring and bool[]."""
 
-    def __init__(self, ros: RosVersion, message: str) -> None:
+    def __init__(self, ros: Middleware, message: str) -> None:
         self.ros = ros
         self._store = get_typestore(_STORES[ros])
         package, _, name = message.partition("/")
@@ -50,7 +51,7 @@ class Payloads:
     def draw(self, source: random.Random, given: Mapping[str, Any] | None = None) -> bytes:
         """A random message, as rosbags serialises it; `given` holds values as rosbags takes them, by path: `a_b`."""
         value = self._drawn_message(self._name, source, given or {}, "")
-        if self.ros is RosVersion.ROS1:
+        if self.ros is ROS1:
             return bytes(self._store.serialize_ros1(value, self._name))
         return bytes(self._store.serialize_cdr(value, self._name))
 
@@ -90,13 +91,13 @@ class Payloads:
 class _Reader:
     """One walk over a payload."""
 
-    def __init__(self, ros: RosVersion, store: Any, payload: bytes) -> None:
+    def __init__(self, ros: Middleware, store: Any, payload: bytes) -> None:
         self._ros, self._store, self._payload = ros, store, payload
         self._place = 0
         self._shown: dict[str, bytearray] = defaultdict(bytearray)
 
     def shown(self, name: str) -> dict[str, bytes]:
-        if self._ros is RosVersion.ROS2 and self._take(_PREFIX_BYTES)[:2] != _ENCODING:
+        if self._ros is ROS2 and self._take(_PREFIX_BYTES)[:2] != _ENCODING:
             raise BrokenPayloadError("encoding")
         self._message(name, "")
         if len(self._payload) - self._place > _LONGEST_TAIL[self._ros]:
@@ -105,7 +106,7 @@ class _Reader:
 
     def _message(self, name: str, path: str) -> None:
         for field, kind in self._store.fielddefs[name][1]:
-            known = _ROS1_NAMES.get(field, field) if self._ros is RosVersion.ROS1 else field
+            known = _ROS1_NAMES.get(field, field) if self._ros is ROS1 else field
             self._field(kind, f"{path}_{known}" if path else known)
 
     def _field(self, kind: Any, path: str) -> None:
@@ -127,7 +128,7 @@ class _Reader:
     def _string(self, path: str) -> None:
         count = self._count()
         text = self._take(count)
-        if self._ros is RosVersion.ROS2:
+        if self._ros is ROS2:
             if not text.endswith(b"\x00"):
                 raise BrokenPayloadError("a string without its zero")
             text = text[:-1]
@@ -149,7 +150,7 @@ class _Reader:
     def _numbers(self, name: str, count: int = 1) -> bytes:
         """One number or more in a row; the padding is in front of the first."""
         size = _dtype(name).itemsize
-        if self._ros is RosVersion.ROS2:
+        if self._ros is ROS2:
             self._take(-(self._place - _PREFIX_BYTES) % size)
         data = self._take(count * size)
         return bytes(byte != 0 for byte in data) if name == "bool" else data

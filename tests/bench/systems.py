@@ -16,8 +16,8 @@ from pathlib import Path
 
 import yaml
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import load_system
 from tests.bench.tables import FAILED, MET, MISSED, Table, Tell
@@ -83,7 +83,7 @@ def measure(seed: int, tell: Tell) -> list[Table]:
 def write_system(folder: Path, seed: int) -> None:
     """The specification, its accelerators' sources and FuseSoC's call for it."""
     (folder / "spec.yaml").write_text(random_system(random.Random(seed), BLOCKS, MESSAGES).text, encoding="utf-8")
-    libraries = {ros: MessageLibrary(ros) for ros in RosVersion}
+    libraries = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
     system = load_system(folder / "spec.yaml", libraries, needs_sources=False).system
     for path, text in missing_sources(system, folder).items():
         path.write_text(text, encoding="utf-8")

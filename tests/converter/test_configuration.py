@@ -17,22 +17,22 @@ from fusesoc_firm.converter.configuration import (
 from fusesoc_firm.converter.ports import field_ports
 from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.stream import WIDTHS, Store, StoredBytes, StoreMap, Stream, ranges, stores_of
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.naming import KEYWORDS
 from fusesoc_firm.text.render import render
 from tests.frame.samples import AWKWARD
 from tests.frame.test_layout import layout
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 
-
-def ports(ros: RosVersion, text: str, others: dict[str, str] | None = None) -> list[tuple[str, str, str]]:
+def ports(ros: Middleware, text: str, others: dict[str, str] | None = None) -> list[tuple[str, str, str]]:
     """(name, type, comment) of each port."""
     return [(port.name, port.vhdl_type, port.comment) for port in field_ports(layout(ros, text, others))]
 
 
-def names(ros: RosVersion, text: str, others: dict[str, str] | None = None) -> list[str]:
+def names(ros: Middleware, text: str, others: dict[str, str] | None = None) -> list[str]:
     return [name for name, _, _ in ports(ros, text, others)]
 
 
@@ -84,8 +84,8 @@ def test_paths_that_meet() -> None:
     assert names(ROS1, "E a\nuint8 a_b\nuint8 a_b_2\n", {"p/E": "uint8 b\n"}) == ["a_b", "a_b_2", "a_b_2_2"]
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_both_converters_have_the_same_legal_names(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_both_converters_have_the_same_legal_names(ros: Middleware) -> None:
     for name, text in AWKWARD[ros].items():
         if "Inner" in text or any(word[0].isupper() for word in text.split()):
             continue
@@ -131,8 +131,8 @@ def test_bools_are_pieces_of_a_bit_and_the_rest_is_cut_at_gaps_only() -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("ros", RosVersion)
-def test_a_publisher_drives_each_bit_once(ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_a_publisher_drives_each_bit_once(ros: Middleware, width: int) -> None:
     frame = layout(ros, "bool a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
     configuration = publisher_configuration(frame, width)
     text = render(PUBLISHER_TEMPLATE, configuration)
@@ -152,8 +152,8 @@ def test_lanes_that_are_used_in_the_same_beats_share_a_store() -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("ros", RosVersion)
-def test_every_bit_of_a_field_comes_from_a_bit_of_its_own(ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_every_bit_of_a_field_comes_from_a_bit_of_its_own(ros: Middleware, width: int) -> None:
     frame = layout(ros, "int8 a\nE[3] e\nfloat64 b\n", {"p/E": "uint8 x\nuint32 y\n"})
     configuration = subscriber_configuration(frame, width)
     kept = sum(store.bits for store in stores_of(Stream(width), windows_of(frame.fields)))
@@ -170,7 +170,7 @@ def test_ranges() -> None:
     assert ranges([0, 1, 2, 5, 7, 8]) == [(0, 2), (5, 5), (7, 8)]
 
 
-def lengths(ros: RosVersion, count: int, width: int) -> list[list[list[str]]]:
+def lengths(ros: Middleware, count: int, width: int) -> list[list[list[str]]]:
     """For each beat with a part of the length, and each legal length, the bytes that it has there."""
     beats = subscriber_configuration(layout(ros, f"uint8[{count}] a\n"), width)["length_beats"]
     return [[[check["value"] for check in one["checks"]] for one in beat["candidates"]] for beat in beats]

@@ -8,16 +8,16 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.converter.converter_core import constants_files, generate
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.request.request import Plain, Request
 from tests.expected import check_expected
 from tests.frame.oracle import parsed
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
-LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 LONGEST_LINE = 120
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -34,7 +34,7 @@ Inner[2] pair
 TEXTS = {"awkward_msgs/Kinds": KINDS, "awkward_msgs/Inner": "int8 LOW=-1\nint8 value\n"}
 
 
-def text_of(ros: RosVersion, name: str) -> str:
+def text_of(ros: Middleware, name: str) -> str:
     message = parse_name(name)
     definitions = parsed(TEXTS, ros) if name in TEXTS else LIBRARIES[ros].closure(message)
     ((path, file),) = constants_files([(message, definitions)]).items()
@@ -53,13 +53,13 @@ def text_of(ros: RosVersion, name: str) -> str:
         (ROS2, "awkward_msgs/Kinds"),
     ],
 )
-def test_golden_files(ros: RosVersion, name: str) -> None:
-    file = f"ros{int(ros)}_{name.replace('/', '_').lower()}_pkg.vhd"
+def test_golden_files(ros: Middleware, name: str) -> None:
+    file = f"ros{ros.number}_{name.replace('/', '_').lower()}_pkg.vhd"
     check_expected(GOLDEN / file, text_of(ros, name))
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_the_text_is_clean(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_the_text_is_clean(ros: Middleware) -> None:
     for name in LIBRARIES[ros].names():
         text = text_of(ros, str(name))
         code = re.sub(r"--.*", "", text)
@@ -92,7 +92,7 @@ def test_long_names_put_their_comments_above() -> None:
 
 def test_the_versions_of_one_message_have_packages_of_two_names() -> None:
     name = parse_name("std_msgs/Header")
-    files = constants_files([(name, LIBRARIES[ros].closure(name)) for ros in RosVersion])
+    files = constants_files([(name, LIBRARIES[ros].closure(name)) for ros in (ROS1, ROS2)])
     assert list(files) == ["std_msgs_header_ros1_pkg.vhd", "std_msgs_header_ros2_pkg.vhd"]
     assert all(f"package {path.removesuffix('.vhd')} is\n" in str(file.content) for path, file in files.items())
 

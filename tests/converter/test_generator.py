@@ -130,7 +130,7 @@ def test_listing_5_1_is_read_as_it_stands(tmp_path: Path) -> None:
     order = order_of_config(path, libraries((), None, None))
     (image,) = order.messages
     assert (order.title, order.width, order.files) == ("Sobel Filter", 8, (path,))
-    assert (str(image.message), int(image.ros)) == ("sensor_msgs/Image", 1)
+    assert (str(image.message), image.ros.number) == ("sensor_msgs/Image", 1)
     assert image.interfaces == {"subscriber": ("AXIS2Image",), "publisher": ("Image2AXIS",)}
 
 

@@ -10,8 +10,9 @@ from fusesoc_firm.converter.configuration import publisher_configuration, subscr
 from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.diagnostics import InputError
 
 TEXTS = {
@@ -28,7 +29,7 @@ def frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Frame:
     for stem, text in TEXTS.items():
         (folder / f"{stem}.msg").write_text(text)
     name = MessageName("my_msgs", "Main")
-    return frame_of(name, MessageLibrary(RosVersion.ROS2, [folder]).closure(name))
+    return frame_of(name, MessageLibrary(ROS2, [folder]).closure(name))
 
 
 def test_every_field_of_variable_size_is_named_once_at_its_place(frame: Frame) -> None:

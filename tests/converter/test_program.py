@@ -27,20 +27,20 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.frame.values import dotted
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from tests.frame.oracle import parsed
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
-LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 
 
-def standard(ros: RosVersion, name: str) -> Frame:
+def standard(ros: Middleware, name: str) -> Frame:
     return frame_of(parse_name(name), LIBRARIES[ros].closure(parse_name(name)))
 
 
-def made(ros: RosVersion, text: str, **others: str) -> Frame:
+def made(ros: Middleware, text: str, **others: str) -> Frame:
     texts = {f"program_msgs/{name}": other for name, other in {"Main": text, **others}.items()}
     return frame_of(parse_name("program_msgs/Main"), parsed(texts, ros))
 
@@ -58,7 +58,7 @@ def _word(step: Step) -> str:
     return " ".join(filter(None, [type(step).__name__ + size, about, mark]))
 
 
-def variable_frames(ros: RosVersion) -> Iterator[Frame]:
+def variable_frames(ros: Middleware) -> Iterator[Frame]:
     for name in LIBRARIES[ros].names():
         frame = frame_of(name, LIBRARIES[ros].closure(name))
         if not frame.is_fixed_size:
@@ -115,8 +115,8 @@ def test_what_is_not_used_is_constant_to_a_publisher() -> None:
     assert bytes(data) == (b"\x00\x01\x00\x00\x03\x00\x00\x00hi\x00\x07\x00\x00\x00\x02\x00\x00\x00\x01\x02\x00")
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_both_converters_have_the_same_segments(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_both_converters_have_the_same_segments(ros: Middleware) -> None:
     """Whatever is used: each field, length and element is told by the same bit on both sides."""
     chance = random.Random(20240715)
     for frame in variable_frames(ros):
@@ -138,8 +138,8 @@ def _told(program: Program) -> dict[tuple[str, ...], tuple[Scope, int]]:
     return found
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_every_step_leads_on_to_the_end(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_every_step_leads_on_to_the_end(ros: Middleware) -> None:
     for frame in variable_frames(ros):
         program = subscriber_program(frame)
         for place, step in enumerate(program.steps):
@@ -151,8 +151,8 @@ def test_every_step_leads_on_to_the_end(ros: RosVersion) -> None:
                     assert program.body(place) <= place
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_names_of_ports_are_distinct_and_stay_with_other_fields(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_names_of_ports_are_distinct_and_stay_with_other_fields(ros: Middleware) -> None:
     for frame in variable_frames(ros):
         ports = [port.name.lower() for port in message_ports(frame, 8)]
         assert len(set(ports)) == len(ports)

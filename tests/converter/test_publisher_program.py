@@ -30,7 +30,8 @@ from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.model import Data, DataKind, Frame, Loop
 from fusesoc_firm.frame.select import select
 from fusesoc_firm.frame.values import leaf_of, part_of, units_of
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.stimuli import KINDS, Stimuli
 from tests.frame.oracle import Oracle
@@ -38,7 +39,6 @@ from tests.frame.test_layout import layout
 from tests.frame.variable_samples import PACKAGE, VARIABLE
 
 SEED = 20240609
-ROS1, ROS2 = RosVersion
 
 
 class Walk:
@@ -120,8 +120,8 @@ class Walk:
         return self.program.body(place)
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_every_message_is_that_of_rosbags(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_every_message_is_that_of_rosbags(ros: Middleware) -> None:
     oracle = Oracle(ros, VARIABLE[ros])
     names = [*oracle.messages(), *(name for name in VARIABLE[ros] if not name.endswith(("Wides", "Giant")))]
     print(f"seed {SEED}")
@@ -139,8 +139,8 @@ def test_every_message_is_that_of_rosbags(ros: RosVersion) -> None:
     assert done > 300
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_what_is_not_used_is_sent_as_its_default(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_what_is_not_used_is_sent_as_its_default(ros: Middleware) -> None:
     """For every message and each of its fields alone; unused are zeros, empty texts and arrays."""
     oracle = Oracle(ros, VARIABLE[ros])
     source = random.Random(SEED)
@@ -165,8 +165,8 @@ def test_defaults_of_unused_fields_are_constants() -> None:
     assert Walk(publisher_program(frame), {"y": 5}).run() == encode(frame, {"y": 5})
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_both_directions_have_the_same_segments(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_both_directions_have_the_same_segments(ros: Middleware) -> None:
     oracle = Oracle(ros, VARIABLE[ros])
     for name in [*oracle.messages(), *VARIABLE[ros]]:
         whole = oracle.frame(name)
@@ -196,8 +196,8 @@ def _segments(program: Program) -> set[tuple[object, Segment]]:
     return found
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_each_segment_is_completed_once(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_each_segment_is_completed_once(ros: Middleware) -> None:
     oracle = Oracle(ros, VARIABLE[ros])
     for name in oracle.messages():
         frame = oracle.frame(name)

@@ -15,12 +15,12 @@ from fusesoc_firm.converter.variable_publisher import (
 )
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.render import TEMPLATES, render
 from tests.frame.test_layout import layout
 
-ROS1, ROS2 = RosVersion
 HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
 IMAGE = "Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n"
 
@@ -68,8 +68,8 @@ def test_a_wider_stream_has_fewer_places(width: int, end: int) -> None:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("ros", RosVersion)
-def test_each_bit_of_the_words_is_driven_once(ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_each_bit_of_the_words_is_driven_once(ros: Middleware, width: int) -> None:
     text = "bool a\nstring s\nE[2] e\nfloat64[] b\nF[] f\nuint8[70] big\n"
     frame = layout(ros, text, {"p/E": "uint8 x\nstring t\nuint32 y\n", "p/F": "bool[3] g\nuint64 h\n"})
     configuration = configured(frame, width)
@@ -138,8 +138,8 @@ def test_every_name_of_the_text_is_kept_from_fields() -> None:
     assert not ports & {name.lower() for name in declared}
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_lines_are_of_a_readable_length(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_lines_are_of_a_readable_length(ros: Middleware) -> None:
     """Whatever the number of parts; declarations of ports are as long as their names."""
     text = "".join(f"string s{number}\nuint8[] d{number}\n" for number in range(60))
     lines = render(VARIABLE_PUBLISHER_TEMPLATE, configured(layout(ros, text))).splitlines()

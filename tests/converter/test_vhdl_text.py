@@ -10,15 +10,15 @@ import pytest
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from tests.expected import check_expected
 from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
-ORACLES = {ros: Oracle(ros, AWKWARD[ros]) for ros in RosVersion}
+ORACLES = {ros: Oracle(ros, AWKWARD[ros]) for ros in (ROS1, ROS2)}
 MESSAGES = [
-    pytest.param(ros, name, id=f"ros{int(ros)}-{name}")
+    pytest.param(ros, name, id=f"ros{ros.number}-{name}")
     for ros, oracle in ORACLES.items()
     for name in [*oracle.fixed_size_messages(), *AWKWARD[ros]]
 ]
@@ -43,8 +43,8 @@ def texts(frame: Frame, width: int = 8) -> dict[str, str]:
         (ROS2, "awkward_msgs/Carry254", "axis_to_awkward_msgs_carry254.vhd"),
     ],
 )
-def test_golden_files(ros: RosVersion, name: str, file: str) -> None:
-    check_expected(GOLDEN / f"ros{int(ros)}_{file}", texts(ORACLES[ros].frame(name))[file])
+def test_golden_files(ros: Middleware, name: str, file: str) -> None:
+    check_expected(GOLDEN / f"ros{ros.number}_{file}", texts(ORACLES[ros].frame(name))[file])
 
 
 @pytest.mark.parametrize("file", ["axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"])
@@ -54,7 +54,7 @@ def test_golden_files_of_a_wide_stream(file: str) -> None:
 
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize(("ros", "name"), MESSAGES)
-def test_the_text_is_clean(ros: RosVersion, name: str, width: int) -> None:
+def test_the_text_is_clean(ros: Middleware, name: str, width: int) -> None:
     for file, text in texts(ORACLES[ros].frame(name), width).items():
         code = re.sub(r"--.*", "", text)
         assert text.isascii(), file
@@ -72,7 +72,7 @@ def test_the_text_is_clean(ros: RosVersion, name: str, width: int) -> None:
 
 
 @pytest.mark.parametrize(("ros", "name"), MESSAGES)
-def test_ports_are_aligned(ros: RosVersion, name: str) -> None:
+def test_ports_are_aligned(ros: Middleware, name: str) -> None:
     """Within a group of ports, which a comment heads, names, directions and types begin in the same columns."""
     for text in texts(ORACLES[ros].frame(name)).values():
         ports = text.partition("  port (\n")[2].partition("  );\n")[0].splitlines()

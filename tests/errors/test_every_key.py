@@ -17,7 +17,7 @@ import yaml
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.system.written.specification import Specification
 from fusesoc_firm.text.diagnostics import nearest
 from fusesoc_firm.text.yaml_sections import Section, keys_of
@@ -107,7 +107,7 @@ def checker(
     folder = tmp_path / spec.parent.name
     shutil.copytree(spec.parent, folder)
     make = libraries
-    known: dict[RosVersion, MessageLibrary] = {}
+    known: dict[Middleware, MessageLibrary] = {}
 
     def shared(paths: Sequence[Path], _: Mapping[str, str] | None, store: str | None) -> object:
         """Libraries are made once, and know no installed ROS."""

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.diagnostics import InputError
 from tests.expected import check_expected
 
@@ -19,7 +20,7 @@ FILES = sorted(HERE.glob("ros[12]/*.msg"))
 def test_message_error(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(HERE)  # so that the messages show relative paths
     folder = path.parent.name
-    library = MessageLibrary(RosVersion(int(folder[-1])), [Path(folder)])
+    library = MessageLibrary(middleware_of(int(folder[-1])), [Path(folder)])
     with pytest.raises(InputError) as caught:
         library.closure(MessageName(folder, path.stem))
     check_expected(path.with_suffix(".expected"), f"{caught.value}\n")

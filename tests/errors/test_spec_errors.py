@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.text.diagnostics import InputError
@@ -18,7 +18,7 @@ SPECIFICATIONS = sorted(FOLDER.glob("*.yaml"))
 
 
 def derive_file(
-    path: Path, libraries: dict[RosVersion, MessageLibrary], monkeypatch: pytest.MonkeyPatch
+    path: Path, libraries: dict[Middleware, MessageLibrary], monkeypatch: pytest.MonkeyPatch
 ) -> DerivedSystem:
     """The system of one of `SPECIFICATIONS`, as `firm system check` derives it."""
     monkeypatch.chdir(FOLDER)  # so that the messages show relative paths
@@ -27,7 +27,7 @@ def derive_file(
 
 @pytest.mark.parametrize("path", SPECIFICATIONS, ids=lambda path: path.stem)
 def test_a_bad_specification_is_explained(
-    path: Path, libraries: dict[RosVersion, MessageLibrary], monkeypatch: pytest.MonkeyPatch
+    path: Path, libraries: dict[Middleware, MessageLibrary], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(InputError) as raised:
         derive_file(path, libraries, monkeypatch)

@@ -1,6 +1,6 @@
 """A judge of layouts that is not ours: rosbags knows the types, makes the bytes, and says what a field is.
 
-    oracle = Oracle(RosVersion.ROS2, {"awkward_msgs/Flags": "bool[9] flags\n"})
+    oracle = Oracle(ROS2, {"awkward_msgs/Flags": "bool[9] flags\n"})
     value = oracle.random_value("geometry_msgs/Point", random.Random(7))
     payload = oracle.serialise("geometry_msgs/Point", value)
 
@@ -23,13 +23,15 @@ from rosbags.typesys.base import normalize_fieldname
 
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageDefinition, MessageName
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.typestores import typestore
 
-_STORES = {RosVersion.ROS1: Stores.ROS1_NOETIC, RosVersion.ROS2: Stores.ROS2_JAZZY}
+_STORES = {ROS1: Stores.ROS1_NOETIC, ROS2: Stores.ROS2_JAZZY}
 _ROS1_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 # ROS 2's stand-in for the fields of an empty message; nobody sets it.
 _STAND_IN = "structure_needs_at_least_one_member"
@@ -42,10 +44,10 @@ class Oracle:
     """The messages of one distribution, the newest unless another is named, and any others by their text."""
 
     def __init__(
-        self, ros: RosVersion, texts: Mapping[str, str] | None = None, distribution: str | None = None
+        self, ros: Middleware, texts: Mapping[str, str] | None = None, distribution: str | None = None
     ) -> None:
         self.ros = ros
-        store = Stores(f"ros{int(ros)}_{distribution}") if distribution else _STORES[ros]
+        store = Stores(f"ros{ros.number}_{distribution}") if distribution else _STORES[ros]
         self._store = typestore(store)
         self._texts = dict(texts or {})
         self._library = MessageLibrary(ros, store=store.value.partition("_")[2])
@@ -69,7 +71,7 @@ class Oracle:
 
     def definition_text(self, name: str) -> str:
         """The message and all within it in one text, parted as ROS 1's `gendeps --cat` does."""
-        return str(self._store.generate_msgdef(_long_name(name), ros_version=int(self.ros))[0])
+        return str(self._store.generate_msgdef(_long_name(name), ros_version=self.ros.number)[0])
 
     def frame(self, name: str) -> Frame:
         """Our own frame of it: what is judged."""
@@ -82,7 +84,7 @@ class Oracle:
     def serialise(self, name: str, value: Mapping[str, Any]) -> bytes:
         """The payload; the padding of CDR is zero."""
         message = self._message(_long_name(name), value)
-        if self.ros is RosVersion.ROS1:
+        if self.ros is ROS1:
             return bytes(self._store.serialize_ros1(message, _long_name(name)))
         return bytes(self._store.serialize_cdr(message, _long_name(name)))
 
@@ -105,7 +107,7 @@ class Oracle:
         return False
 
     def _message_value(self, long_name: str, source: random.Random) -> dict[str, Any]:
-        if self.ros is RosVersion.ROS1 and long_name in _ROS1_TIMES:
+        if self.ros is ROS1 and long_name in _ROS1_TIMES:
             # rosbags gives both halves the types of ROS 2; where the ranges overlap, the bytes are those of ROS 1.
             return {half: source.choice((0, 1, _LARGEST_SIGNED, source.getrandbits(31))) for half in ("sec", "nsec")}
         return {name: self._value(kind, source) for name, kind in self._fields(long_name)}
@@ -123,7 +125,7 @@ class Oracle:
     def _message(self, long_name: str, value: Mapping[str, Any]) -> object:
         arguments = {}
         for name, kind in self._fields(long_name):
-            if self.ros is RosVersion.ROS1 and long_name in _ROS1_TIMES:
+            if self.ros is ROS1 and long_name in _ROS1_TIMES:
                 # rosbags gives both halves the names and types of ROS 2: the same bits are other numbers there.
                 is_seconds = name == "sec"
                 half = value["sec" if is_seconds else "nsec"] % 2**32
@@ -147,7 +149,7 @@ class Oracle:
 
     def _dtype(self, name: str) -> np.dtype[Any]:
         if name == "byte":
-            return np.dtype("i1" if self.ros is RosVersion.ROS1 else "u1")
+            return np.dtype("i1" if self.ros is ROS1 else "u1")
         return np.dtype({"char": "u1", "bool": "?"}.get(name, name))
 
 
@@ -157,11 +159,11 @@ class DefinitionsOracle(Oracle):
     `refused` are those that rosbags cannot read, each with its reason.
     """
 
-    def __init__(self, ros: RosVersion, definitions: Mapping[MessageName, MessageDefinition]) -> None:
+    def __init__(self, ros: Middleware, definitions: Mapping[MessageName, MessageDefinition]) -> None:
         super().__init__(ros)
         self._store = get_typestore(Stores.EMPTY)
         self.refused: dict[MessageName, str] = {}
-        if ros is RosVersion.ROS1:
+        if ros is ROS1:
             for long_name in _ROS1_TIMES:
                 self._store.register(get_types_from_msg("int32 sec\nuint32 nanosec\n", long_name))
         for name, definition in definitions.items():
@@ -171,7 +173,7 @@ class DefinitionsOracle(Oracle):
                 self.refused[name] = str(error).splitlines()[-1]
 
 
-def parsed(texts: Mapping[str, str], ros: RosVersion) -> dict[MessageName, MessageDefinition]:
+def parsed(texts: Mapping[str, str], ros: Middleware) -> dict[MessageName, MessageDefinition]:
     """The definitions in `texts`, by name; raises `InputError` for a fault in one."""
     diagnostics = Diagnostics()
     definitions = {

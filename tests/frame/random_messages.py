@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import random
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS2
+from fusesoc_firm.message.middleware import Middleware
 
 PACKAGE = "random_msgs"
 _NUMBERS = ["bool", "uint8", "int8", "int16", "uint32", "float32", "float64", "int64"]
 
 
-def random_texts(ros: RosVersion, chance: random.Random, count: int = 5) -> dict[str, str]:
+def random_texts(ros: Middleware, chance: random.Random, count: int = 5) -> dict[str, str]:
     """`count` messages, by their names; the last may be made of all others."""
     names: list[str] = []
     texts = {}
@@ -21,20 +22,20 @@ def random_texts(ros: RosVersion, chance: random.Random, count: int = 5) -> dict
     return texts
 
 
-def _field(ros: RosVersion, chance: random.Random, names: list[str]) -> str:
+def _field(ros: Middleware, chance: random.Random, names: list[str]) -> str:
     type_ = chance.choice(_NUMBERS)
     if names and chance.random() < 0.5:
         type_ = chance.choice(names)
     elif chance.random() < 0.25:
-        bounds = ["", "", "<=2", "<=5"] if ros is RosVersion.ROS2 else [""]
+        bounds = ["", "", "<=2", "<=5"] if ros is ROS2 else [""]
         type_ = f"string{chance.choice(bounds)}"
     sizes = ["", "", "", "[]", "[]", "[1]", "[2]", "[3]"]
-    return type_ + chance.choice([*sizes, "[<=1]", "[<=3]"] if ros is RosVersion.ROS2 else sizes)
+    return type_ + chance.choice([*sizes, "[<=1]", "[<=3]"] if ros is ROS2 else sizes)
 
 
-def deep_texts(ros: RosVersion, chance: random.Random, levels: int) -> dict[str, str]:
+def deep_texts(ros: Middleware, chance: random.Random, levels: int) -> dict[str, str]:
     """Messages `L0` to `L<levels - 1>`, by their names: each holds the one before it, among other fields."""
-    sizes = ["", "[]", "[1]", "[2]", *(["[<=1]", "[<=3]"] if ros is RosVersion.ROS2 else [])]
+    sizes = ["", "[]", "[1]", "[2]", *(["[<=1]", "[<=3]"] if ros is ROS2 else [])]
     texts = {}
     for level in range(levels):
         fields = [_field(ros, chance, []) for _ in range(chance.randint(1, 3))]

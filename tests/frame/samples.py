@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 
 PACKAGE = "awkward_msgs"
 
@@ -56,9 +57,9 @@ _ROS2 = {
 }
 _ROS2 |= {f"Carry{payload}": f"uint8[{payload - 4}] data\n" for payload in (252, 253, 254, 255, 256, 511, 1021)}
 
-AWKWARD: Mapping[RosVersion, Mapping[str, str]] = {
-    RosVersion.ROS1: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS1}.items()},
-    RosVersion.ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS2}.items()},
+AWKWARD: Mapping[Middleware, Mapping[str, str]] = {
+    ROS1: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS1}.items()},
+    ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS2}.items()},
 }
 
 _VARIABLE_SHARED = {
@@ -87,7 +88,7 @@ _VARIABLE_ROS2 = {
     "Unicode": "uint8 first\nwstring text\nwstring[] texts\nuint8 last\n",
 }
 
-AWKWARD_VARIABLE: Mapping[RosVersion, Mapping[str, str]] = {
-    RosVersion.ROS1: {f"{PACKAGE}/{name}": text for name, text in _VARIABLE_SHARED.items()},
-    RosVersion.ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_VARIABLE_SHARED, **_VARIABLE_ROS2}.items()},
+AWKWARD_VARIABLE: Mapping[Middleware, Mapping[str, str]] = {
+    ROS1: {f"{PACKAGE}/{name}": text for name, text in _VARIABLE_SHARED.items()},
+    ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_VARIABLE_SHARED, **_VARIABLE_ROS2}.items()},
 }

@@ -12,10 +12,9 @@ import pytest
 
 from fusesoc_firm.frame.codec import CodecError, decode, encode, pack_frame, used_bytes
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
 from tests.frame.test_layout import layout
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 INNER = {"p/E": "bool flag\nint16 number\n"}
 GOOD: dict[str, Any] = {"e": [{"flag": True, "number": -2}, {"flag": False, "number": 3}], "f": [0.5, 2.0], "u": 7}
 

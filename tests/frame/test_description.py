@@ -6,10 +6,11 @@ import yaml
 
 from fusesoc_firm.frame.description import description
 from fusesoc_firm.frame.tree import Row, rows
+from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from tests.frame.test_nodes import ROS2, frame, standard
+from tests.frame.test_nodes import frame, standard
 
 
 def test_a_message_of_variable_size_as_data() -> None:
@@ -49,7 +50,7 @@ def test_padding_at_run_time_is_told() -> None:
     assert nodes[-1] == {"data": "a", "type": "float64[]", "element_bytes": 8, "padding": "at run time"}
 
 
-def tree(ros: RosVersion, name: str) -> dict[str, Row]:
+def tree(ros: Middleware, name: str) -> dict[str, Row]:
     definitions = MessageLibrary(ros).closure(parse_name(name))
     return {row.name: row for row in rows(parse_name(name), definitions, standard(ros, name))}
 

@@ -20,25 +20,17 @@ from fusesoc_firm.frame.codec import decode, encode, used_bytes
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.length import length_of
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import (
-    ArrayType,
-    FieldType,
-    MessageDefinition,
-    MessageName,
-    RosVersion,
-    SequenceType,
-    StringType,
-)
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import ArrayType, FieldType, MessageDefinition, MessageName, SequenceType, StringType
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.message.stores import distributions
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.verify.stimuli import EMPTY, KINDS, Stimuli
 from tests.frame.genpy_oracle import GenpyOracle, has_genpy
 from tests.frame.oracle import DefinitionsOracle, Oracle, is_same
 from tests.frame.random_messages import random_texts
 
-ROS1 = RosVersion.ROS1
 CORPUS = os.environ.get("CORPUS", "")
 RANDOM_DEFINITIONS = 80
 
@@ -82,8 +74,8 @@ def check_all(
 
 
 @pytest.mark.one_in(3)
-@pytest.mark.parametrize(("ros", "distribution"), [(ros, name) for ros in RosVersion for name in distributions(ros)])
-def test_every_message_of_a_distribution_against_rosbags(ros: RosVersion, distribution: str) -> None:
+@pytest.mark.parametrize(("ros", "distribution"), [(ros, name) for ros in (ROS1, ROS2) for name in ros.distributions()])
+def test_every_message_of_a_distribution_against_rosbags(ros: Middleware, distribution: str) -> None:
     chance = new_seed()
     oracle = Oracle(ros, distribution=distribution)
     assert len(oracle.messages()) > 130
@@ -100,8 +92,8 @@ def test_every_message_of_a_distribution_against_genpy() -> None:
         check_all(parse_name(name), definitions, GenpyOracle(parse_name(name), definitions).serialise, chance)
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_random_definitions_against_rosbags(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_random_definitions_against_rosbags(ros: Middleware) -> None:
     chance = new_seed()
     for _ in range(RANDOM_DEFINITIONS):
         texts = random_texts(ros, chance)
@@ -127,22 +119,22 @@ def test_random_definitions_against_genpy() -> None:
 # --- the corpus --------------------------------------------------------------------------------------------------
 
 
-def corpus(ros: RosVersion) -> Iterator[tuple[MessageName, dict[MessageName, MessageDefinition]]]:
+def corpus(ros: Middleware) -> Iterator[tuple[MessageName, dict[MessageName, MessageDefinition]]]:
     """Every message whose parts are all known, with these."""
-    library = MessageLibrary(ros, [Path(CORPUS, f"ros{int(ros)}")])
+    library = MessageLibrary(ros, [Path(CORPUS, f"ros{ros.number}")])
     unknown = Counter[str]()
-    for path in sorted(Path(CORPUS, f"ros{int(ros)}").glob("*/msg/*.msg")):
+    for path in sorted(Path(CORPUS, f"ros{ros.number}").glob("*/msg/*.msg")):
         name = MessageName(path.parts[-3], path.stem)
         try:
             yield name, library.closure(name)
         except InputError as error:
             unknown[error.diagnostics[0].message] += 1
-    print(f"ROS {int(ros)}: left out, since the folder does not hold all they need: {dict(unknown)}")
+    print(f"ROS {ros.number}: left out, since the folder does not hold all they need: {dict(unknown)}")
 
 
 @needs_corpus
-@pytest.mark.parametrize("ros", RosVersion)
-def test_the_corpus_against_rosbags(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_the_corpus_against_rosbags(ros: Middleware) -> None:
     chance = new_seed()
     messages = dict(corpus(ros))
     everything = {name: definition for closure in messages.values() for name, definition in closure.items()}
@@ -155,7 +147,7 @@ def test_the_corpus_against_rosbags(ros: RosVersion) -> None:
             check_all(name, messages[name], rosbags(oracle, str(name)), chance)
         except AssertionError as error:
             different.append(f"{name}: {str(error)[:300]}")
-    print(f"ROS {int(ros)}: {len(messages) - len(left_out)} messages, {len(KINDS)} stimuli each")
+    print(f"ROS {ros.number}: {len(messages) - len(left_out)} messages, {len(KINDS)} stimuli each")
     print(f"left out: {len(wide)} with wstring, refused by rosbags: {oracle.refused}")
     assert different == []
     assert len(messages) > 1000 > 10 * len(left_out)

@@ -8,14 +8,13 @@ import pytest
 
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame, Run
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from tests.frame.oracle import parsed
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 
-
-def layout(ros: RosVersion, text: str, others: Mapping[str, str] | None = None) -> Frame:
+def layout(ros: Middleware, text: str, others: Mapping[str, str] | None = None) -> Frame:
     """The frame of `p/M`."""
     return frame_of(parse_name("p/M"), parsed({"p/M": text, **(others or {})}, ros))
 
@@ -84,13 +83,13 @@ def test_times_of_ros1_are_two_numbers() -> None:
         (ROS2, "bool", "bool", 1),
     ],
 )
-def test_what_old_names_mean(ros: RosVersion, kind: str, name: str, bits: int) -> None:
+def test_what_old_names_mean(ros: Middleware, kind: str, name: str, bits: int) -> None:
     (leaf,) = layout(ros, f"{kind} x\n").fields
     assert (leaf.type.name, leaf.type.bits, leaf.type.size) == (name, bits, 1)
 
 
 @pytest.mark.parametrize(("ros", "payload", "last"), [(ROS1, 9, 1), (ROS2, 20, 12)])
-def test_a_message_without_fields_is_a_byte_in_ros2_only(ros: RosVersion, payload: int, last: int) -> None:
+def test_a_message_without_fields_is_a_byte_in_ros2_only(ros: Middleware, payload: int, last: int) -> None:
     frame = layout(ros, "E e\nuint8 a\nE[2] f\nfloat64 b\n", {"p/E": ""})
     assert frame.payload_bytes == payload
     assert runs(frame)["b"] == [(last, 1)]

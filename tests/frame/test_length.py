@@ -8,8 +8,9 @@ import pytest
 
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.length import Align, Bytes, Length, Repeat, Term, length_of
-from fusesoc_firm.message.model import RosVersion
-from tests.frame.test_nodes import ROS1, ROS2, frame, standard
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
+from tests.frame.test_nodes import frame, standard
 
 INNER = "float64 x\nuint8 y\n"
 
@@ -42,7 +43,7 @@ def shown(terms: tuple[Term, ...]) -> str:
         ),
     ],
 )
-def test_expressions(ros: RosVersion, name: str, expected: str) -> None:
+def test_expressions(ros: Middleware, name: str, expected: str) -> None:
     assert shown(length_of(standard(ros, name)).terms) == expected
 
 

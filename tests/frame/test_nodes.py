@@ -7,21 +7,21 @@ import pytest
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node, Pad, all_nodes
 from fusesoc_firm.frame.position import Position
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from tests.frame.oracle import parsed
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 PACKAGE = "layout_msgs"
 
 
-def frame(ros: RosVersion, text: str, **others: str) -> Frame:
+def frame(ros: Middleware, text: str, **others: str) -> Frame:
     texts = {f"{PACKAGE}/{name}": other for name, other in {"Main": text, **others}.items()}
     return frame_of(parse_name(f"{PACKAGE}/Main"), parsed(texts, ros))
 
 
-def standard(ros: RosVersion, name: str) -> Frame:
+def standard(ros: Middleware, name: str) -> Frame:
     return frame_of(parse_name(name), MessageLibrary(ros).closure(parse_name(name)))
 
 
@@ -60,7 +60,7 @@ def outline(nodes: tuple[Node, ...]) -> list[str]:
         ),
     ],
 )
-def test_messages_of_the_distributions(ros: RosVersion, name: str, expected: str) -> None:
+def test_messages_of_the_distributions(ros: Middleware, name: str, expected: str) -> None:
     assert " ".join(outline(standard(ros, name).nodes)) == expected
 
 

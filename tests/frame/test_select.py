@@ -9,9 +9,10 @@ import pytest
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Pad, all_nodes
 from fusesoc_firm.frame.select import select
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.text.diagnostics import InputError, SourceRef
 from tests.frame.test_codec_of_any_message import image
-from tests.frame.test_nodes import ROS1, ROS2, frame, outline, standard
+from tests.frame.test_nodes import frame, outline, standard
 
 
 def used(made: Frame) -> list[str]:

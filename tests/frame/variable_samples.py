@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 
 PACKAGE = "variable_msgs"
 
@@ -46,7 +47,7 @@ _ROS2 = {
     "Bounded": "string<=5 text\nuint32[<=3] few\nstring<=4[<=2] texts\nfloat64[<=2] last\n",
 }
 
-VARIABLE: Mapping[RosVersion, Mapping[str, str]] = {
-    RosVersion.ROS1: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS1}.items()},
-    RosVersion.ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS2}.items()},
+VARIABLE: Mapping[Middleware, Mapping[str, str]] = {
+    ROS1: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS1}.items()},
+    ROS2: {f"{PACKAGE}/{name}": text for name, text in {**_SHARED, **_ROS2}.items()},
 }

@@ -21,10 +21,11 @@ from hypothesis import strategies as st
 
 from fusesoc_firm.cli import main
 from fusesoc_firm.converter.config_file import read_config
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.bounds import MOST_FIELDS, MOST_LEVELS
 from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.plugin.lock_file import read_lock
 from fusesoc_firm.simulation.stimuli import read_stimuli
@@ -33,7 +34,6 @@ from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.yaml_text import yaml_data
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 # Seconds of the processor that a child has; each takes one or two. One that waits for ever is ended, too.
 _TIME = 20
 
@@ -71,11 +71,10 @@ import sys
 from pathlib import Path
 from fusesoc_firm.converter.stages import STAGES
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.complexity import statistics
 
-for ros in RosVersion:
+for ros in (ROS1, ROS2):
     library = MessageLibrary(ros, [Path(sys.argv[1])])
     for word in sys.argv[2:]:
         name = parse_name(word)
@@ -316,5 +315,5 @@ def test_no_text_stumbles_over_garbage(data: bytes) -> None:
     text = data.decode("utf-8", "replace")
     with suppress(yaml.YAMLError):
         yaml_data(text)
-    for ros in RosVersion:
+    for ros in (ROS1, ROS2):
         parse_message(text, MessageName("a", "A"), ros, "A.msg", Diagnostics())

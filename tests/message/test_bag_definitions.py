@@ -16,8 +16,9 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
 from fusesoc_firm.cli import main
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request, obtain
@@ -33,8 +34,8 @@ TEXT = f"Inner inner\ngeometry_msgs/Point at\nuint8 KEPT=3\n{LINE}\nMSG: odd_msg
 POINT = f"{LINE}\nMSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
 
 
-def version(kind: str) -> RosVersion:
-    return RosVersion.ROS1 if kind == "ros1" else RosVersion.ROS2
+def version(kind: str) -> Middleware:
+    return ROS1 if kind == "ros1" else ROS2
 
 
 def record(
@@ -69,14 +70,14 @@ def test_a_bag_defines_what_no_store_has(tmp_path: Path, kind: str) -> None:
     assert library.files([ODD]) == [Part(bag, "odd_msgs/Odd", library.content(ODD))]
     # It goes before the distribution, and is nothing to the other version of ROS.
     assert library.origin(parse_name("geometry_msgs/Point")) == str(bag)
-    other = RosVersion.ROS2 if ros is RosVersion.ROS1 else RosVersion.ROS1
+    other = ROS2 if ros is ROS1 else ROS1
     assert ODD not in MessageLibrary(other, [bag]).names()
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_on_the_command_line(tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     bag = record(tmp_path, kind, {"odd_msgs/msg/Odd": TEXT + POINT})
-    assert main(["message", "show", "odd_msgs/Odd", "--ros", str(int(version(kind))), "--path", str(bag)]) == 0
+    assert main(["message", "show", "odd_msgs/Odd", "--ros", str(version(kind).number), "--path", str(bag)]) == 0
     assert "    pair  " in capsys.readouterr().out
 
 
@@ -101,12 +102,12 @@ def test_what_is_no_bag_or_has_no_definitions(tmp_path: Path) -> None:
     (tmp_path / "drive.bag").write_bytes(b"nothing")
     (tmp_path / "notes.txt").write_text("")
     with pytest.raises(InputError) as raised:
-        MessageLibrary(RosVersion.ROS1, [tmp_path / "drive.bag", tmp_path / "notes.txt"])
+        MessageLibrary(ROS1, [tmp_path / "drive.bag", tmp_path / "notes.txt"])
     assert "drive.bag is not a bag that can be read" in str(raised.value)
     assert "notes.txt' is neither a folder nor a bag" in str(raised.value)
     empty = record(tmp_path, "mcap", {})
     with pytest.raises(InputError, match="drive' is a bag without definitions"):
-        MessageLibrary(RosVersion.ROS2, [empty])
+        MessageLibrary(ROS2, [empty])
 
 
 # --- the store ----------------------------------------------------------------------------------------------------
@@ -121,7 +122,7 @@ class Calls:
         self.bag = record(root, kind, {"odd_msgs/msg/Odd": TEXT + POINT})
 
     def request(self) -> Request:
-        given = {"message": "odd_msgs/Odd", "ros": int(version(self.kind)), "paths": [self.bag.name]}
+        given = {"message": "odd_msgs/Odd", "ros": version(self.kind).number, "paths": [self.bag.name]}
         (self.root / "call_input.yml").write_text(yaml.safe_dump(given))
         return make_request("firm", Call("me:p:a-b:1.0", self.root, given), GENERATORS["firm"], lambda _: ())
 

@@ -14,18 +14,18 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.derived import Interface
-from fusesoc_firm.message.folders import environment_folders
+from fusesoc_firm.message.folders import ros2_folders
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, RosVersion
+from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName
 from fusesoc_firm.message.parser import parse_full_name, parse_name
 from fusesoc_firm.message.signature import md5, signature
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 SERVICE, ACTION = InterfaceKind.SERVICE, InterfaceKind.ACTION
 CORPUS = os.environ.get("CORPUS", "")
-INSTALLED = environment_folders(ROS2, os.environ)
+INSTALLED = ros2_folders(os.environ)
 
 FIBONACCI = "#goal\nint32 order\n---\n#result\nint32[] sequence\n---\n#feedback\nint32[] sequence\n"
 SET_BOOL = "bool data # e.g. for hardware\n---\nbool success\nstring message\n"

@@ -7,15 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.folders import interface_files
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import InterfaceKind, MessageName, MessageType, PrimitiveType, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import InterfaceKind, MessageName, MessageType, PrimitiveType
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.message.stores import DistributionStore, distributions
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 POINT = MessageName("geometry_msgs", "Point")
 
 
@@ -35,7 +36,7 @@ def own_names(library: MessageLibrary) -> list[str]:
 
 
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
-def test_common_messages_need_no_files(ros: RosVersion) -> None:
+def test_common_messages_need_no_files(ros: Middleware) -> None:
     library = MessageLibrary(ros)
     assert field_names(library, POINT) == ["x", "y", "z"]
     assert library.files([POINT]) == []
@@ -60,8 +61,8 @@ def test_a_message_of_a_store_points_into_its_text() -> None:
 
 
 def test_distributions() -> None:
-    assert distributions(ROS1) == ["noetic"]
-    assert {"foxy", "humble", "jazzy"} <= set(distributions(ROS2))
+    assert distributions(1) == ["noetic"]
+    assert {"foxy", "humble", "jazzy"} <= set(distributions(2))
     humble = MessageLibrary(ROS2, store="humble")
     assert MessageName("service_msgs", "ServiceEventInfo") not in humble.names()
     assert MessageName("service_msgs", "ServiceEventInfo") in MessageLibrary(ROS2, store="jazzy").names()
@@ -69,7 +70,7 @@ def test_distributions() -> None:
 
 def test_an_unknown_distribution() -> None:
     with pytest.raises(InputError) as caught:
-        DistributionStore(ROS2, "jazy")
+        DistributionStore(2, "jazy")
     assert str(caught.value) == "error: 'jazy' is not a distribution of ROS 2\n      = did you mean 'jazzy'?"
 
 
@@ -138,7 +139,7 @@ def test_precedence(tmp_path: Path) -> None:
     ("ros", "variable", "folder"), [(ROS1, "ROS_PACKAGE_PATH", "share"), (ROS2, "AMENT_PREFIX_PATH", ".")]
 )
 def test_the_environment_counts_only_if_it_is_given(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ros: RosVersion, variable: str, folder: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ros: Middleware, variable: str, folder: str
 ) -> None:
     name = MessageName("my_msgs", "A")
     write(tmp_path / "share" / "my_msgs" / "msg" / "A.msg")
@@ -246,7 +247,7 @@ def test_a_cycle_below_the_message_is_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("ros", "words"), [(ROS1, ("any", "union", "map", "Any")), (ROS2, ("Any", "Optional", "Union"))]
 )
-def test_messages_may_be_called_like_what_msg_has_not(tmp_path: Path, ros: RosVersion, words: tuple[str, ...]) -> None:
+def test_messages_may_be_called_like_what_msg_has_not(tmp_path: Path, ros: Middleware, words: tuple[str, ...]) -> None:
     folder = tmp_path / "my_msgs" / "msg"
     folder.mkdir(parents=True)
     for word in words:

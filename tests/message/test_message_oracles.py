@@ -19,7 +19,9 @@ import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     DefaultValue,
@@ -29,17 +31,14 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     Scalar,
     SequenceType,
     StringType,
 )
 from fusesoc_firm.message.parser import parse_message, parse_name
-from fusesoc_firm.message.stores import distributions
 from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.typestores import typestore
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 CORPUS = os.environ.get("CORPUS", "")
 needs_corpus = pytest.mark.skipif(not CORPUS, reason="CORPUS names no folder")
 
@@ -54,7 +53,7 @@ def content(definition: MessageDefinition) -> Content:
     )
 
 
-def ours(text: str, name: MessageName, ros: RosVersion) -> Content | None:
+def ours(text: str, name: MessageName, ros: Middleware) -> Content | None:
     diagnostics = Diagnostics()
     definition = parse_message(text, name, ros, "text", diagnostics)
     return None if diagnostics.found else content(definition)
@@ -63,7 +62,7 @@ def ours(text: str, name: MessageName, ros: RosVersion) -> Content | None:
 # --- rosbags -----------------------------------------------------------------------------------------------------
 
 
-def of_rosbags(kind: Any, ros: RosVersion) -> FieldType:
+def of_rosbags(kind: Any, ros: Middleware) -> FieldType:
     """A type in rosbags' model, which keeps ROS 1's `time` as a message and 0 for no bound."""
     tag, argument = kind
     if tag == Nodetype.ARRAY:
@@ -73,7 +72,7 @@ def of_rosbags(kind: Any, ros: RosVersion) -> FieldType:
     return element_of_rosbags(kind, ros)
 
 
-def element_of_rosbags(kind: Any, ros: RosVersion) -> ElementType:
+def element_of_rosbags(kind: Any, ros: Middleware) -> ElementType:
     tag, argument = kind
     if tag == Nodetype.NAME:
         name = parse_name(argument)
@@ -83,7 +82,7 @@ def element_of_rosbags(kind: Any, ros: RosVersion) -> ElementType:
     return StringType(bound=bound or None) if word == "string" else PrimitiveType(word)
 
 
-def content_of_rosbags(entry: Any, ros: RosVersion) -> Content:
+def content_of_rosbags(entry: Any, ros: Middleware) -> Content:
     constants, fields = entry
     # rosbags adds the member that an empty struct has on ROS 2's wire; the definition does not name it.
     named = [(name, kind) for name, kind in fields if name != "structure_needs_at_least_one_member"]
@@ -92,11 +91,11 @@ def content_of_rosbags(entry: Any, ros: RosVersion) -> Content:
 
 @pytest.mark.parametrize(
     ("ros", "distribution"),
-    [(ros, name) for ros in RosVersion for name in distributions(ros)],
+    [(ros, name) for ros in (ROS1, ROS2) for name in ros.distributions()],
     ids=str,
 )
-def test_every_message_of_a_distribution_keeps_all_that_rosbags_knows(ros: RosVersion, distribution: str) -> None:
-    table = typestore(Stores(f"ros{int(ros)}_{distribution}")).fielddefs
+def test_every_message_of_a_distribution_keeps_all_that_rosbags_knows(ros: Middleware, distribution: str) -> None:
+    table = typestore(Stores(f"ros{ros.number}_{distribution}")).fielddefs
     library = MessageLibrary(ros, store=distribution)
     names = library.names()
     assert len(names) >= len(table) - 2 > 130  # without ROS 1's time and duration
@@ -190,14 +189,14 @@ def random_line(chance: random.Random) -> str:
     )
 
 
-def is_wider(line: str, ros: RosVersion) -> bool:
+def is_wider(line: str, ros: Middleware) -> bool:
     """Whether we mean to take the line though the reference does not; docs/reference/messages.md has the list."""
     if ros is ROS1:
         return "\t" in line
     return line[0].isspace() or "[ ]" in line
 
 
-def is_narrower(line: str, ros: RosVersion) -> bool:
+def is_narrower(line: str, ros: Middleware) -> bool:
     """Whether we mean to refuse the line though the reference takes it; docs/reference/messages.md has the list."""
     code = line.partition("#")[0].strip()
     if "float32" in code and "1e39" in code:
@@ -214,7 +213,7 @@ def is_narrower(line: str, ros: RosVersion) -> bool:
 
 
 @pytest.mark.parametrize(("ros", "reference"), REFERENCES)
-def test_random_lines(ros: RosVersion, reference: Reference) -> None:
+def test_random_lines(ros: Middleware, reference: Reference) -> None:
     seed = random.randrange(2**32)
     print(f"seed {seed}")
     chance = random.Random(seed)
@@ -238,15 +237,15 @@ def test_random_lines(ros: RosVersion, reference: Reference) -> None:
 # --- the corpus --------------------------------------------------------------------------------------------------
 
 
-def corpus(ros: RosVersion) -> list[tuple[MessageName, str]]:
-    paths = sorted(Path(CORPUS, f"ros{int(ros)}").glob("*/msg/*.msg"))
+def corpus(ros: Middleware) -> list[tuple[MessageName, str]]:
+    paths = sorted(Path(CORPUS, f"ros{ros.number}").glob("*/msg/*.msg"))
     assert paths, "CORPUS has no ros1/<package>/msg/*.msg or ros2/..."
     return [(MessageName(path.parts[-3], path.stem), path.read_text(encoding="utf-8")) for path in paths]
 
 
 @needs_corpus
 @pytest.mark.parametrize(("ros", "reference"), REFERENCES)
-def test_corpus_against_the_reference(ros: RosVersion, reference: Reference) -> None:
+def test_corpus_against_the_reference(ros: Middleware, reference: Reference) -> None:
     different, taken = [], 0
     for name, text in corpus(ros):
         mine = ours(text, name, ros)
@@ -254,12 +253,12 @@ def test_corpus_against_the_reference(ros: RosVersion, reference: Reference) -> 
         asked = MessageName(name.package, name.name.removesuffix("_FeedbackMessage"))
         different += [str(name)] if mine != reference(text, asked) else []
         taken += mine is not None
-    print(f"ROS {ros}: {taken} definitions agree with the reference")
+    print(f"{ros.title}: {taken} definitions agree with the reference")
     assert different == []
     assert taken > 0
 
 
-def rosbags_cannot_read(text: str, name: MessageName, ros: RosVersion) -> bool:
+def rosbags_cannot_read(text: str, name: MessageName, ros: Middleware) -> bool:
     """Known deviations of rosbags' parser, told by how the text looks to ours."""
     mine = ours(text, name, ros)
     if mine is None:
@@ -274,8 +273,8 @@ def rosbags_cannot_read(text: str, name: MessageName, ros: RosVersion) -> bool:
 
 
 @needs_corpus
-@pytest.mark.parametrize("ros", RosVersion)
-def test_corpus_against_rosbags(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_corpus_against_rosbags(ros: Middleware) -> None:
     different, compared, excluded = [], 0, 0
     for name, text in corpus(ros):
         if rosbags_cannot_read(text, name, ros):
@@ -292,14 +291,14 @@ def test_corpus_against_rosbags(ros: RosVersion) -> None:
             different.append((str(name), str(error).splitlines()[-1]))
             continue
         different += [(str(name), "content")] if theirs != (fields, mine[1]) else []
-    print(f"ROS {ros}: {compared} definitions compared with rosbags, {excluded} left out")
+    print(f"{ros.title}: {compared} definitions compared with rosbags, {excluded} left out")
     assert different == []
     assert compared > 10 * excluded
 
 
 @pytest.mark.parametrize(("ros", "reference"), REFERENCES)
 def test_what_msg_has_not_is_refused_by_the_reference_too(
-    ros: RosVersion, reference: Callable[[str, MessageName], Content | None]
+    ros: Middleware, reference: Callable[[str, MessageName], Content | None]
 ) -> None:
     name = MessageName("my_msgs", "Sample")
     *lines, right = NOT_IN_MSG.read_text(encoding="utf-8").splitlines()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
@@ -12,7 +14,6 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     Scalar,
     SequenceType,
     StringType,
@@ -27,19 +28,18 @@ from fusesoc_firm.message.parser import (
 )
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 NAME = MessageName("my_msgs", "Mine")
 SERVICE = MessageName("my_msgs", "Add")
 
 
-def parse(text: str, ros: RosVersion) -> MessageDefinition:
+def parse(text: str, ros: Middleware) -> MessageDefinition:
     diagnostics = Diagnostics()
     definition = parse_message(text, NAME, ros, "Mine.msg", diagnostics)
     diagnostics.raise_if_any()
     return definition
 
 
-def faults(text: str, ros: RosVersion) -> list[str]:
+def faults(text: str, ros: Middleware) -> list[str]:
     """Each fault as `line:column message`."""
     diagnostics = Diagnostics()
     parse_message(text, NAME, ros, "Mine.msg", diagnostics)
@@ -77,7 +77,7 @@ BOTH = [ROS1, ROS2]
         ("geometry_msgs/Point[3]", ArrayType(message("geometry_msgs", "Point"), 3)),
     ],
 )
-def test_types_of_both_versions(text: str, expected: FieldType, ros: RosVersion) -> None:
+def test_types_of_both_versions(text: str, expected: FieldType, ros: Middleware) -> None:
     assert [field.type for field in parse(f"{text} x", ros).fields] == [expected]
 
 
@@ -104,7 +104,7 @@ def test_types_of_both_versions(text: str, expected: FieldType, ros: RosVersion)
         ("string<=5[3]", ROS2, ArrayType(StringType(bound=5), 3)),
     ],
 )
-def test_types_of_one_version(text: str, ros: RosVersion, expected: FieldType) -> None:
+def test_types_of_one_version(text: str, ros: Middleware, expected: FieldType) -> None:
     assert [field.type for field in parse(f"{text} x", ros).fields] == [expected]
 
 
@@ -153,7 +153,7 @@ def test_types_of_one_version(text: str, ros: RosVersion, expected: FieldType) -
         ("Point P=1", ROS2, "1:1 'Point' is not a type for constants"),
     ],
 )
-def test_faults(line: str, ros: RosVersion, fault: str) -> None:
+def test_faults(line: str, ros: Middleware, fault: str) -> None:
     assert faults(line, ros) == [fault]
 
 
@@ -197,7 +197,7 @@ def test_faults(line: str, ros: RosVersion, fault: str) -> None:
         ("wstring S='w'", ROS2, "w"),
     ],
 )
-def test_constants(line: str, ros: RosVersion, value: Scalar) -> None:
+def test_constants(line: str, ros: Middleware, value: Scalar) -> None:
     definition = parse(line, ros)
     assert [constant.value for constant in definition.constants] == [value]
     assert type(definition.constants[0].value) is type(value)
@@ -213,7 +213,7 @@ def test_constants(line: str, ros: RosVersion, value: Scalar) -> None:
         ("string A = 'a' # b", ROS2, "'a'"),
     ],
 )
-def test_a_constant_keeps_how_it_is_written(line: str, ros: RosVersion, text: str) -> None:
+def test_a_constant_keeps_how_it_is_written(line: str, ros: Middleware, text: str) -> None:
     assert [constant.text for constant in parse(line, ros).constants] == [text]
 
 
@@ -240,7 +240,7 @@ def test_a_constant_keeps_how_it_is_written(line: str, ros: RosVersion, text: st
         ("string A='it's'", ROS2),
     ],
 )
-def test_values_out_of_range(line: str, ros: RosVersion) -> None:
+def test_values_out_of_range(line: str, ros: Middleware) -> None:
     (fault,) = faults(line, ros)
     assert fault.startswith(f"1:{line.index('=') + 2} ")
     assert "value of" in fault
@@ -295,7 +295,7 @@ def test_faulty_defaults(line: str, fault: str) -> None:
 
 @pytest.mark.parametrize("ros", BOTH)
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_lines_blanks_and_comments(end: str, ros: RosVersion) -> None:
+def test_lines_blanks_and_comments(end: str, ros: Middleware) -> None:
     lines = ["\ufeff# first", "", "   ", "uint8 A=1# one", "\tuint8\t \tx # the = sign", "  # = indented", "int8 y", ""]
     definition = parse(end.join(lines), ros)
     assert [(c.name, c.source.line) for c in definition.constants] == [("A", 4)]
@@ -307,7 +307,7 @@ def test_a_byte_order_mark_moves_no_column() -> None:
 
 
 @pytest.mark.parametrize("ros", BOTH)
-def test_a_form_feed_in_a_comment_ends_no_line(ros: RosVersion) -> None:
+def test_a_form_feed_in_a_comment_ends_no_line(ros: Middleware) -> None:
     assert parse("# a\x0cb\u2028c\nuint8 x", ros).fields[0].source.line == 2
 
 
@@ -322,7 +322,7 @@ def test_a_field_points_at_its_type() -> None:
     ("text", "place"),
     [("uint8 x\n\nint8 x", "3:6"), ("uint8 A=1\nuint8 A=1", "2:7")],
 )
-def test_duplicate_names(text: str, place: str, ros: RosVersion) -> None:
+def test_duplicate_names(text: str, place: str, ros: Middleware) -> None:
     name = text.rsplit(maxsplit=1)[-1].partition("=")[0]
     assert faults(text, ros) == [f"{place} '{name}' is declared twice"]
 
@@ -408,7 +408,7 @@ def test_a_wrong_number_of_sections(text: str, fault: str) -> None:
     assert [str(d).splitlines()[0] for d in diagnostics.found] == [fault]
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_a_size_of_thousands_of_digits_is_a_fault_like_any_other(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_a_size_of_thousands_of_digits_is_a_fault_like_any_other(ros: Middleware) -> None:
     digits = "9" * 5000
     assert faults(f"uint8[{digits}] x", ros) == [f"1:7 '{digits}' is not a size"]

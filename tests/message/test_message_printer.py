@@ -7,7 +7,9 @@ from dataclasses import replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fusesoc_firm.message.dialect import Dialect, dialect_of
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.dialect import Dialect
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     Constant,
@@ -19,12 +21,11 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     Scalar,
     SequenceType,
     StringType,
 )
-from fusesoc_firm.message.parser import parse_message
+from fusesoc_firm.message.parser import dialect_of, parse_message
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 
@@ -32,7 +33,7 @@ NOWHERE = SourceRef("", 0, 0)
 NAME = MessageName("my_msgs", "Mine")
 
 
-def parse(text: str, ros: RosVersion) -> MessageDefinition:
+def parse(text: str, ros: Middleware) -> MessageDefinition:
     diagnostics = Diagnostics()
     definition = parse_message(text, NAME, ros, "Mine.msg", diagnostics)
     diagnostics.raise_if_any()
@@ -43,15 +44,14 @@ def without_places(definition: MessageDefinition) -> MessageDefinition:
     """Without sources, and without how a constant is written where that means nothing."""
     fields = tuple(replace(field, source=NOWHERE) for field in definition.fields)
     constants = tuple(
-        replace(c, source=NOWHERE, text=c.text if definition.ros is RosVersion.ROS1 else "")
-        for c in definition.constants
+        replace(c, source=NOWHERE, text=c.text if definition.ros is ROS1 else "") for c in definition.constants
     )
     return replace(definition, fields=fields, constants=constants, source=NOWHERE)
 
 
 def test_ros1_text() -> None:
     text = "Header header\nstring S=a # b\nuint8 LONGER=1\nbool B=False\nPoint[]   p\nuint8[3] xyz # lost"
-    assert to_text(parse(text, RosVersion.ROS1)) == (
+    assert to_text(parse(text, ROS1)) == (
         "# my_msgs/Mine (ROS 1)\n"
         "\n"
         "string S      = a # b\n"
@@ -66,7 +66,7 @@ def test_ros1_text() -> None:
 
 def test_a_value_of_ros1_stays_as_it_was_written() -> None:
     text = "float32 A= +1.50 # one and a half\nint8 B=-07\nbool C=1"
-    assert to_text(parse(text, RosVersion.ROS1)).splitlines()[2:] == [
+    assert to_text(parse(text, ROS1)).splitlines()[2:] == [
         "float32 A = +1.50",
         "int8    B = -07",
         "bool    C = 1",
@@ -75,7 +75,7 @@ def test_a_value_of_ros1_stays_as_it_was_written() -> None:
 
 def test_ros2_text() -> None:
     text = "string<=5[<=2] names ['a', b]\nbool ok true\nint32 x\nstring NAME='say \"no\"'\nwstring w 'w'"
-    assert to_text(parse(text, RosVersion.ROS2)) == (
+    assert to_text(parse(text, ROS2)) == (
         "# my_msgs/Mine (ROS 2)\n"
         "\n"
         'string NAME = "say \\"no\\""\n'
@@ -88,11 +88,11 @@ def test_ros2_text() -> None:
 
 
 def test_an_empty_message_has_only_its_header() -> None:
-    assert to_text(parse("", RosVersion.ROS1)) == "# my_msgs/Mine (ROS 1)\n"
+    assert to_text(parse("", ROS1)) == "# my_msgs/Mine (ROS 1)\n"
 
 
 def test_a_signature_stands_in_the_header() -> None:
-    text = to_text(parse("uint8 x", RosVersion.ROS2), "RIHS01_12")
+    text = to_text(parse("uint8 x", ROS2), "RIHS01_12")
     assert text == "# my_msgs/Mine (ROS 2)\n# signature: RIHS01_12\n\nuint8 x\n"
 
 
@@ -101,10 +101,10 @@ SIZES = st.integers(1, 2**32 - 1)
 
 def texts(dialect: Dialect, largest: int | None) -> st.SearchStrategy[str]:
     """Strings that the version can write: one line, and in ROS 2 no `#`, with `=` too in no default."""
-    forbidden = "" if dialect.ros is RosVersion.ROS1 else "#="
+    forbidden = "" if dialect.title == ROS1.title else "#="
     characters = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc", "Zl", "Zp"), exclude_characters=forbidden)
     text = st.text(characters, max_size=min(12, largest) if largest else 12)
-    return text.map(str.strip) if dialect.ros is RosVersion.ROS1 else text
+    return text.map(str.strip) if dialect.title == ROS1.title else text
 
 
 def values(kind: PrimitiveType | StringType, dialect: Dialect) -> st.SearchStrategy[Scalar]:
@@ -121,7 +121,11 @@ def elements(dialect: Dialect) -> st.SearchStrategy[ElementType]:
     primitives = st.sampled_from(sorted(dialect.primitives)).map(PrimitiveType)
     bounds = st.none() | SIZES if dialect.has_bounds else st.none()
     wide = st.booleans() if "wstring" in dialect.strings else st.just(False)
-    messages = st.builds(MessageName, st.from_regex(dialect.package_name.pattern, fullmatch=True), st.just("Point"))
+    messages = st.builds(
+        MessageName,
+        st.from_regex(dialect.package_name.pattern, fullmatch=True).filter(dialect.package_name.accepts),
+        st.just("Point"),
+    )
     return primitives | st.builds(StringType, wide, bounds) | messages.map(MessageType)
 
 
@@ -156,22 +160,30 @@ def defaults(draw: st.DrawFn, kind: FieldType, dialect: Dialect) -> DefaultValue
 
 @st.composite
 def definitions(draw: st.DrawFn) -> MessageDefinition:
-    ros = draw(st.sampled_from(list(RosVersion)))
+    ros = draw(st.sampled_from([ROS1, ROS2]))
     dialect = dialect_of(ros)
-    names = st.lists(st.from_regex(dialect.field_name.pattern, fullmatch=True), max_size=6, unique=True)
+    names = st.lists(
+        st.from_regex(dialect.field_name.pattern, fullmatch=True).filter(dialect.field_name.accepts),
+        max_size=6,
+        unique=True,
+    )
     fields = []
     for name in draw(names):
         kind = draw(field_types(dialect))
         fields.append(Field(name, kind, NOWHERE, draw(defaults(kind, dialect))))
     constants = []
-    constant_names = st.lists(st.from_regex(dialect.constant_name.pattern, fullmatch=True), max_size=4, unique=True)
+    constant_names = st.lists(
+        st.from_regex(dialect.constant_name.pattern, fullmatch=True).filter(dialect.constant_name.accepts),
+        max_size=4,
+        unique=True,
+    )
     for name in draw(constant_names):
         kinds = sorted(dialect.builtin_types - dialect.opaque_primitives)
         word = draw(st.sampled_from(kinds))
         constant_type = StringType(word == "wstring") if word in dialect.strings else PrimitiveType(word)
         if name not in {field.name for field in fields}:
             value = draw(values(constant_type, dialect))
-            written = str(value) if ros is RosVersion.ROS1 else ""
+            written = str(value) if ros is ROS1 else ""
             constants.append(Constant(name, constant_type, value, written, NOWHERE))
     return MessageDefinition(NAME, ros, tuple(fields), tuple(constants), NOWHERE)
 

@@ -18,31 +18,31 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
     FieldType,
     MessageDefinition,
     MessageName,
     MessageType,
-    RosVersion,
     SequenceType,
     StringType,
 )
 from fusesoc_firm.message.parser import parse_message, parse_name
 from fusesoc_firm.message.signature import md5, rihs01, signature
-from fusesoc_firm.message.stores import DistributionStore, distributions
+from fusesoc_firm.message.stores import DistributionStore
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from tests.typestores import typestore
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 CORPUS = os.environ.get("CORPUS", "")
 needs_corpus = pytest.mark.skipif(not CORPUS, reason="CORPUS names no folder")
 
 Definitions = dict[MessageName, MessageDefinition]
 
 
-def define(ros: RosVersion, **texts: str) -> Definitions:
+def define(ros: Middleware, **texts: str) -> Definitions:
     """Messages of the package `my_msgs`."""
     diagnostics = Diagnostics()
     names = {name: MessageName("my_msgs", name) for name in texts}
@@ -203,7 +203,7 @@ def rosbags_name(name: MessageName) -> str:
     return f"{name.package}/msg/{name.name}"
 
 
-def rosbags_signature(store: Typestore, name: MessageName, ros: RosVersion) -> str | None:
+def rosbags_signature(store: Typestore, name: MessageName, ros: Middleware) -> str | None:
     """None for what holds a wide string: rosbags has none."""
     if ros is ROS1:
         return store.generate_msgdef(rosbags_name(name))[1]
@@ -222,7 +222,7 @@ def has_rosbags_wrong(definition: MessageDefinition) -> bool:
     return not words.isdisjoint({"char", "wstring"})
 
 
-def different_from_rosbags(closures: dict[MessageName, Definitions], store: Typestore, ros: RosVersion) -> list[str]:
+def different_from_rosbags(closures: dict[MessageName, Definitions], store: Typestore, ros: Middleware) -> list[str]:
     """The messages whose signature is rosbags' though it is known to be wrong, or is not though it should be."""
     return [
         str(name)
@@ -234,13 +234,13 @@ def different_from_rosbags(closures: dict[MessageName, Definitions], store: Type
 
 @pytest.mark.parametrize(
     ("ros", "distribution"),
-    [(ros, name) for ros in RosVersion for name in distributions(ros)],
+    [(ros, name) for ros in (ROS1, ROS2) for name in ros.distributions()],
     ids=str,
 )
-def test_every_message_of_a_distribution_has_the_signature_of_rosbags(ros: RosVersion, distribution: str) -> None:
+def test_every_message_of_a_distribution_has_the_signature_of_rosbags(ros: Middleware, distribution: str) -> None:
     library = MessageLibrary(ros, store=distribution)
     closures = {name: library.closure(name) for name in library.names()}
-    store = typestore(Stores(f"ros{int(ros)}_{distribution}"))
+    store = typestore(Stores(f"ros{ros.number}_{distribution}"))
     assert different_from_rosbags(closures, store, ros) == []
     assert len(closures) > 130
 
@@ -303,15 +303,15 @@ def test_random_messages_have_the_sums_of_genmsg() -> None:
 class Corpus:
     """The messages of the corpus, and those of the distribution that they hold."""
 
-    def __init__(self, ros: RosVersion) -> None:
-        self._library = MessageLibrary(ros, [Path(CORPUS, f"ros{int(ros)}")])
+    def __init__(self, ros: Middleware) -> None:
+        self._library = MessageLibrary(ros, [Path(CORPUS, f"ros{ros.number}")])
         self.names = [name for name in self._library.names() if self._library.files([name])]
         # Messages whose parts are all known and right; each part is in the corpus or in the distribution.
         self.closures: dict[MessageName, Definitions] = {}
         for name in self.names:
             with contextlib.suppress(InputError):
                 self.closures[name] = self._library.closure(name)
-        store = DistributionStore(ros)
+        store = DistributionStore(ros.number)
         parts = {part for closure in self.closures.values() for part in closure}
         self.texts = {part: store.text(part) for part in parts - set(self.names)}
         for name in self.names:
@@ -357,12 +357,12 @@ def rosbags_store(definitions: Iterable[MessageDefinition]) -> Typestore:
 
 
 @needs_corpus
-@pytest.mark.parametrize("ros", RosVersion)
-def test_corpus_against_rosbags(ros: RosVersion) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_corpus_against_rosbags(ros: Middleware) -> None:
     corpus = Corpus(ros)
     closures = corpus.closures
     store = rosbags_store(definition for closure in closures.values() for definition in closure.values())
     assert different_from_rosbags(closures, store, ros) == []
     wrong = sum(any(has_rosbags_wrong(part) for part in closure.values()) for closure in closures.values())
-    print(f"ROS {ros}: {len(closures)} of {len(corpus.names)} messages compared with rosbags, wrong there: {wrong}")
+    print(f"{ros.title}: {len(closures)} of {len(corpus.names)} messages compared with rosbags, wrong there: {wrong}")
     assert len(closures) > 10 * wrong

@@ -28,7 +28,6 @@ from fusesoc_firm.message.model import (
     MessageName,
     MessageType,
     PrimitiveType,
-    RosVersion,
     SequenceType,
     StringType,
 )
@@ -60,7 +59,7 @@ RULES = WireRules(
 TYPES = frozenset(RULES.scalars) | frozenset(RULES.compounds) | {"text"}
 
 
-def parse(text: str, name: MessageName, ros: RosVersion, file: str, diagnostics: Diagnostics) -> MessageDefinition:
+def parse(text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics) -> MessageDefinition:
     """Reads a definition; a line that is wrong is noted, and hides nothing in the next."""
     lines = [line.partition("#")[0] for line in read_lines(text, file)]
     fields = [_field(line, name.package, diagnostics) for line in lines if line.text]
@@ -131,7 +130,8 @@ def _folders(environment: Mapping[str, str]) -> list[Path]:
 
 
 MIDDLEWARE = Middleware(
-    ros=RosVersion.add(3, "Parcel"),
+    number=3,
+    title="Parcel",
     words=("PARCEL",),
     rules=RULES,
     parse=parse,

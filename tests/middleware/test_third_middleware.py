@@ -22,7 +22,8 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message import middleware
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
+from fusesoc_firm.message.middleware import MIDDLEWARES
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.text.render import render
@@ -44,7 +45,6 @@ DEFINITIONS = {
 @pytest.fixture
 def parcel(monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
     """The module, registered until the test ends."""
-    monkeypatch.setattr(RosVersion, "known", dict(RosVersion.known))
     monkeypatch.setattr(middleware, "_registered", dict(middleware._registered))
     words = dict(MIDDLEWARES)
     module = importlib.import_module("tests.middleware.parcel")
@@ -105,7 +105,7 @@ def packed(message: MessageName, value: dict[str, Any]) -> bytes:
 def test_its_layout_and_codec(message: MessageName, parcel: ModuleType, package: Path) -> None:
     print(f"seed {SEED}")
     chance = random.Random(SEED)
-    library = libraries([package], None, None)[parcel.MIDDLEWARE.ros]
+    library = libraries([package], None, None)[parcel.MIDDLEWARE]
     frame = frame_of(message, library.closure(message))
     assert (frame.ros.title, frame.is_fixed_size) == ("Parcel", message == POSE)
     for _ in range(30):
@@ -122,7 +122,7 @@ def test_its_converters_in_simulation(
     """What the host sends to the subscriber comes back from the publisher."""
     print(f"seed {SEED}")
     chance = random.Random(SEED)
-    definitions = MessageLibrary(parcel.MIDDLEWARE.ros, [package]).closure(message)
+    definitions = MessageLibrary(parcel.MIDDLEWARE, [package]).closure(message)
     frame = frame_of(message, definitions)
     payloads = [packed(message, value_of(message, chance)) for _ in range(5)]
     write_frames(
@@ -147,7 +147,7 @@ def write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
 
 
 def test_its_signature(parcel: ModuleType, package: Path) -> None:
-    definitions = MessageLibrary(parcel.MIDDLEWARE.ros, [package]).closure(POSE)
+    definitions = MessageLibrary(parcel.MIDDLEWARE, [package]).closure(POSE)
     assert signature(POSE, definitions) == parcel.checksum(POSE, definitions)
     text = render(CONSTANTS_TEMPLATE, constants_configuration(POSE, definitions, "lab_pose_pkg"))
     assert f'"{parcel.checksum(POSE, definitions)}"' in text
@@ -155,7 +155,7 @@ def test_its_signature(parcel: ModuleType, package: Path) -> None:
 
 def test_its_faults_and_its_places(parcel: ModuleType, package: Path) -> None:
     (package / "Bad.parcel").write_text("id u16\nlevel: f33\nsome: -1 u8\n", encoding="utf-8")
-    library = MessageLibrary(parcel.MIDDLEWARE.ros, (), {"PARCEL_HOME": str(package)})
+    library = MessageLibrary(parcel.MIDDLEWARE, (), {"PARCEL_HOME": str(package)})
     with pytest.raises(InputError) as raised:
         library.get(MessageName("lab", "Bad"))
     places = [(fault.source.line, fault.message) for fault in raised.value.diagnostics if fault.source]

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.codec import pack_frame
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.node.bursts import split_frame
 from fusesoc_firm.node.carrier import CarrierError, ros_arguments
 from fusesoc_firm.node.description import describe
@@ -491,7 +491,7 @@ def test_what_cannot_be_drawn_is_told(tmp_path: Path, table: str, picture: str, 
 def test_the_generated_file_has_the_table(tmp_path: Path, kinds: tuple[str, ...]) -> None:
     system = with_software(tmp_path, *kinds)
     spec = tmp_path / "spec.yaml"
-    (source,) = python_node(system, RosVersion.ROS1, spec, tmp_path / "nodes" / "robot").values()
+    (source,) = python_node(system, ROS1, spec, tmp_path / "nodes" / "robot").values()
     names: dict[str, object] = {"__name__": "generated"}
     exec(compile(source, "robot_node.py", "exec"), names)
     assert names["NODE"] == describe(system)
@@ -501,7 +501,7 @@ def test_the_generated_file_has_the_table(tmp_path: Path, kinds: tuple[str, ...]
 
 def test_a_generated_file_of_another_version_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="system 'robot' has no topic of ROS 2"):
-        python_node(pairs(tmp_path), RosVersion.ROS2, tmp_path / "spec.yaml", tmp_path)
+        python_node(pairs(tmp_path), ROS2, tmp_path / "spec.yaml", tmp_path)
 
 
 def parsed(line: str) -> tuple[argparse.Namespace, tuple[str, ...]]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.message.library import libraries
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.node.package import cpp_package, generated_files, headers
 from fusesoc_firm.plugin.gapi import GENERATORS
 from fusesoc_firm.request.request import Request
@@ -140,7 +140,7 @@ def test_nested_messages_are_part_of_a_definition() -> None:
 def test_what_no_node_can_serve_is_refused(tmp_path: Path, text: str, ros: int | None, message: str) -> None:
     loaded = written(tmp_path, text)
     with pytest.raises(InputError) as caught:
-        cpp_package(loaded, RosVersion(ros) if ros else None)
+        cpp_package(loaded, middleware_of(ros) if ros else None)
     assert messages(caught.value) == [message]
 
 

@@ -156,7 +156,7 @@ def test_mcap_and_its_decoder_of_ros2(tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", [Form.SQLITE3, Form.MCAP, Form.ROS1])
 def test_rosbags(tmp_path: Path, form: Form) -> None:
     """Its reader makes types of the definitions, and refuses a bag whose hashes are others than those of the types."""
-    path, _, expected = recorded(tmp_path, int(form.ros), form)
+    path, _, expected = recorded(tmp_path, form.ros.number, form)
     with AnyReader([path]) as reader:
         assert {(item.topic, item.msgtype, item.msgcount) for item in reader.connections} == {
             ("/plan_out", "own_msgs/msg/Plan", 5),

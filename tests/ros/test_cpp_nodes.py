@@ -21,7 +21,8 @@ from fusesoc_firm.cli import main
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import middleware_of
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.node.description import describe
 from fusesoc_firm.node.steps import write_ways
 from fusesoc_firm.simulation.simulator import build_simulator
@@ -215,7 +216,7 @@ def test_blocks_in_software_run_beside_the_hardware(workshop: Workshop) -> None:
     spec = workshop.specification("image_pipeline_software")
     model, source = load_model("image_pipeline"), random.Random(SEED)
     name = MessageName("sensor_msgs", "Image")
-    frame = frame_of(name, MessageLibrary(RosVersion.ROS1).closure(name))
+    frame = frame_of(name, MessageLibrary(middleware_of(1)).closure(name))
     software = f"PYTHONPATH={REPOSITORY} exec {sys.executable} -m fusesoc_firm.node.software_process {spec}"
     program, transport = workshop.program("image_pipeline_software"), live_simulator(workshop, spec)
     with (

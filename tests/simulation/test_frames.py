@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.simulation.frames import expected_text, stimulus_text
 from fusesoc_firm.simulation.reference import responses
 from fusesoc_firm.simulation.stimuli import read_stimuli
 from fusesoc_firm.system.derived.model import Converter
 
-_LIBRARY = MessageLibrary(RosVersion.ROS1)
+_LIBRARY = MessageLibrary(ROS1)
 
 
 def converter(block: str, message: str) -> Converter:

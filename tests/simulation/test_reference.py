@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.simulation.reference import Response, responses
 from fusesoc_firm.simulation.stimuli import Stimulus
@@ -17,7 +17,7 @@ from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.text.diagnostics import InputError
 
 POINT = parse_name("geometry_msgs/Point")
-FRAME = frame_of(POINT, MessageLibrary(RosVersion.ROS1).closure(POINT))
+FRAME = frame_of(POINT, MessageLibrary(ROS1).closure(POINT))
 PUBLISHERS = (Converter("left", FRAME, 0), Converter("right", FRAME, 1))
 
 

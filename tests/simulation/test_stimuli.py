@@ -13,17 +13,18 @@ from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.simulation.stimuli import Stimulus, read_stimuli
 from fusesoc_firm.system.derived.model import Converter
 from fusesoc_firm.text.diagnostics import InputError
 
-LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 
 
-def frame(message: str, ros: RosVersion = RosVersion.ROS1) -> Frame:
+def frame(message: str, ros: Middleware = ROS1) -> Frame:
     name = parse_name(message)
     return frame_of(name, LIBRARIES[ros].closure(name))
 
@@ -36,7 +37,7 @@ SUBSCRIBERS = (
     Converter("flag", frame("std_msgs/Bool"), 4),
     Converter("nothing", frame("std_msgs/Empty"), 5),
     Converter("pose", frame("geometry_msgs/PoseWithCovariance"), 6),
-    Converter("state", frame("geometry_msgs/Pose", RosVersion.ROS2), 7),
+    Converter("state", frame("geometry_msgs/Pose", ROS2), 7),
 )
 
 
@@ -66,8 +67,8 @@ def test_messages_come_in_order_with_their_payload(tmp_path: Path) -> None:
     assert found[0].message == {"x": 1.0, "y": 2.5, "z": -3.0}
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_what_the_subscriber_has_no_port_for_may_be_left_out(ros: RosVersion, tmp_path: Path) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_what_the_subscriber_has_no_port_for_may_be_left_out(ros: Middleware, tmp_path: Path) -> None:
     """Numbers, texts and arrays, and parts of the elements of an array; what is given is sent."""
     name = parse_name("sensor_msgs/PointCloud2")
     whole = frame_of(name, LIBRARIES[ros].closure(name))
@@ -91,7 +92,7 @@ def test_what_the_subscriber_has_no_port_for_may_be_left_out(ros: RosVersion, tm
 
 
 def test_what_is_left_out_of_a_fixed_message_is_its_default(tmp_path: Path) -> None:
-    used = select(frame("geometry_msgs/Pose", RosVersion.ROS2), {"position.y": None})
+    used = select(frame("geometry_msgs/Pose", ROS2), {"position.y": None})
     path = tmp_path / "stimuli.yaml"
     path.write_text("- pose: {position: {y: 2, x: 1}}\n", encoding="utf-8")
     (stimulus,) = read_stimuli(path, [Converter("pose", used, 0)])
@@ -258,10 +259,10 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 VARIABLE = (
     Converter("text", frame("std_msgs/String"), 0),
-    Converter("scan", frame("sensor_msgs/LaserScan", RosVersion.ROS2), 1),
-    Converter("status", frame("diagnostic_msgs/DiagnosticStatus", RosVersion.ROS2), 2),
+    Converter("scan", frame("sensor_msgs/LaserScan", ROS2), 1),
+    Converter("status", frame("diagnostic_msgs/DiagnosticStatus", ROS2), 2),
     Converter("names", frame("sensor_msgs/JointState"), 3),
-    Converter("solid", frame("shape_msgs/SolidPrimitive", RosVersion.ROS2), 4),
+    Converter("solid", frame("shape_msgs/SolidPrimitive", ROS2), 4),
 )
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.derived.analysis import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.written.specification import Specification, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
-LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 
 _SHORT = {"Point": "geometry_msgs/Point", "Vector3": "geometry_msgs/Vector3", "Pose": "geometry_msgs/Pose"}
 

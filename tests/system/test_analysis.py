@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.request.request import Request
 from fusesoc_firm.system.system_core import load_requested, load_system
 from fusesoc_firm.system.written.specification import Specification
@@ -67,7 +67,7 @@ def test_the_version_of_ros(tmp_path: Path, ros: str) -> None:
         "p", "publisher", "geometry_msgs/Point", ros=ros
     )
     (subscriber,) = derived(tmp_path, specification(blocks)).subscribers
-    assert subscriber.frame.ros is (RosVersion.ROS2 if ros == "ROS2" else RosVersion.ROS1)
+    assert subscriber.frame.ros is (ROS2 if ros == "ROS2" else ROS1)
 
 
 def test_accelerators_in_a_row_and_one_type_used_twice(tmp_path: Path) -> None:

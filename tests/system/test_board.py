@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.boards.board import (
     BOARD_TEMPLATE,
     FLOWS,
@@ -24,7 +24,7 @@ from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.render import render
 
-LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 SPECIFICATION = """
 project: {{name: robot, clock: 100 MHz, scheduler: {scheduler}}}
 blocks:

@@ -11,7 +11,7 @@ import pytest
 from fusesoc_firm.frame.codec import decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.select import names_in_use
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import load_system
 from fusesoc_firm.text.diagnostics import InputError
@@ -176,7 +176,7 @@ def test_a_first_version_answers_with_the_message(tmp_path: Path) -> None:
     """For messages of all kinds: what it returns can be sent, and all values are those of none."""
     source = random.Random(SEED)
     print(f"seed {SEED}")
-    known = [str(name) for name in LIBRARIES[RosVersion.ROS1].names() if str(name).partition("/")[0] != "std_msgs"]
+    known = [str(name) for name in LIBRARIES[ROS1].names() if str(name).partition("/")[0] != "std_msgs"]
     for number, name in enumerate(source.sample(known, 25)):
         folder = tmp_path / str(number)
         folder.mkdir()

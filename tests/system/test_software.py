@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.frame.select import names_in_use
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.derived.model import Connection, DerivedSystem, End
 from fusesoc_firm.system.hardware.configuration import system_configuration
 from fusesoc_firm.system.system_core import load_system
@@ -434,7 +434,7 @@ def test_sources_and_messages_of_software_are_inputs(tmp_path: Path) -> None:
     )
     path = tmp_path / "spec.yaml"
     path.write_text(specification(blocks, types), encoding="utf-8")
-    libraries = {ros: MessageLibrary(ros, [tmp_path / "own_msgs"]) for ros in RosVersion}
+    libraries = {ros: MessageLibrary(ros, [tmp_path / "own_msgs"]) for ros in (ROS1, ROS2)}
     assert load_system(path, libraries).inputs() == [tmp_path / "node.py", definition]
 
 

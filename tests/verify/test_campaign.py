@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.workers import Workers
 from fusesoc_firm.verify.campaign import Entry, Settings, run, select
 from fusesoc_firm.verify.task import Result, Task, Verdict
-from tests.verify.messages import ROS1, ROS2
 
 
 class Pretenders(Workers):

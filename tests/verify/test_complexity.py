@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.verify.complexity import Level, Statistics, statistics
-from tests.verify.messages import ROS1, ROS2, own, standard
+from tests.verify.messages import own, standard
 
 S, E, A, V = Level.SIMPLE, Level.EXPANDING, Level.ARRAYS, Level.VARIABLE_SUBMESSAGES
 
@@ -33,7 +34,7 @@ S, E, A, V = Level.SIMPLE, Level.EXPANDING, Level.ARRAYS, Level.VARIABLE_SUBMESS
         (ROS1, "sensor_msgs/JointState", Statistics(V, 7, 5, 2)),
     ],
 )
-def test_messages_of_distributions(ros: RosVersion, name: str, expected: Statistics) -> None:
+def test_messages_of_distributions(ros: Middleware, name: str, expected: Statistics) -> None:
     assert statistics(*standard(ros, name)) == expected
 
 

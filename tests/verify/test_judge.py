@@ -6,11 +6,12 @@ import random
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.verify import genpy_judge, judge, mcap_judge, rosbags_judge
 from fusesoc_firm.verify.definitions import NoJudgementError
 from fusesoc_firm.verify.stimuli import KINDS, Stimuli
 from tests.frame.samples import AWKWARD
-from tests.verify.messages import ROS1, ROS2, Definitions, own, standard
+from tests.verify.messages import Definitions, own, standard
 
 needs_genpy = pytest.mark.skipif(not genpy_judge.is_installed(), reason="no Python of this machine has genpy")
 STANDARD = [

@@ -7,12 +7,12 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.campaign import Entry, Settings
 from fusesoc_firm.verify.complexity import Level, Statistics
 from fusesoc_firm.verify.report import Histogram, Report, as_data, as_html, histogram, write_report
 from fusesoc_firm.verify.task import Result, Verdict
-from tests.verify.messages import ROS1, ROS2
 
 ENTRIES = (
     Entry(

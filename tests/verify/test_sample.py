@@ -8,26 +8,27 @@ from typing import Any
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message.middleware import Middleware, middleware_of
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.complexity import Level, statistics
 from fusesoc_firm.verify.task import Task, Verdict, verify
 
 SEED = 20240602
 WIDTHS = (8, 64)
-LIBRARIES = {ros: MessageLibrary(ros) for ros in RosVersion}
+LIBRARIES = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
 
 
-def sample() -> list[tuple[RosVersion, Level, str]]:
+def sample() -> list[tuple[Middleware, Level, str]]:
     lines = (Path(__file__).parent / "data" / "sample.txt").read_text().splitlines()
     words = [line.split() for line in lines if not line.startswith("#")]
-    return [(RosVersion(int(ros)), Level(int(level)), name) for ros, level, name in words]
+    return [(middleware_of(int(ros)), Level(int(level)), name) for ros, level, name in words]
 
 
 def cases() -> list[Any]:
     return [
-        pytest.param(ros, name, width, id=f"ros{int(ros)}-{name}-{width}")
+        pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
         for ros, _, name in sample()
         for width in WIDTHS
     ]
@@ -43,7 +44,7 @@ def test_the_sample_holds_all_levels() -> None:
 
 @pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), cases())
-def test_converters_of_the_sample(ros: RosVersion, name: str, width: int) -> None:
+def test_converters_of_the_sample(ros: Middleware, name: str, width: int) -> None:
     message = parse_name(name)
     found = verify(Task(message, LIBRARIES[ros].closure(message), width, stimuli=4, seed=SEED))
     assert (found.verdict, found.detail) == (Verdict.PASS, "")

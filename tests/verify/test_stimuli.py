@@ -11,8 +11,9 @@ import pytest
 
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, KINDS, ONE, TYPICAL, Stimuli, kinds
-from tests.verify.messages import ROS1, ROS2, Definitions, own
+from tests.verify.messages import Definitions, own
 
 SEEDS = range(40)
 DEEP = {"A": "float32[] x\n", "B": "A[] a\nstring[] s\n", "C": "B[] b\n", "D": "C[] c\nuint8[] d\n"}

@@ -22,6 +22,7 @@ import pytest
 from fusesoc_firm.cli import main
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Fixed, Frame
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.request.request import GeneratedFile
@@ -33,7 +34,7 @@ from fusesoc_firm.verify.judge import Judgement, judge
 from fusesoc_firm.verify.task import Result, Task, Verdict, verify
 from tests.hdl.ghdl import CORES, REPOSITORY, Library
 from tests.processes import IGNORING_INTERRUPTS
-from tests.verify.messages import ROS1, ROS2, standard
+from tests.verify.messages import standard
 
 Captured = pytest.CaptureFixture[str]
 Files = Callable[[Iterable[Frame], int], dict[str, GeneratedFile]]

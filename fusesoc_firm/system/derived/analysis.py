@@ -14,7 +14,8 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Names, names_in_use, select, with_names_in_use
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MIDDLEWARES, MessageName, RosVersion
+from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.connections import Wiring, places
@@ -58,7 +59,7 @@ from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.yaml_sections import keys_only_of
 from fusesoc_firm.text.yaml_text import Text
 
-Libraries = Mapping[RosVersion, MessageLibrary]
+Libraries = Mapping[Middleware, MessageLibrary]
 _KINDS_OF_BLOCKS = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
 
 
@@ -133,7 +134,7 @@ class _Analysis:
     libraries: Libraries
     faults: Diagnostics
     needs_sources: bool
-    frames: dict[tuple[RosVersion, MessageName], Frame] = field(default_factory=dict)
+    frames: dict[tuple[Middleware, MessageName], Frame] = field(default_factory=dict)
     types: dict[str, AcceleratorType] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
     inputs: dict[str, tuple[MessageSide, ...]] = field(default_factory=dict)

@@ -12,7 +12,8 @@ from graphlib import CycleError, TopologicalSorter
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Names, Paths, names_in_use, select, with_names_in_use
 from fusesoc_firm.frame.values import dotted
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.system.derived.model import Connection, End, MessageSide
 from fusesoc_firm.system.written.specification import Block, Outgoing
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, nearest
@@ -40,7 +41,7 @@ class Wiring:
     faults: Diagnostics
     has_more_blocks: bool = False
     has_more_messages: bool = False
-    strays: set[tuple[MessageName, RosVersion]] = field(default_factory=set)
+    strays: set[tuple[MessageName, Middleware]] = field(default_factory=set)
     ambiguous: set[str] = field(default_factory=set)
     # The fields that go from each source to each of its sinks, and who drives each field of a sink.
     sinks: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)

@@ -12,7 +12,8 @@ from fractions import Fraction
 from functools import cached_property
 
 from fusesoc_firm.frame.model import Frame
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.system.written.specification import Accelerator
 from fusesoc_firm.text.naming import identifier
 
@@ -96,7 +97,7 @@ class MessageSide:
     length: PayloadLength | None = None
 
     @property
-    def kind(self) -> tuple[MessageName, RosVersion]:
+    def kind(self) -> tuple[MessageName, Middleware]:
         """What connects two sides: the message, whichever fields of it they use."""
         return self.frame.message, self.frame.ros
 

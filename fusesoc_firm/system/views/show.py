@@ -159,7 +159,7 @@ def _given(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]
 
 
 def _message(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
-    return {"name": system.names[end], "nameMW": str(side.frame.message), "ROS": int(side.frame.ros)}
+    return {"name": system.names[end], "nameMW": str(side.frame.message), "ROS": side.frame.ros.number}
 
 
 def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> dict[str, Any]:
@@ -174,7 +174,7 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
     return {
         "nameBD": entity,
         "nameMW": str(converter.frame.message),
-        "ROS": int(converter.frame.ros),
+        "ROS": converter.frame.ros.number,
         "block": converter.block,
         **({"software": converter.software.block} if converter.software else {"topic": converter.name}),
         "id": converter.id,

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.message.model import MIDDLEWARES
+from fusesoc_firm.message.middleware import MIDDLEWARES
 from fusesoc_firm.scheduling.policies import DEFAULT, POLICIES
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, fail
 from fusesoc_firm.text.naming import LONGEST_PATH, text_fault

@@ -1,7 +1,7 @@
 """The two converters of a message back to back behind the Manager, and what must come of the frames sent to them.
 
     bench = ConverterBench(tmp_path)                    # analyses the library once
-    pair = bench.pair(RosVersion.ROS2, "geometry_msgs/Point")
+    pair = bench.pair(ROS2, "geometry_msgs/Point")
     result = pair.run(tmp_path, [pair.frame_of(payload)], SEED=7, STALL_PERCENT=30)
 
 Payloads come from rosbags; which frames are good, and why not, is decided here by docs/reference/converters.md
@@ -26,7 +26,8 @@ from fusesoc_firm.converter.ports import FieldPort, field_ports
 from fusesoc_firm.frame.codec import used_bytes
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.text.render import render
 from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD
@@ -38,8 +39,8 @@ PUBLISHER = 2
 LENGTH_BYTES = 4
 
 BAD_LENGTH, SHORT_FRAME, LONG_FRAME, BAD_ENCODING = 1, 2, 3, 4
-_ENCODING = {RosVersion.ROS1: b"", RosVersion.ROS2: b"\x00\x01"}
-_LONGEST_TAIL = {RosVersion.ROS1: 0, RosVersion.ROS2: 3}
+_ENCODING = {ROS1: b"", ROS2: b"\x00\x01"}
+_LONGEST_TAIL = {ROS1: 0, ROS2: 3}
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,10 @@ class ConverterBench:
     """GHDL's libraries in one directory: `firm`, and one for the converters of each ROS version and width."""
 
     directory: Path
-    oracles: Mapping[RosVersion, Oracle] = field(default_factory=lambda: {r: Oracle(r, AWKWARD[r]) for r in RosVersion})
-    pairs: dict[tuple[RosVersion, str, int, Selection], Pair] = field(default_factory=dict)
+    oracles: Mapping[Middleware, Oracle] = field(
+        default_factory=lambda: {ros: Oracle(ros, AWKWARD[ros]) for ros in (ROS1, ROS2)}
+    )
+    pairs: dict[tuple[Middleware, str, int, Selection], Pair] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(
@@ -69,13 +72,13 @@ class ConverterBench:
             )
         )
 
-    def pair(self, ros: RosVersion, name: str, width: int = 8, selection: Selection = EVERYTHING) -> Pair:
+    def pair(self, ros: Middleware, name: str, width: int = 8, selection: Selection = EVERYTHING) -> Pair:
         """The converters of a message with their bench, generated and analysed once."""
         key = ros, name, width, selection
         if key not in self.pairs:
             # Entities of other fields have the same names.
             number = sum(other[3] != EVERYTHING for other in self.pairs)
-            library = f"ros{int(ros)}_{width}" if selection == EVERYTHING else f"selection_{number}"
+            library = f"ros{ros.number}_{width}" if selection == EVERYTHING else f"selection_{number}"
             pair = Pair(Library(library, self.directory), self.oracles[ros], name, width, selection)
             pair.analyse()
             self.pairs[key] = pair
@@ -210,7 +213,7 @@ class Pair:
 
     def _with_whole_prefix(self, payload: bytes) -> bytes:
         """The options in the header of CDR are the sender's own: a publisher of ours has none."""
-        return payload[:2] + bytes(2) + payload[4:] if self.oracle.ros is RosVersion.ROS2 else payload
+        return payload[:2] + bytes(2) + payload[4:] if self.oracle.ros is ROS2 else payload
 
     def _with_bools_of_one(self, payload: bytes) -> bytes:
         """Random bytes may be any bool; a publisher sends 0 or 1."""
@@ -279,7 +282,7 @@ def _troubled_frame(pair: Pair, source: random.Random) -> Sent:
         case 7:  # another length than the announced one, both legal in ROS 2
             announced = len(payload) + source.randrange(4)
             return Sent(announced.to_bytes(LENGTH_BYTES, "little") + payload + source.randbytes(source.randrange(4)))
-        case 8 if pair.oracle.ros is RosVersion.ROS2:  # another encoding
+        case 8 if pair.oracle.ros is ROS2:  # another encoding
             body[LENGTH_BYTES + source.randrange(2)] ^= 1 << source.randrange(8)
             return Sent(bytes(body))
     return Sent(bytes(body))

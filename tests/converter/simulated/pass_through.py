@@ -13,9 +13,9 @@ from pathlib import Path
 
 from rosbags.typesys import Stores, get_typestore
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.message.stores import distributions
 from fusesoc_firm.verify.stimuli import Stimuli, kinds
 from tests.frame.oracle import Oracle
 from tests.replay.replays import Item, read, write
@@ -38,7 +38,7 @@ class PassThrough:
     width: int = 64
 
     @cached_property
-    def ros(self) -> RosVersion:
+    def ros(self) -> Middleware:
         """The version of ROS."""
         return ros_of(self.distribution)
 
@@ -46,7 +46,7 @@ class PassThrough:
         """The system: each message has a subscriber that is called after it, and a publisher."""
         lines = [f"project: {{name: pass_{self.distribution}, width: {self.width}}}", "blocks:"]
         for name in self.names:
-            kind = f"middleware: ROS{int(self.ros)}, message: {name}"
+            kind = f"middleware: ROS{self.ros.number}, message: {name}"
             block = _block(name)
             lines.append(f"  - {{name: {block}, mode: subscriber, {kind}, outgoing: [{{name: {block}_out}}]}}")
             lines.append(f"  - {{name: {block}_out, mode: publisher, {kind}}}")
@@ -78,7 +78,7 @@ class PassThrough:
         """A bag, and what is in it."""
         items = self.items()
         store = get_typestore(_STORES[self.distribution])
-        if self.ros is RosVersion.ROS1:
+        if self.ros is ROS1:
             return write(folder / "in.bag", "ros1", items, store), items
         return write(folder / "in", "mcap", items, store), items
 
@@ -92,9 +92,9 @@ def _block(name: str) -> str:
     return name.replace("/", "_")
 
 
-def ros_of(distribution: str) -> RosVersion:
+def ros_of(distribution: str) -> Middleware:
     """The version of a distribution."""
-    return next(ros for ros in RosVersion if distribution in distributions(ros))
+    return next(ros for ros in (ROS1, ROS2) if distribution in ros.distributions())
 
 
 def systems_of_all(distribution: str, count: int, seed: int) -> list[PassThrough]:

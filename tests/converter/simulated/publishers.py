@@ -1,7 +1,7 @@
 """The publisher of a message of variable size alone: messages in, frames out.
 
     bench = PublisherBench(tmp_path)                        # analyses the library once
-    publisher = bench.publisher(RosVersion.ROS2, "sensor_msgs/JointState", 64)
+    publisher = bench.publisher(ROS2, "sensor_msgs/JointState", 64)
     result = publisher.run(tmp_path, [publisher.good(value)], SEED=7, STALL_PERCENT=30)
 
 What the frames must be comes from rosbags. Here is decided what the message side shows for a value.
@@ -28,7 +28,8 @@ from fusesoc_firm.converter.variable_publisher import (
 )
 from fusesoc_firm.frame.model import Data, DataKind, Frame, FrameField, Loop, Node
 from fusesoc_firm.frame.values import leaf_of, part_of, units_of
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL, Stimuli
@@ -49,25 +50,25 @@ class PublisherBench:
     """GHDL's libraries in one directory: `firm`, and one for the publishers of each ROS version and width."""
 
     directory: Path
-    oracles: Mapping[RosVersion, Oracle] = field(
-        default_factory=lambda: {ros: Oracle(ros, VARIABLE[ros]) for ros in RosVersion}
+    oracles: Mapping[Middleware, Oracle] = field(
+        default_factory=lambda: {ros: Oracle(ros, VARIABLE[ros]) for ros in (ROS1, ROS2)}
     )
-    publishers: dict[tuple[RosVersion, str, int], Publisher] = field(default_factory=dict)
+    publishers: dict[tuple[Middleware, str, int], Publisher] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(core_files("axis/package", "axis/axis", "sim/host"))
         Library("bench", self.directory).analyse([HERE / "message_source.vhd"])
 
-    def publisher(self, ros: RosVersion, name: str, width: int = 8) -> Publisher:
+    def publisher(self, ros: Middleware, name: str, width: int = 8) -> Publisher:
         """The publisher of a message with its bench, generated and analysed once."""
         key = ros, name, width
         if key not in self.publishers:
             self.publishers[key] = self.of_frame(ros, name, self.oracles[ros].frame(name), width)
         return self.publishers[key]
 
-    def of_frame(self, ros: RosVersion, name: str, frame: Frame, width: int, suffix: str = "") -> Publisher:
+    def of_frame(self, ros: Middleware, name: str, frame: Frame, width: int, suffix: str = "") -> Publisher:
         """The publisher of a message of which not all may be used."""
-        library = Library(f"ros{int(ros)}_{width}{suffix}", self.directory)
+        library = Library(f"ros{ros.number}_{width}{suffix}", self.directory)
         publisher = Publisher(library, self.oracles[ros], name, frame, width)
         publisher.analyse()
         return publisher

@@ -45,7 +45,7 @@ class SubscriberBench:
     def subscriber(self, frame: Frame, width: int) -> Subscriber:
         """The subscriber with its bench, analysed once."""
         if (frame, width) not in self.made:
-            library = Library(f"ros{int(frame.ros)}_{width}", self.directory)
+            library = Library(f"ros{frame.ros.number}_{width}", self.directory)
             made = Subscriber(library, frame, width)
             made.analyse()
             self.made[frame, width] = made

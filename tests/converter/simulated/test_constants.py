@@ -16,14 +16,15 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores
 
 from fusesoc_firm.converter.converter_core import constants_files
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import MessageName, RosVersion
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from tests.frame import genpy_oracle
 from tests.hdl.ghdl import Library, core_files
 from tests.typestores import typestore
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 STORES = {ROS1: Stores.ROS1_NOETIC, ROS2: Stores.ROS2_JAZZY}
 
 # Names that VHDL has for something else.
@@ -82,7 +83,7 @@ class Expected:
         return 1 if len(self.digits) == 1 else 4 * len(self.digits)
 
 
-def of_number(name: str, kind: str, value: float, ros: RosVersion) -> Expected:
+def of_number(name: str, kind: str, value: float, ros: Middleware) -> Expected:
     """As NumPy sees it; a bool is one digit."""
     if kind == "bool":
         return Expected(name, str(int(value)))
@@ -98,7 +99,7 @@ def of_text(name: str, text: bytes) -> Iterator[Expected]:
         yield Expected(f"{name}_BYTES", text[::-1].hex())
 
 
-def expected_of(name: str, kind: str, value: Any, ros: RosVersion) -> Iterator[Expected]:
+def expected_of(name: str, kind: str, value: Any, ros: Middleware) -> Iterator[Expected]:
     if kind == "string":
         yield from of_text(name, value.encode())
     else:
@@ -201,8 +202,8 @@ def known_constants(table: Mapping[str, Any], long_name: str, seen: list[str]) -
             yield from known_constants(table, inner[1], seen)
 
 
-@pytest.mark.parametrize("ros", RosVersion)
-def test_every_message_of_the_distributions(ros: RosVersion, tmp_path: Path) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_every_message_of_the_distributions(ros: Middleware, tmp_path: Path) -> None:
     """Each has a package; rosbags says which constants are in it and what they are."""
     library = MessageLibrary(ros)
     table = typestore(STORES[ros]).fielddefs
@@ -235,7 +236,7 @@ def awkward_expected() -> list[Expected]:
     return found
 
 
-def odd_package(folder: Path, text: str, ros: RosVersion) -> Library:
+def odd_package(folder: Path, text: str, ros: Middleware) -> Library:
     """The analysed package `odd_msgs_odd_pkg` of a message with this text."""
     package = folder / "odd_msgs"
     (package / "msg").mkdir(parents=True)

@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 
 from fusesoc_firm.converter.stream import WIDTHS
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from tests.converter.simulated.converters import PUBLISHER, ConverterBench, Sent, printed, troubled_frames
 from tests.frame.samples import AWKWARD
 from tests.hdl.frames import traffic
 
 SEED = 20240602
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 _FROM_DISTRIBUTIONS = {
     ROS1: """
         actionlib/TestRequestResult geometry_msgs/Inertia geometry_msgs/Point geometry_msgs/PoseWithCovariance
@@ -41,13 +41,13 @@ _KINDS = (
 )
 
 
-def case(ros: RosVersion, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{int(ros)}-{name}-{width}")
+def case(ros: Middleware, name: str, width: int) -> Any:
+    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
 
 
 # Every message at 8 bits, and every kind at every width; with broken frames where the header lies in three beats (16
 # bits), in one with some payload (64), and where a whole frame does (512).
-SAMPLE = [case(ros, name, 8) for ros in RosVersion for name in [*_FROM_DISTRIBUTIONS[ros], *AWKWARD[ros]]]
+SAMPLE = [case(ros, name, 8) for ros in (ROS1, ROS2) for name in [*_FROM_DISTRIBUTIONS[ros], *AWKWARD[ros]]]
 SAMPLE += [case(ros, name, width) for width in WIDTHS if width > 8 for ros, name in _KINDS]
 TROUBLED = [case(ros, name, width) for width in (8, 16, 64, 512) for ros, name in _KINDS]
 NETLISTS = [
@@ -79,7 +79,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> ConverterBench:
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_messages_come_through_under_stalls(
-    bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int
+    bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """The ports show the values that rosbags serialised, and the publisher makes rosbags' bytes of them."""
     pair = bench.pair(ros, name, width)
@@ -94,7 +94,7 @@ def test_messages_come_through_under_stalls(
 @pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_no_cycle_is_lost_without_stalls(
-    bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int
+    bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """With room for one message between them, both converters work all the time: frames follow without a gap."""
     pair = bench.pair(ros, name, width)
@@ -111,7 +111,7 @@ def test_no_cycle_is_lost_without_stalls(
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_a_message_that_waits_loses_nothing(
-    bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int
+    bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """The first beat of the next frame comes in the cycle that takes the message, and no sooner."""
     pair = bench.pair(ros, name, width)
@@ -125,7 +125,7 @@ def test_a_message_that_waits_loses_nothing(
 @pytest.mark.parametrize("flow", FLOWS)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_broken_frames_hurt_no_other(
-    bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int, flow: str
+    bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int, flow: str
 ) -> None:
     """Every good frame is delivered, none else is, and each broken one gives one error with its code."""
     pair = bench.pair(ros, name, width)
@@ -139,7 +139,7 @@ def test_broken_frames_hurt_no_other(
 
 @pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
-def test_every_length_of_a_frame(bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
+def test_every_length_of_a_frame(bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     """Cut behind each byte, and longer by up to five; with the length of the whole message, and with its own.
 
     Of a long frame the ends have to do.
@@ -184,7 +184,7 @@ def test_a_lie_in_each_byte_of_the_length(bench: ConverterBench, tmp_path: Path,
 
 @pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
-def test_they_are_latch_free(bench: ConverterBench, ros: RosVersion, name: str, width: int) -> None:
+def test_they_are_latch_free(bench: ConverterBench, ros: Middleware, name: str, width: int) -> None:
     pair = bench.pair(ros, name, width)
     for entity in pair.entities:
         assert pair.library.latches(entity) == []
@@ -192,7 +192,7 @@ def test_they_are_latch_free(bench: ConverterBench, ros: RosVersion, name: str, 
 
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(("ros", "name", "width"), NETLISTS)
-def test_the_netlist_does_the_same(tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
+def test_the_netlist_does_the_same(tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     """The bench with what `ghdl --synth` made of both converters in their place."""
     pair = ConverterBench(tmp_path).pair(ros, name, width)
     subscriber, publisher = pair.entities

@@ -11,14 +11,14 @@ import pytest
 
 from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
 from fusesoc_firm.converter.ports import field_ports
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from tests.converter.simulated.converters import EVERYTHING, ConverterBench, Selection, printed, troubled_frames
 from tests.frame.oracle import Oracle
 from tests.frame.samples import AWKWARD
 from tests.hdl.frames import traffic
 
 SEED = 20240603
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
 
 _DEFAULTS = {
     "x": 1.5,
@@ -64,7 +64,7 @@ LARGE = [
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> ConverterBench:
-    oracles = {ros: Oracle(ros, {**AWKWARD[ros], **GIANTS}) for ros in RosVersion}
+    oracles = {ros: Oracle(ros, {**AWKWARD[ros], **GIANTS}) for ros in (ROS1, ROS2)}
     return ConverterBench(tmp_path_factory.mktemp("used_fields"), oracles)
 
 
@@ -72,7 +72,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> ConverterBench:
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
 @pytest.mark.parametrize(("ros", "name", "selection"), SMALL)
 def test_the_other_fields_are_skipped_and_sent_as_their_defaults(
-    bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, selection: Selection, width: int
+    bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, selection: Selection, width: int
 ) -> None:
     pair = bench.pair(ros, name, width, selection)
     print(f"seed {SEED}")
@@ -89,7 +89,7 @@ def test_the_other_fields_are_skipped_and_sent_as_their_defaults(
 @pytest.mark.parametrize("width", [8, 64, 512])
 @pytest.mark.parametrize(("ros", "name", "selection"), LARGE)
 def test_giant_messages(
-    bench: ConverterBench, tmp_path: Path, ros: RosVersion, name: str, selection: Selection, width: int
+    bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, selection: Selection, width: int
 ) -> None:
     pair = bench.pair(ros, name, width, selection)
     print(f"seed {SEED}")

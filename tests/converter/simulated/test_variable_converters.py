@@ -14,7 +14,8 @@ from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.frame.codec import CodecError, decode, encode
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import select
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.stimuli import KINDS, TYPICAL, Stimuli
 from tests.converter.simulated.subscribers import LENGTH_BYTES, SubscriberBench
@@ -23,8 +24,7 @@ from tests.frame.samples import AWKWARD_VARIABLE
 
 SEED = 20240711
 
-ROS1, ROS2 = RosVersion.ROS1, RosVersion.ROS2
-ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in RosVersion}
+ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in (ROS1, ROS2)}
 _FROM_DISTRIBUTIONS = {
     ROS1: """
         std_msgs/String std_msgs/Header sensor_msgs/Image sensor_msgs/PointCloud2 sensor_msgs/JointState
@@ -36,20 +36,20 @@ _FROM_DISTRIBUTIONS = {
         trajectory_msgs/JointTrajectory rcl_interfaces/ParameterEvent sensor_msgs/CameraInfo
         shape_msgs/SolidPrimitive""".split(),
 }
-_NAMES = {ros: [*_FROM_DISTRIBUTIONS[ros], *AWKWARD_VARIABLE[ros]] for ros in RosVersion}
+_NAMES = {ros: [*_FROM_DISTRIBUTIONS[ros], *AWKWARD_VARIABLE[ros]] for ros in (ROS1, ROS2)}
 
 
-def case(ros: RosVersion, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{int(ros)}-{name}-{width}")
+def case(ros: Middleware, name: str, width: int) -> Any:
+    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
 
 
-def is_variable(ros: RosVersion, name: str) -> bool:
+def is_variable(ros: Middleware, name: str) -> bool:
     return not ORACLES[ros].frame(name).is_fixed_size
 
 
 SAMPLE = [
     case(ros, name, (8, 64)[number % 2])
-    for ros in RosVersion
+    for ros in (ROS1, ROS2)
     for number, name in enumerate(_NAMES[ros])
     if is_variable(ros, name)
 ]
@@ -80,11 +80,11 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> SubscriberBench:
     return SubscriberBench(tmp_path_factory.mktemp("subscribers"))
 
 
-def stimuli(ros: RosVersion, name: str, seed: object) -> Stimuli:
+def stimuli(ros: Middleware, name: str, seed: object) -> Stimuli:
     return Stimuli(ORACLES[ros].closure(name), ros, random.Random(f"{seed} {name}"))
 
 
-def serialise(ros: RosVersion, name: str, value: Mapping[str, Any]) -> bytes:
+def serialise(ros: Middleware, name: str, value: Mapping[str, Any]) -> bytes:
     """What rosbags makes of a value; it knows no wstring, for which our codec stands in, checked elsewhere."""
     if name == "awkward_msgs/Unicode":
         return encode(ORACLES[ros].frame(name), value)
@@ -99,7 +99,7 @@ def framed(payload: bytes) -> bytes:
 @pytest.mark.parametrize("stall", [0, 40])
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_messages_come_through_under_stalls(
-    bench: SubscriberBench, tmp_path: Path, ros: RosVersion, name: str, width: int, stall: int
+    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int, stall: int
 ) -> None:
     """Fields, lengths, streams and elements are those that rosbags serialised, in wire order."""
     subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
@@ -131,7 +131,7 @@ SELECTIONS = [
 @pytest.mark.parametrize("width", [8, 64])
 @pytest.mark.parametrize(("ros", "name", "include", "exclude"), SELECTIONS)
 def test_what_is_not_used_is_skipped(
-    tmp_path: Path, ros: RosVersion, name: str, width: int, include: list[str], exclude: list[str]
+    tmp_path: Path, ros: Middleware, name: str, width: int, include: list[str], exclude: list[str]
 ) -> None:
     """The used fields come as ever; broken frames are told by what is looked at, and by their length."""
     frame = select(ORACLES[ros].frame(name), dict.fromkeys(include), dict.fromkeys(exclude))
@@ -154,7 +154,7 @@ def test_what_is_not_used_is_skipped(
 @pytest.mark.parametrize("stall", [0, 35])
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_broken_frames_hurt_no_other(
-    bench: SubscriberBench, tmp_path: Path, ros: RosVersion, name: str, width: int, stall: int
+    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int, stall: int
 ) -> None:
     """Every good frame gives its message, every other one a frame_error, and the next frame is right again."""
     frame = ORACLES[ros].frame(name)
@@ -179,7 +179,7 @@ def test_broken_frames_hurt_no_other(
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_every_length_of_a_frame(
-    bench: SubscriberBench, tmp_path: Path, ros: RosVersion, name: str, width: int
+    bench: SubscriberBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """Cut behind each byte, with the length of the whole message and with its own, a good one behind each."""
     frame = ORACLES[ros].frame(name)
@@ -242,14 +242,14 @@ def test_a_stream_takes_a_beat_in_every_cycle(bench: SubscriberBench, tmp_path: 
 
 @pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
-def test_they_are_latch_free(bench: SubscriberBench, ros: RosVersion, name: str, width: int) -> None:
+def test_they_are_latch_free(bench: SubscriberBench, ros: Middleware, name: str, width: int) -> None:
     subscriber = bench.subscriber(ORACLES[ros].frame(name), width)
     assert subscriber.library.latches(subscriber.entity) == []
 
 
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(("ros", "name", "width"), NETLISTS)
-def test_the_netlist_does_the_same(tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
+def test_the_netlist_does_the_same(tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     subscriber = SubscriberBench(tmp_path).subscriber(ORACLES[ros].frame(name), width)
     subscriber.library.replace_by_netlist(subscriber.entity)
     subscriber.analyse_bench()
@@ -269,7 +269,7 @@ def test_the_netlist_does_the_same(tmp_path: Path, ros: RosVersion, name: str, w
 # --- frames ----------------------------------------------------------------------------------------------------------
 
 
-def troubled(ros: RosVersion, payload: bytes, chance: random.Random) -> bytes:
+def troubled(ros: Middleware, payload: bytes, chance: random.Random) -> bytes:
     """A frame, good or broken by chance."""
     body = bytearray(framed(payload))
     match chance.randrange(11):

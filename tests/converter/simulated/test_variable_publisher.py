@@ -19,7 +19,8 @@ from fusesoc_firm.converter.variable_publisher import (
     variable_publisher_configuration,
 )
 from fusesoc_firm.frame.select import select
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.text.render import render
 from fusesoc_firm.verify.stimuli import EMPTY, EXTREME, TYPICAL
 from tests.converter.simulated.publishers import ID, SHORT, Publisher, PublisherBench
@@ -27,7 +28,6 @@ from tests.frame.variable_samples import PACKAGE, VARIABLE
 from tests.hdl.ghdl import Library, core_files
 
 SEED = 20240607
-ROS1, ROS2 = RosVersion
 
 _FROM_DISTRIBUTIONS = {
     ROS1: """
@@ -45,19 +45,19 @@ _KINDS = ("Text", "Sizes", "Texts", "Plains", "Nameds", "Tree", "Hollow", "Words
 _LEFT_OUT = ("Plain", "Nothing", "Flag", "Giant")
 
 
-def case(ros: RosVersion, name: str, width: int) -> Any:
-    return pytest.param(ros, name, width, id=f"ros{int(ros)}-{name}-{width}")
+def case(ros: Middleware, name: str, width: int) -> Any:
+    return pytest.param(ros, name, width, id=f"ros{ros.number}-{name}-{width}")
 
 
-_AWKWARD = {ros: [name for name in VARIABLE[ros] if name.partition("/")[2] not in _LEFT_OUT] for ros in RosVersion}
-_KIND_CASES = [(ros, f"{PACKAGE}/{name}") for ros in RosVersion for name in _KINDS]
+_AWKWARD = {ros: [name for name in VARIABLE[ros] if name.partition("/")[2] not in _LEFT_OUT] for ros in (ROS1, ROS2)}
+_KIND_CASES = [(ros, f"{PACKAGE}/{name}") for ros in (ROS1, ROS2) for name in _KINDS]
 _KIND_CASES += [(ROS1, f"{PACKAGE}/Times"), (ROS2, f"{PACKAGE}/Wides"), (ROS2, f"{PACKAGE}/Bounded")]
-SAMPLE = [case(ros, name, 8) for ros in RosVersion for name in [*_FROM_DISTRIBUTIONS[ros], *_AWKWARD[ros]]]
-SAMPLE += [case(ros, name, 64) for ros in RosVersion for name in _FROM_DISTRIBUTIONS[ros]]
+SAMPLE = [case(ros, name, 8) for ros in (ROS1, ROS2) for name in [*_FROM_DISTRIBUTIONS[ros], *_AWKWARD[ros]]]
+SAMPLE += [case(ros, name, 64) for ros in (ROS1, ROS2) for name in _FROM_DISTRIBUTIONS[ros]]
 SAMPLE += [case(ros, name, width) for width in WIDTHS if width > 8 for ros, name in _KIND_CASES]
 TROUBLED = [case(ros, name, width) for width in (8, 64) for ros, name in _KIND_CASES]
-TROUBLED += [case(ros, f"{PACKAGE}/Tree", width) for width in (16, 32, 512) for ros in RosVersion]
-TROUBLED += [case(ros, f"sensor_msgs/{name}", 8) for ros in RosVersion for name in ("Image", "PointCloud2")]
+TROUBLED += [case(ros, f"{PACKAGE}/Tree", width) for width in (16, 32, 512) for ros in (ROS1, ROS2)]
+TROUBLED += [case(ros, f"sensor_msgs/{name}", 8) for ros in (ROS1, ROS2) for name in ("Image", "PointCloud2")]
 NETLISTS = [
     case(ROS1, "sensor_msgs/Image", 8),
     case(ROS2, "sensor_msgs/JointState", 8),
@@ -76,7 +76,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> PublisherBench:
 @pytest.mark.one_in(9)
 @pytest.mark.parametrize(("ros", "name", "width"), SAMPLE)
 def test_frames_are_those_of_rosbags(
-    bench: PublisherBench, tmp_path: Path, ros: RosVersion, name: str, width: int
+    bench: PublisherBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     publisher = bench.publisher(ros, name, width)
     print(f"seed {SEED}")
@@ -88,7 +88,7 @@ def test_frames_are_those_of_rosbags(
 @pytest.mark.one_in(7)
 @pytest.mark.parametrize(("ros", "name", "width"), TROUBLED)
 def test_faults_hurt_no_other_frame(
-    bench: PublisherBench, tmp_path: Path, ros: RosVersion, name: str, width: int
+    bench: PublisherBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """Each frame has its announced length, each fault gives one error with its code, and the rest is right."""
     publisher = bench.publisher(ros, name, width)
@@ -103,9 +103,9 @@ def test_faults_hurt_no_other_frame(
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", [8, 32, 64, 512])
 @pytest.mark.parametrize("name", ["sensor_msgs/PointCloud2", "sensor_msgs/JointState"])
-@pytest.mark.parametrize("ros", RosVersion)
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
 def test_a_message_goes_in_any_cycle(
-    bench: PublisherBench, tmp_path: Path, ros: RosVersion, name: str, width: int
+    bench: PublisherBench, tmp_path: Path, ros: Middleware, name: str, width: int
 ) -> None:
     """Withdrawn so many cycles after it was shown, with a whole one behind each."""
     publisher = bench.publisher(ros, name, width)
@@ -119,10 +119,10 @@ def test_a_message_goes_in_any_cycle(
 
 @pytest.mark.one_in(11)
 @pytest.mark.parametrize("width", [8, 16, 64, 512])
-@pytest.mark.parametrize("ros", RosVersion)
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
 @pytest.mark.parametrize("length", [2**32 - 1, 2**31, 2**29, 300])
 def test_a_length_that_is_far_too_large_ends_with_its_part(
-    bench: PublisherBench, tmp_path: Path, ros: RosVersion, width: int, length: int
+    bench: PublisherBench, tmp_path: Path, ros: Middleware, width: int, length: int
 ) -> None:
     """A `tlast` and a `last` end a part, and a frame its length: nothing goes on for 2**32 elements."""
     publisher = bench.publisher(ros, f"{PACKAGE}/Lying", width)
@@ -158,8 +158,8 @@ def test_padding_ends_in_what_is_given_up(bench: PublisherBench, tmp_path: Path,
 
 @pytest.mark.one_in(5)
 @pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize("ros", RosVersion)
-def test_a_stream_moves_a_beat_a_cycle(bench: PublisherBench, tmp_path: Path, ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_a_stream_moves_a_beat_a_cycle(bench: PublisherBench, tmp_path: Path, ros: Middleware, width: int) -> None:
     """Of two messages the longer one takes as many cycles more as it has beats more."""
     publisher = bench.publisher(ros, f"{PACKAGE}/Bytes", width)
     beats = (3, 40, 3, 1040, 3)
@@ -171,8 +171,8 @@ def test_a_stream_moves_a_beat_a_cycle(bench: PublisherBench, tmp_path: Path, ro
 
 
 @pytest.mark.parametrize("width", [8, 64])
-@pytest.mark.parametrize("ros", RosVersion)
-def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: RosVersion, width: int) -> None:
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Middleware, width: int) -> None:
     """What a part costs beside its bytes: a cycle for its opening, and one for padding that the run decides on."""
     publisher = bench.publisher(ros, "sensor_msgs/JointState", width)
     value = {
@@ -190,7 +190,7 @@ def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Ros
 
 @pytest.mark.one_in(9)
 @pytest.mark.parametrize("width", [8, 64])
-@pytest.mark.parametrize("ros", RosVersion)
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
 @pytest.mark.parametrize(
     ("name", "include", "exclude"),
     [
@@ -206,7 +206,7 @@ def test_the_cycles_of_a_message(bench: PublisherBench, tmp_path: Path, ros: Ros
 def test_what_is_not_used_is_empty(
     bench: PublisherBench,
     tmp_path: Path,
-    ros: RosVersion,
+    ros: Middleware,
     name: str,
     include: list[str],
     exclude: list[str],
@@ -263,10 +263,10 @@ def test_a_giant_block_of_zeros_is_one_word(bench: PublisherBench, tmp_path: Pat
 
 
 @pytest.mark.one_in(4)
-@pytest.mark.parametrize("ros", RosVersion)
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
 @pytest.mark.parametrize("width", [8, 64])
 def test_every_message_of_the_distributions_is_analysed(
-    bench: PublisherBench, tmp_path: Path, ros: RosVersion, width: int
+    bench: PublisherBench, tmp_path: Path, ros: Middleware, width: int
 ) -> None:
     oracle = bench.oracles[ros]
     library = Library("work", tmp_path)
@@ -285,14 +285,14 @@ def test_every_message_of_the_distributions_is_analysed(
 
 @pytest.mark.one_in(3)
 @pytest.mark.parametrize(("ros", "name", "width"), [*NETLISTS, case(ROS1, f"{PACKAGE}/Texts", 512)])
-def test_they_are_latch_free(bench: PublisherBench, ros: RosVersion, name: str, width: int) -> None:
+def test_they_are_latch_free(bench: PublisherBench, ros: Middleware, name: str, width: int) -> None:
     publisher = bench.publisher(ros, name, width)
     assert publisher.library.latches(publisher.entity) == []
 
 
 @pytest.mark.one_in(4)
 @pytest.mark.parametrize(("ros", "name", "width"), NETLISTS)
-def test_the_netlist_does_the_same(tmp_path: Path, ros: RosVersion, name: str, width: int) -> None:
+def test_the_netlist_does_the_same(tmp_path: Path, ros: Middleware, name: str, width: int) -> None:
     """The bench with what `ghdl --synth` made of the publisher in its place."""
     publisher = PublisherBench(tmp_path).publisher(ros, name, width)
     publisher.library.replace_by_netlist(publisher.entity, {"ID": ID})

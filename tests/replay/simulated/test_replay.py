@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS1
 from fusesoc_firm.node.bursts import BurstJoiner, JoinedFrame
 from tests.applications.applications import SPECS
 from tests.applications.images import image
@@ -134,7 +134,7 @@ def test_frames_that_interrupt_each_other(tmp_path: Path, builds: Path, monkeypa
 
 @pytest.mark.check
 def test_a_system_answers_the_same_wherever_a_block_is(tmp_path: Path, builds: Path) -> None:
-    chance, oracle = random.Random(SEED), Oracle(RosVersion.ROS1)
+    chance, oracle = random.Random(SEED), Oracle(ROS1)
     images = [oracle.serialise("sensor_msgs/Image", image("ROS", chance, 4, 6, 3)) for _ in range(4)]
     items = [("/camera", "sensor_msgs/msg/Image", number * 10**8, data) for number, data in enumerate(images)]
     source = write(tmp_path / "in.bag", "ros1", items)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.model import RosVersion
 from fusesoc_firm.system.scaffold.skeleton import missing_sources
 from fusesoc_firm.system.system_core import load_system
 from tests.hdl.ghdl import Library, core_files
@@ -33,7 +33,7 @@ def test_a_random_system_is_elaborated(number: int, runtime: Path, tmp_path: Pat
     print(f"seed {SEED + number}")
     chance = random.Random(SEED + number)
     (tmp_path / "spec.yaml").write_text(random_system(chance, 4 + 2 * number, 3 + number).text, encoding="utf-8")
-    libraries = {ros: MessageLibrary(ros) for ros in RosVersion}
+    libraries = {ros: MessageLibrary(ros) for ros in (ROS1, ROS2)}
     system = load_system(tmp_path / "spec.yaml", libraries, needs_sources=False).system
     for path, text in missing_sources(system, tmp_path).items():
         path.write_text(text, encoding="utf-8")

@@ -14,7 +14,7 @@ import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from fusesoc_firm.message.model import RosVersion
+from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.stimuli import EMPTY, TYPICAL, Stimuli
 from tests.frame.oracle import Oracle
@@ -22,7 +22,7 @@ from tests.system.simulated.systems import DATA, GeneratedSystem, build, call
 
 SEED = 20240615
 IMAGE, CLOUD, STRING = "sensor_msgs/Image", "sensor_msgs/PointCloud2", "std_msgs/String"
-ORACLE = Oracle(RosVersion.ROS2)
+ORACLE = Oracle(ROS2)
 
 Message = dict[str, Any]
 INVERT = """
@@ -50,7 +50,7 @@ def respond(subscriber, message):
 
 def values(name: str, count: int, longest: int = 40) -> list[Message]:
     """Random messages, an empty one in front."""
-    stimuli = Stimuli(ORACLE.closure(name), RosVersion.ROS2, random.Random(SEED), longest=longest)
+    stimuli = Stimuli(ORACLE.closure(name), ROS2, random.Random(SEED), longest=longest)
     return [stimuli.message(parse_name(name), EMPTY if not n else TYPICAL) for n in range(count)]
 
 
