@@ -43,7 +43,7 @@ def run(command: str) -> NoReturn:
         from importlib.util import find_spec
 
         if all(map(find_spec, _NEEDED)):
-            from fusesoc_firm.plugin.gapi import main
+            from fusesoc_firm.plugin.answer import main
 
             sys.exit(main(command, sys.argv[1:]))
         if not tried:
@@ -81,7 +81,7 @@ def _warn_of_another_version(command: str) -> None:
 def _is_recalled(command: str) -> bool:
     """Tell whether the call was answered as it was answered before."""
     try:
-        from fusesoc_firm.store.recall import answer
+        from fusesoc_firm.plugin.recall import answer
     except ImportError:
         return False
     return answer(command, sys.argv[1:])

@@ -7,7 +7,7 @@ behind their message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -161,17 +161,19 @@ def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
 
 def _characters(text: str) -> list[str]:
     """Pieces that make up a string of Latin-1: `"printable"` and, for any other character, `character'val(10)`."""
-    pieces = []
-    for is_printable, run in groupby(text, key=lambda character: character.isascii() and character.isprintable()):
-        characters = list(run)
-        if not is_printable:
-            pieces += [f"character'val({ord(character)})" for character in characters]
-            continue
-        for first in range(0, len(characters), _CHARACTERS_A_PIECE):
-            part = "".join(characters[first : first + _CHARACTERS_A_PIECE])
-            pieces.append(f'"{part.replace(_QUOTE, 2 * _QUOTE)}"')
+    runs = groupby(text, key=lambda character: character.isascii() and character.isprintable())
+    pieces = [piece for is_printable, run in runs for piece in (_quoted("".join(run)) if is_printable else _codes(run))]
     # Two characters make a string only with a string in front.
     return pieces if pieces and pieces[0].startswith(_QUOTE) else ['""', *pieces]
+
+
+def _quoted(text: str) -> Iterator[str]:
+    for first in range(0, len(text), _CHARACTERS_A_PIECE):
+        yield f'"{text[first : first + _CHARACTERS_A_PIECE].replace(_QUOTE, 2 * _QUOTE)}"'
+
+
+def _codes(characters: Iterable[str]) -> Iterator[str]:
+    return (f"character'val({ord(character)})" for character in characters)
 
 
 def _bytes(data: bytes) -> list[str]:

@@ -22,8 +22,7 @@ from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import Definitions
-from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
-from fusesoc_firm.store.reads import Input
+from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
 from fusesoc_firm.text.render import render
 
 VHDL = "vhdlSource-93"
@@ -34,18 +33,23 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
-    folders = [*(request.files_root / path for path in paths), *request.folders_of(request.listed("messages"))]
+    folders = [*(request.files_root / path for path in paths), *request.message_folders.of(request.listed("messages"))]
     return folders, os.environ, None if distro is None else str(distro)
 
 
-def inputs(request: Request) -> list[Input]:
-    """The files that say what is wanted and that hold the definitions; none for those of a type store."""
-    return list(order_of_request(request).files)
-
-
-def generate(request: Request) -> GeneratedCore:
-    """What the request asks for, in the order in which a tool reads it. Raises `InputError`."""
+def load(request: Request) -> LoadedRequest:
+    """The converters that a request asks for. Raises `InputError`."""
     order = order_of_request(request)
+    return LoadedRequest(
+        request,
+        order.files,
+        lambda: converters_core(order),
+        lambda: [(order.libraries[wanted.ros], wanted.definitions) for wanted in order.messages],
+    )
+
+
+def converters_core(order: Order) -> GeneratedCore:
+    """The core of an order, its files in the order in which a tool reads them. Raises `InputError`."""
     files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
     interfaces: dict[str, GeneratedFile] = {}
     for wanted in order.messages:

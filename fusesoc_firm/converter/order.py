@@ -53,6 +53,7 @@ class Wanted:
 class Order:
     """All that is wanted: each message once, streams of `width` bits, and the `files` that it was read from.
 
+    `libraries` are those that the messages were taken from.
     `prefix` stands before the names of all design units that are not named by the user.
     """
 
@@ -60,6 +61,7 @@ class Order:
     width: int
     messages: tuple[Wanted, ...]
     files: tuple[Input, ...]
+    libraries: Mapping[Middleware, MessageLibrary]
     prefix: str = ""
 
     def entity(self, frame: Frame, direction: str) -> str:
@@ -98,7 +100,7 @@ def order_of_message(
     elif interface.has_signature:
         facts.append(signature(name, library.joint_closure(interface.messages), interface.kind))
     title = f"{interface or name} ({', '.join(facts)})"
-    return Order(title, width, messages, tuple(library.files(definitions)))
+    return Order(title, width, messages, tuple(library.files(definitions)), {library.ros: library})
 
 
 def _check_no_selection(selection: Selection, text: str) -> None:
@@ -116,7 +118,8 @@ def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) 
     faults.raise_if_any()
     messages = _joined(wanted for _, wanted in found)
     files = [file for wanted in messages for file in libraries[wanted.ros].files(wanted.definitions)]
-    return Order(str(config.project.name), config.project.width, messages, (path, *dict.fromkeys(files)), prefix)
+    project, inputs = config.project, (path, *dict.fromkeys(files))
+    return Order(str(project.name), project.width, messages, inputs, libraries, prefix)
 
 
 def _wanted(

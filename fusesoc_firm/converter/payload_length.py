@@ -14,6 +14,7 @@ from typing import Any
 
 from fusesoc_firm.converter.message_ports import LENGTH_BITS, message_side
 from fusesoc_firm.converter.ports import ros_path
+from fusesoc_firm.converter.vhdl import bits
 from fusesoc_firm.frame.length import Align, Bytes, Repeat, Term, sent_length_of
 from fusesoc_firm.frame.model import Data, Frame, Loop, Path
 from fusesoc_firm.text.naming import entity_name
@@ -27,18 +28,28 @@ _SIGNAL = re.compile(r"[a-z]+_\d+")
 
 @dataclass(frozen=True)
 class Statement:
-    """An assignment of `value` to an unsigned signal of `bits` bits, called by a word and a number."""
+    """An assignment of a sum to an unsigned signal for values below `modulus`, called by a word and a number.
+
+    The sum is that of `operands` and `constant`. If it is `counted`, it is zero where that operand is.
+    """
 
     word: str
-    number: int
-    bits: int
-    value: str
-    comment: str
+    modulus: int
+    operands: tuple[str, ...]
+    constant: int = 0
+    counted: str = ""
+    comment: str = ""
+    number: int = 0
 
     @property
     def signal(self) -> str:
         """The signal's name."""
         return f"{self.word}_{self.number}"
+
+    @property
+    def bits(self) -> int:
+        """The signal's bits."""
+        return self.modulus.bit_length() - 1
 
 
 def length_entity(frame: Frame, suffix: str = "") -> str:
@@ -59,7 +70,7 @@ def payload_length_configuration(frame: Frame, suffix: str = "") -> Configuratio
     parts = _counted_parts(length.terms)
     names = dict(zip((part.path for part in parts), length_ports(frame), strict=True))
     # Positions count from behind the prefix.
-    total = _Sum(_modulus(length.terms), {path: f"unsigned({name})" for path, name in names.items()}, [])
+    total = _Sum(_modulus(length.terms), {path: _unsigned(name) for path, name in names.items()}, [])
     total.add(length.terms)
     total.add_bytes(length.prefix)
     return {
@@ -72,7 +83,15 @@ def payload_length_configuration(frame: Frame, suffix: str = "") -> Configuratio
         "place_bits": total.modulus.bit_length() - 1,
         "ports": [{"name": names[part.path], "comment": f"{ros_path(part.path)}: {part.ros_type}"} for part in parts],
         "statements": [
-            {"signal": item.signal, "bits": item.bits, "value": item.value, "comment": item.comment}
+            {
+                "signal": item.signal,
+                "bits": item.bits,
+                "operands": [*item.operands],
+                "more": item.constant if item.constant > 0 else None,
+                "less": -item.constant if item.constant < 0 else None,
+                "counted": item.counted,
+                "comment": item.comment,
+            }
             for item in total.statements
         ],
         "elements": [*total.elements],
@@ -86,7 +105,7 @@ def _chain_length(statements: Sequence[Statement]) -> int:
     """How many paddings follow from each other at most."""
     lengths: dict[str, int] = {}
     for item in statements:
-        before = [lengths[name] for name in _SIGNAL.findall(item.value) if name in lengths]
+        before = [lengths[name] for name in _SIGNAL.findall(" ".join(item.operands)) if name in lengths]
         lengths[item.signal] = max(before, default=0) + (item.word == "padding")
     return max(lengths.values(), default=0)
 
@@ -152,10 +171,10 @@ class _Sum:
 
     def _add_padding(self, alignment: int) -> None:
         offset = self.offset % self.modulus
-        position = " + ".join([*self.origin, *([str(offset)] if offset else [])])
-        place = self._state("place", self.modulus, position, f"up to a multiple of {alignment}")
-        bits = place if alignment == self.modulus else _low(place, alignment)
-        padding = self._state("padding", alignment, f"0 - {bits}")
+        comment = f"up to a multiple of {alignment}"
+        place = self._state(Statement("place", self.modulus, (*self.origin,), offset, comment=comment))
+        position = place if alignment == self.modulus else _low(place, alignment)
+        padding = self._state(Statement("padding", alignment, (_minus(position),)))
         self.paddings.append(padding)
         self.origin = [] if alignment == self.modulus else [place, padding]
         self.offset = 0
@@ -166,28 +185,34 @@ class _Sum:
         count = self.counts[term.part.path]
         first = replace(self, origin=[*self.origin], paddings=[], constant=-term.stride)
         first.add(term.body)
-        value = " + ".join([_times(count, term.stride), *first.paddings])
         is_uniform = not first.paddings and not first.constant
-        if not is_uniform:
-            value += f" {'-' if first.constant < 0 else '+'} {abs(first.constant)}" if first.constant else ""
-            value += f" when {count} /= 0 else (others => '0')"
-        words = f"{ros_path(term.part.path)}: {term.part.ros_type}"
-        elements = self._state("bytes", 2**LENGTH_BITS, value, words)
+        operands = (_times(count, term.stride), *first.paddings)
+        comment = f"{ros_path(term.part.path)}: {term.part.ros_type}"
+        elements = self._state(
+            Statement("bytes", 2**LENGTH_BITS, operands, first.constant, "" if is_uniform else count, comment)
+        )
         self.elements.append(elements)
         if term.stride % self.modulus or not is_uniform:
             self.origin.append(_low(elements, self.modulus))
 
-    def _state(self, word: str, modulus: int, value: str, comment: str = "") -> str:
-        """A signal for values below `modulus`, and the statement that assigns it."""
-        number = sum(statement.word == word for statement in self.statements)
-        statement = Statement(word, number, modulus.bit_length() - 1, value, comment)
-        self.statements.append(statement)
-        return statement.signal
+    def _state(self, statement: Statement) -> str:
+        """Add a statement with a number of its own; the signal that it assigns to."""
+        number = sum(other.word == statement.word for other in self.statements)
+        self.statements.append(replace(statement, number=number))
+        return self.statements[-1].signal
 
 
 def _low(signal: str, modulus: int) -> str:
     """A signal modulo a power of two."""
-    return f"{signal}({modulus.bit_length() - 2} downto 0)"
+    return bits(signal, modulus.bit_length() - 2, 0)
+
+
+def _minus(number: str) -> str:
+    return f"0 - {number}"
+
+
+def _unsigned(port: str) -> str:
+    return f"unsigned({port})"
 
 
 def _times(count: str, stride: int) -> str:

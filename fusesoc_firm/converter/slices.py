@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from fusesoc_firm.converter.ports import FieldPort
-from fusesoc_firm.converter.vhdl import bits
+from fusesoc_firm.converter.vhdl import bit, bits
 from fusesoc_firm.frame.model import FrameField
 
 
@@ -38,7 +38,7 @@ class Slice:
         """The port in VHDL, or the part of it that the slice is."""
         if self.port.width is None or (self.width == self.port.width and not self.is_bit):
             return self.port.name
-        return f"{self.port.name}({self.low})" if self.is_bit else bits(self.port.name, self.high, self.low)
+        return bit(self.port.name, self.low) if self.is_bit else bits(self.port.name, self.high, self.low)
 
 
 def slices_of(port: FieldPort) -> Iterator[Slice]:

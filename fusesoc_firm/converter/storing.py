@@ -32,6 +32,12 @@ def is_beat(first: int, last: int) -> str:
     return "is_first = '1'" if last == 0 else f"(is_first = '1' or position_r <= {last})"
 
 
+def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
+    """The condition for a beat of a store, one of the `parts` whose windows a table has."""
+    used = f"used_{table} = '1'"
+    return used if len(parts) == 1 else f"{used} and {is_beat(store.beats[0], store.beats[-1])}"
+
+
 def store_configuration(stores: Sequence[Store]) -> Configuration:
     """What the partials need for `stores` as `stores_of` gives them."""
     tables: list[Configuration] = []
@@ -40,10 +46,8 @@ def store_configuration(stores: Sequence[Store]) -> Configuration:
         parts = list(group)
         windows = ranges([beat for store in parts for beat in store.beats])
         if len(windows) > _MOST_COMPARED and windows[-1][1] >= _TABLE_BEATS:
-            used = f"used_{len(tables)} = '1'"
+            enables += [[_is_used(len(tables), store, parts)] for store in parts]
             tables.append({"number": len(tables), **_table(windows)})
-            inside = [is_beat(store.beats[0], store.beats[-1]) for store in parts]
-            enables += [[used] if len(parts) == 1 else [f"{used} and {place}"] for place in inside]
         else:
             enables += [[is_beat(*window) for window in ranges(store.beats)] for store in parts]
     return {

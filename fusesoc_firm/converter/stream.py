@@ -45,10 +45,6 @@ class Stream:
         """The lane of a byte."""
         return byte % self.lanes
 
-    def data(self, lane: int, count: int = 1) -> str:
-        """The bits of `count` lanes."""
-        return f"{8 * (lane + count) - 1} downto {8 * lane}"
-
 
 @dataclass(frozen=True)
 class Store:

@@ -13,6 +13,11 @@ def vhdl_type(width: int | None) -> str:
     return "std_logic" if width is None else f"std_logic_vector({width - 1} downto 0)"
 
 
+def bit(vector: str, number: int) -> str:
+    """A bit of a vector."""
+    return f"{vector}({number})"
+
+
 def bits(vector: str, high: int, low: int) -> str:
     """Some bits of a vector."""
     return f"{vector}({high} downto {low})"
@@ -47,6 +52,11 @@ def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
         else:
             lines.append(operand)
     return lines
+
+
+def all_of(conditions: Iterable[str]) -> str:
+    """What is '1' while all of them are."""
+    return " and ".join(conditions)
 
 
 def any_of(conditions: Iterable[str]) -> str:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import copy
 import difflib
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 from fusesoc_firm.message import ROS2
@@ -286,19 +286,42 @@ class MessageLibrary:
         return next(iter(primitives or difflib.get_close_matches(str(name), names, n=1)), "")
 
 
-def libraries(
-    paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None
-) -> dict[Middleware, MessageLibrary]:
+class Libraries(Mapping[Middleware, MessageLibrary]):
+    """A library of each middleware, made when it is first asked for, which raises `InputError` as its constructor."""
+
+    def __init__(self, makers: Mapping[Middleware, Callable[[], MessageLibrary]]) -> None:
+        self._makers = makers
+        self._made: dict[Middleware, MessageLibrary] = {}
+
+    def __getitem__(self, ros: Middleware) -> MessageLibrary:
+        """The library of a middleware."""
+        if ros not in self._made:
+            self._made[ros] = self._makers[ros]()
+        return self._made[ros]
+
+    def __iter__(self) -> Iterator[Middleware]:
+        """Every middleware."""
+        return iter(self._makers)
+
+    def __len__(self) -> int:
+        """How many middlewares there are."""
+        return len(self._makers)
+
+
+def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None) -> Libraries:
     """A library of each middleware, for those who speak several.
 
-    `store` is a distribution of one of them; the other keeps its default. Raises `InputError` as `MessageLibrary` does.
+    `store` is a distribution of one of them; the other keeps its default. Raises `InputError` for an unknown one.
     """
     known = {ros: ros.distributions() for ros in middlewares()}
     if store is not None and not any(store in names for names in known.values()):
         fail(f"'{store}' is not a distribution of ROS", hint=nearest(store, itertools.chain(*known.values())))
-    return {
-        ros: MessageLibrary(ros, paths, environment, store if store in names else None) for ros, names in known.items()
-    }
+    return Libraries(
+        {
+            ros: partial(MessageLibrary, ros, paths, environment, store if store in names else None)
+            for ros, names in known.items()
+        }
+    )
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:

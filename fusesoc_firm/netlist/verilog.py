@@ -7,7 +7,7 @@ written. Logic is continuous assignments, never `always @*`, which some simulato
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Final
 
@@ -131,6 +131,39 @@ def _digits(value: int, width: int) -> str:
     return format(value & (1 << width) - 1, f"0{width}b") if width else ""
 
 
+def _assignment(target: str, value: str) -> str:
+    return f"  assign {target} = {value};"
+
+
+def _either(condition: str, value: str, other: str) -> str:
+    return f"{condition} ? {value} : {other}"
+
+
+def _function(name: str, width: int, inputs: Mapping[str, Net], statements: Iterable[str]) -> Iterator[str]:
+    """The declaration of a function of `width` bits."""
+    yield f"  function {declaration(width)}{name};"
+    yield from (f"    input {declaration(net.width)}{item};" for item, net in inputs.items())
+    yield from (f"    {statement}" for statement in statements)
+    yield "  endfunction"
+
+
+def _insertion(function: str, place: str, width: int) -> Iterator[str]:
+    """`data`, of `width` bits, in a place of `source`."""
+    yield "begin"
+    yield f"  {function} = source;"
+    yield f"  {function}[{place} +: {width}] = data;"
+    yield "end"
+
+
+def _choice(function: str, width: int, count: int) -> Iterator[str]:
+    """`value0`, or the value whose bit of a `selector` of `width` bits is set; of `count` values."""
+    yield "case (selector)"
+    for bit in range(count - 1):
+        yield f"  {literal(_digits(1 << bit, width))}: {function} = value{bit + 1};"
+    yield f"  default: {function} = value0;"
+    yield "endcase"
+
+
 class _Writer:
     """Writes one module."""
 
@@ -206,7 +239,7 @@ class _Writer:
         for port, net in zip(self.module.outputs, self.module.results, strict=True):
             if net is None:
                 raise NetlistError(f"error: nothing drives the port '{port.name}' of '{self.module.name}'")
-            yield f"  assign {identifier(port.name)} = {self.value(net)};"
+            yield _assignment(identifier(port.name), self.value(net))
 
     def _declarations(self, gate: Instance) -> Iterator[str]:
         if gate.kind in _EDGES or (gate.outputs and gate.outputs[0].number in self.constants):
@@ -279,7 +312,7 @@ class _Writer:
             raise gate.error(f"GHDL made a '{gate.kind[1:]}' of this, which has no counterpart in Verilog")
 
     def _assign(self, gate: Instance, expression: str) -> Iterator[str]:
-        yield f"  assign {self.names[gate.outputs[0].number]} = {expression};"
+        yield _assignment(self.names[gate.outputs[0].number], expression)
 
     def _expression(self, gate: Instance) -> str:
         nets = [gate.input(index) for index in range(len(gate.inputs))]
@@ -295,7 +328,7 @@ class _Writer:
     def _absolute(self, gate: Instance) -> Iterator[str]:
         net = gate.input(0)
         value = self.value(net)
-        yield from self._assign(gate, f"{self.part(net, net.width - 1, 1)} ? -{value} : {value}")
+        yield from self._assign(gate, _either(self.part(net, net.width - 1, 1), f"-{value}", value))
 
     def _modulus(self, gate: Instance) -> Iterator[str]:
         """The remainder with the sign of the divisor."""
@@ -363,23 +396,15 @@ class _Writer:
     def _dynamic_insertion(self, gate: Instance) -> Iterator[str]:
         source, data, index = (gate.input(number) for number in range(3))
         width = gate.outputs[0].width
-        if width == data.width:
-            changed = self.value(data)
-        else:
+        changed = self.value(data)
+        if width != data.width:
             name = self._distinct(f"{gate.name}_insert")
             place = self._place(gate, index, "place")
-            yield f"  function {declaration(width)}{name};"
-            yield f"    input {declaration(width)}source;"
-            yield f"    input {declaration(data.width)}data;"
-            yield f"    input {declaration(index.width)}place;"
-            yield "    begin"
-            yield f"      {name} = source;"
-            yield f"      {name}[{place} +: {data.width}] = data;"
-            yield "    end"
-            yield "  endfunction"
-            changed = f"{name}({', '.join(map(self.value, (source, data, index)))})"
+            inputs = {"source": source, "data": data, "place": index}
+            yield from _function(name, width, inputs, _insertion(name, place, data.width))
+            changed = self._call(name, inputs.values())
         if gate.kind == "$dyn_insert_en":
-            changed = f"{self.value(gate.input(3))} ? {changed} : {self.value(source)}"
+            changed = _either(self.value(gate.input(3)), changed, self.value(source))
         yield from self._assign(gate, changed)
 
     def _place(self, gate: Instance, index: Net, name: str = "") -> str:
@@ -394,26 +419,21 @@ class _Writer:
         width, selector = gate.outputs[0].width, gate.input(0)
         nets = [gate.input(index) for index in range(1, len(gate.inputs))]
         name = self._distinct(f"{gate.name}_select")
-        values = [f"value{number}" for number in range(len(nets))]
-        yield f"  function {declaration(width)}{name};"
-        yield f"    input {declaration(selector.width)}selector;"
-        yield from (f"    input {declaration(width)}{value};" for value in values)
-        yield "    case (selector)"
-        for bit, value in enumerate(values[1:]):
-            yield f"      {literal(_digits(1 << bit, selector.width))}: {name} = {value};"
-        yield f"      default: {name} = {values[0]};"
-        yield "    endcase"
-        yield "  endfunction"
-        yield from self._assign(gate, f"{name}({', '.join(map(self.value, (selector, *nets)))})")
+        inputs = {"selector": selector, **{f"value{number}": net for number, net in enumerate(nets)}}
+        yield from _function(name, width, inputs, _choice(name, selector.width, len(nets)))
+        yield from self._assign(gate, self._call(name, inputs.values()))
+
+    def _call(self, function: str, nets: Iterable[Net]) -> str:
+        return f"{function}({', '.join(map(self.value, nets))})"
 
     def _bidirectional(self, gate: Instance) -> Iterator[str]:
         read, port = gate.outputs
         name = next(name for name, net in self._inouts().items() if net.number == port.number)
         if gate.inputs[0]:
-            yield f"  assign {self.names[port.number]} = {self.value(gate.input(0))};"
+            yield _assignment(self.names[port.number], self.value(gate.input(0)))
         else:
-            yield f"  assign {self.names[port.number]} = {{{port.width}{{1'bz}}}};"
-        yield f"  assign {self.names[read.number]} = {identifier(name)};"
+            yield _assignment(self.names[port.number], f"{{{port.width}{{1'bz}}}}")
+        yield _assignment(self.names[read.number], identifier(name))
 
     def _resolution(self, gate: Instance) -> Iterator[str]:
         for index in (0, 1):
@@ -454,21 +474,24 @@ class _Writer:
         return f"{_EDGES[clock.kind]} {self.value(clock.input(0))}"
 
     def _register(self, gate: Instance) -> Iterator[str]:
-        name, data = self.names[gate.outputs[0].number], self.value(gate.input(1))
+        name = self.names[gate.outputs[0].number]
+        assignment = f"{name} <= {self.value(gate.input(1))};"
         if "a" in gate.kind:
-            reset = self.value(gate.input(2))
-            yield f"  always @({self._edge(gate, 0)} or posedge {reset})"
-            yield f"    if ({reset})"
-            yield f"      {name} <= {self.value(gate.input(3))};"
-            yield "    else"
-            yield f"      {name} <= {data};"
+            yield from self._with_reset(gate, name, assignment)
         else:
-            yield f"  always @({self._edge(gate, 0)})"
-            yield f"    {name} <= {data};"
+            yield from (f"  always @({self._edge(gate, 0)})", f"    {assignment}")
         if "i" in gate.kind:
             first = self._first_value(gate, gate.input(len(gate.inputs) - 1))
             if set(first) != {"x"}:
                 yield f"  initial {name} = {literal(first)};"
+
+    def _with_reset(self, gate: Instance, name: str, assignment: str) -> Iterator[str]:
+        reset = self.value(gate.input(2))
+        yield f"  always @({self._edge(gate, 0)} or posedge {reset})"
+        yield f"    if ({reset})"
+        yield f"      {name} <= {self.value(gate.input(3))};"
+        yield "    else"
+        yield f"      {assignment}"
 
     def _first_value(self, gate: Instance, net: Net) -> str:
         """The levels of a first value, which may be that of a signal."""
@@ -516,16 +539,20 @@ class _Writer:
         clocked: dict[str, list[Instance]] = defaultdict(list)
         for number, port in enumerate(ports):
             if port.kind == "$mem_rd":
-                yield f"  assign {self.names[port.outputs[1].number]} = {self._word(name, port, ports[:number])};"
+                yield _assignment(self.names[port.outputs[1].number], self._word(name, port, ports[:number]))
             else:
                 clocked[self._edge(port, 2)].append(port)
         for edge, group in clocked.items():
-            yield f"  always @({edge}) begin"
-            for number, port in enumerate(group):
-                enable = self.value(port.input(3))
-                condition = "" if self.constants.get(port.input(3).number) == "1" else f"if ({enable}) "
-                yield f"    {condition}{self._action(name, port, group[:number])}"
-            yield "  end"
+            yield from self._clocked(name, edge, group)
+
+    def _clocked(self, name: str, edge: str, ports: Sequence[Instance]) -> Iterator[str]:
+        """The ports of a memory that act at the same edge."""
+        yield f"  always @({edge}) begin"
+        for number, port in enumerate(ports):
+            is_always = self.constants.get(port.input(3).number) == "1"
+            condition = "" if is_always else f"if ({self.value(port.input(3))}) "
+            yield f"    {condition}{self._action(name, port, ports[:number])}"
+        yield "  end"
 
     def _action(self, name: str, port: Instance, before: Sequence[Instance]) -> str:
         """What a port does at an edge of its clock."""
@@ -540,7 +567,7 @@ class _Writer:
         for other in before:
             if other.kind == "$mem_wr_sync":
                 is_written = f"{self.value(other.input(3))} && {self.value(other.input(1))} == {address}"
-                word = f"{is_written} ? {self.value(other.input(4))} : {word}"
+                word = _either(is_written, self.value(other.input(4)), word)
         return word
 
     def _contents(self, memory: Instance) -> Iterator[str]:
@@ -559,19 +586,19 @@ class _Writer:
 
     def _module_instance(self, gate: Instance) -> Iterator[str]:
         module = self.modules[gate.kind]
-        label = self.labels[id(gate)]
         values = self.generics.get((self.module.name, gate.name), {}) if module.parameters else {}
         parameters = ", ".join(f".{identifier(name)}({values[name]})" for name in module.parameters)
-        connections = [
-            *((port.name, self.value(gate.input(index))) for index, port in enumerate(module.inputs)),
-            *(
-                (port.name, self.names[net.number] if self._is_read(net) else "")
-                for port, net in zip(module.outputs, gate.outputs, strict=True)
-            ),
-        ]
-        yield f"  {identifier(module.name)} {f'#({parameters}) ' if parameters else ''}{label} ("
-        yield ",\n".join(f"    .{identifier(port)}({value})" for port, value in connections)
+        given = f"#({parameters}) " if parameters else ""
+        yield f"  {identifier(module.name)} {given}{self.labels[id(gate)]} ("
+        yield ",\n".join(f"    .{identifier(port)}({value})" for port, value in self._connections(gate, module))
         yield "  );"
+
+    def _connections(self, gate: Instance, module: Module) -> Iterator[tuple[str, str]]:
+        """Each port of an instance, and what is connected to it."""
+        for index, port in enumerate(module.inputs):
+            yield port.name, self.value(gate.input(index))
+        for port, net in zip(module.outputs, gate.outputs, strict=True):
+            yield port.name, self.names[net.number] if self._is_read(net) else ""
 
     def _is_read(self, net: Net) -> bool:
         return net.number in self.readers or net in self.module.results

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fusesoc_firm.message.middleware import Middleware
-    from fusesoc_firm.system.system_core import CoreFolders, LoadedSystem
+    from fusesoc_firm.request.request import CoreFolders
+    from fusesoc_firm.system.system_core import LoadedSystem
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,8 @@
 
     python -m fusesoc_firm.plugin.batch GENERATOR < calls.json
 
-Such a process does the calls of one generator. The files of ours that it uses count for all of its calls, so an edit of
-one may make more of them anew than it would have to, but none of another generator's. What cannot be made is left
-alone: FuseSoC's own call makes it, or says what is wrong.
+Such a process does the calls of one generator, so it imports what they take once. What cannot be made is left alone:
+FuseSoC's own call makes it, or says what is wrong.
 """
 
 from __future__ import annotations
@@ -16,30 +15,19 @@ import sys
 from collections.abc import Generator as Steps
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
 
-from fusesoc_firm.plugin.gapi import (
-    GENERATORS,
-    MESSAGES,
-    Call,
-    Generator,
-    MessageCores,
-    make_request,
-    obtain,
-    used_before,
-)
-from fusesoc_firm.request.request import GeneratedCore, GeneratorCall, Request
-from fusesoc_firm.store.own_code import digests
-from fusesoc_firm.text.diagnostics import InputError, fail
-from fusesoc_firm.text.render import forget_rendered
+from fusesoc_firm.plugin.answer import Basis, load, obtain
+from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES
+from fusesoc_firm.request.calls import make_request
+from fusesoc_firm.request.request import GeneratorCall, Request
+from fusesoc_firm.store.facts import facts
+from fusesoc_firm.text.diagnostics import InputError, SourceRef, fail
 
 # So many are worth a process of their own.
 _LEAST = 4
 # The parameter that names cores with messages.
 _OF_CORES = "messages"
-# Modules that keep what took long to find out, and nothing rendered; `render` notes what it keeps.
-_WITHOUT_TEMPLATES = ("store.own_code", "text.render", "request.core_reader", "store.store")
 
 
 def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None]:
@@ -92,56 +80,31 @@ def _ours(calls: Iterable[GeneratorCall]) -> list[GeneratorCall]:
     ]
 
 
-def _no_folders(names: MessageCores) -> tuple[Path, ...]:
+def _no_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     fail(f"there is no run that made the messages of {', '.join(names)}")
 
 
 def _request(call: GeneratorCall) -> Request:
-    generator = GENERATORS[call.generator]
-    return make_request(call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), generator, _no_folders)
+    return make_request(call, GENERATORS[call.generator].parameters, _no_folders)
 
 
 def main() -> None:
     """Make the calls on standard input; a byte on standard output for each."""
     (name,) = sys.argv[1:]
-    code = digests()
+    generator = GENERATORS[name]
+    # The modules of the first call serve all others, so what is made is not kept if one of them was edited since.
+    code = facts("code", [""])
     for item in json.load(sys.stdin):
-        _forget()
         with suppress(InputError):
-            _make(GeneratorCall(**item), GENERATORS[name], code)
+            request, basis = _request(GeneratorCall(**item)), Basis("", [*code])
+            obtain(load(request, generator, basis), generator, basis)
         os.write(sys.stdout.fileno(), b".")
-
-
-def _forget() -> None:
-    """Forget which templates were rendered, and all that our modules keep, which could be made of them."""
-    forget_rendered()
-    for name, module in [*sys.modules.items()]:
-        package, _, rest = name.partition(".")
-        if package == "fusesoc_firm" and rest not in _WITHOUT_TEMPLATES:
-            for value in [*vars(module).values()]:
-                if hasattr(value, "cache_clear"):
-                    value.cache_clear()
-
-
-def _make(call: GeneratorCall, generator: Generator, code: Mapping[str, str]) -> None:
-    """Make a call in a process that has imported modules when our files were as `code` says.
-
-    Raises `InputError`.
-    """
-
-    def generate(request: Request) -> GeneratedCore:
-        core = generator.generate(request)
-        if digests() != code:
-            fail("a file of ours was edited since")
-        return core
-
-    obtain(_request(call), replace(generator, generate=generate))
 
 
 def _load(call: GeneratorCall) -> None:
     """Import what it takes to find such a call in the store, which copies of this process then have."""
     with suppress(InputError):
-        used_before(_request(call), GENERATORS[call.generator])
+        GENERATORS[call.generator].load(_request(call))
 
 
 if __name__ == "__main__":

@@ -14,8 +14,9 @@ from fusesoc_firm.building.cluster import build_on
 from fusesoc_firm.building.plan import Plan
 from fusesoc_firm.building.pool import Outcome, Pool
 from fusesoc_firm.building.process import save_time
+from fusesoc_firm.plugin.answer import answer_from_store
 from fusesoc_firm.plugin.batch import prepare
-from fusesoc_firm.plugin.gapi import GENERATORS, answer_from_store
+from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.plugin.project import check_locked
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.workers import cluster_workers

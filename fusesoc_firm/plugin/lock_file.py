@@ -17,13 +17,11 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.building.cores import ProjectCore
-from fusesoc_firm.converter.converter_core import library_sources, order_of_request
-from fusesoc_firm.message.library import MessageLibrary, libraries
+from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.signature import Definitions, signature
-from fusesoc_firm.request.request import Request
+from fusesoc_firm.message.signature import signature
+from fusesoc_firm.request.request import LoadedRequest
 from fusesoc_firm.store.reads import Input
-from fusesoc_firm.system.system_core import load_requested
 from fusesoc_firm.text.diagnostics import Diagnostics, fail
 from fusesoc_firm.text.files import read_regular
 from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
@@ -31,8 +29,6 @@ from fusesoc_firm.tools.programs import facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """By kind (`messages`, `cores`, `tools`) and name: facts by name."""
-Call = tuple[Request, Sequence[Input]]
-"""A request for a generated core, and what it is made of."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
 _HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
@@ -44,21 +40,23 @@ def lock_path(core: ProjectCore) -> Path:
     return core.files[0].with_suffix(".lock")
 
 
-def lock_of(core: ProjectCore, depends: Iterable[ProjectCore], calls: Mapping[str, Sequence[Call]]) -> Lock:
-    """What a core uses now: itself, and the cores that it `depends` on, with the `calls` of each by its name.
+def lock_of(
+    core: ProjectCore, depends: Iterable[ProjectCore], generated: Mapping[str, Sequence[LoadedRequest]]
+) -> Lock:
+    """What a core uses now: itself, and the cores that it `depends` on, with what each has `generated` by its name.
 
     A message that two of them take from different places is listed for each.
     """
     depends = list(depends)
     messages: dict[str, dict[str, str]] = {}
     for item in (core, *depends):
-        for request, _ in calls.get(item.vlnv, ()):
-            for label, facts in _messages(request).items():
+        for loaded in generated.get(item.vlnv, ()):
+            for label, facts in _messages(loaded).items():
                 if messages.setdefault(label, facts) != facts:
-                    messages[_of_request(label, request)] = facts
+                    messages[_of_request(label, loaded)] = facts
     return {
         "messages": dict(sorted(messages.items())),
-        "cores": {item.vlnv: {"sha256": _digest_of_core(item, calls.get(item.vlnv, ()))} for item in depends},
+        "cores": {item.vlnv: {"sha256": _digest_of_core(item, generated.get(item.vlnv, ()))} for item in depends},
         "tools": _tools(),
     }
 
@@ -91,12 +89,12 @@ def check_lock(locked: Lock, used: Lock) -> None:
     faults.raise_if_any()
 
 
-def check_request(path: Path, request: Request, *, has_messages: bool = True) -> None:
-    """Raise `InputError` with what a request uses that differs from a lock file: messages, if any, and packages."""
+def check_request(path: Path, loaded: LoadedRequest) -> None:
+    """Raise `InputError` with what a request uses that differs from a lock file: messages and packages."""
     locked = read_lock(path)
     faults = Diagnostics()
-    for label, now in _messages(request).items() if has_messages else ():
-        was = locked["messages"].get(_of_request(label, request), locked["messages"].get(label))
+    for label, now in _messages(loaded).items():
+        was = locked["messages"].get(_of_request(label, loaded), locked["messages"].get(label))
         for difference in _difference("message", label, was, now):
             faults.error(difference, hint=f"by {path}")
     for name, now in packages(_PACKAGES).items():
@@ -126,25 +124,17 @@ def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mappin
             yield f"{word} {name}: {fact} is {now.get(fact)}, but {was.get(fact)} is locked"
 
 
-def _messages(request: Request) -> dict[str, dict[str, str]]:
+def _messages(loaded: LoadedRequest) -> dict[str, dict[str, str]]:
     """The facts of each message that a request leads to."""
     return {
-        f"{name} ({library.ros.title})": _message(name, library, request.files_root.resolve())
-        for library, definitions in _definitions(request)
+        f"{name} ({library.ros.title})": _message(name, library, loaded.request.files_root.resolve())
+        for library, definitions in loaded.definitions()
         for name in definitions
     }
 
 
-def _of_request(label: str, request: Request) -> str:
-    return f"{label} of {request.vlnv}"
-
-
-def _definitions(request: Request) -> list[tuple[MessageLibrary, Definitions]]:
-    """The library of each message that a request leads to, with all definitions within it."""
-    if request.command == "far":
-        return load_requested(request).definitions()
-    known = libraries(*library_sources(request))
-    return [(known[wanted.ros], wanted.definitions) for wanted in order_of_request(request).messages]
+def _of_request(label: str, loaded: LoadedRequest) -> str:
+    return f"{label} of {loaded.request.vlnv}"
 
 
 def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[str, str]:
@@ -159,10 +149,10 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
     }
 
 
-def _digest_of_core(core: ProjectCore, calls: Sequence[Call]) -> str:
+def _digest_of_core(core: ProjectCore, generated: Sequence[LoadedRequest]) -> str:
     """The digest of a core's files, and of what is generated for it is made of, by their names from its description."""
     folder = core.files[0].parent
-    made_of = [item for _, inputs in calls for item in inputs]
+    made_of = [item for loaded in generated for item in loaded.inputs]
     return _digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,14 +14,14 @@ from fusesoc_firm.building.cores import (
     dependencies,
     project_cores,
 )
-from fusesoc_firm.plugin.gapi import GENERATORS, MESSAGES, Call, MessageCores, make_request, used_before
+from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES
 from fusesoc_firm.plugin.lock_file import Lock, check_lock, lock_of, lock_path, lock_text, read_lock
+from fusesoc_firm.request.calls import make_request
 from fusesoc_firm.request.core_reader import core_name
 from fusesoc_firm.request.message_core import folders
-from fusesoc_firm.request.request import GeneratorCall, Request
-from fusesoc_firm.store.own_code import PACKAGE, digests
-from fusesoc_firm.store.reads import Input
-from fusesoc_firm.text.diagnostics import InputError, fail
+from fusesoc_firm.request.request import GeneratorCall, LoadedRequest, Request
+from fusesoc_firm.store.own_code import PACKAGE, names
+from fusesoc_firm.text.diagnostics import InputError, SourceRef, fail
 from fusesoc_firm.text.outputs import shown, write
 
 
@@ -62,11 +62,11 @@ def write_lock(core: str) -> Path:
     return path
 
 
-def message_folders(names: MessageCores) -> tuple[Path, ...]:
+def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
     """The folders of cores that carry messages, where these lie: there is no run that copies them."""
     found: list[Path] = []
     cores = {name: core for core in project_cores() for name in core.names}
-    for name, source in names.items():
+    for name, source in named.items():
         core = cores.get(core_name(name))
         requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []
         if not requests:
@@ -85,11 +85,11 @@ def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
     return lock_of(core, depends, calls)
 
 
-def _requests(core: ProjectCore) -> Iterator[tuple[Request, Sequence[Input]]]:
-    """What a core has generated, and what that is made of."""
+def _requests(core: ProjectCore) -> Iterator[LoadedRequest]:
+    """What a core has generated, and what that leads to."""
     for call in core.calls:
         if call.generator != MESSAGES and (request := _request(call)):
-            yield request, GENERATORS[request.command].inputs(request)
+            yield GENERATORS[request.command].load(request)
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
@@ -116,24 +116,22 @@ def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
         if request is None:
             return set()
         files = set(_input_files(request))
-        used = used_before(request, GENERATORS[request.command])
     except InputError:
         # It cannot be made: whatever changed beside it, or in our own files, may be why.
         roots = (Path(call.files_root).resolve(), PACKAGE)
         return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
-    # What was not made before may use any.
-    return files | {PACKAGE / name for name in (digests() if used is None else used)}
+    return files | {PACKAGE / name for name in names()}
 
 
 def _request(call: GeneratorCall) -> Request | None:
     """The request that FuseSoC would make; None for a generator that is not ours."""
     if call.generator not in GENERATORS:
         return None
-    known = GENERATORS[call.generator]
-    return make_request(call.generator, Call(call.vlnv, Path(call.files_root), call.parameters), known, message_folders)
+    return make_request(call, GENERATORS[call.generator].parameters, message_folders)
 
 
 def _input_files(request: Request) -> list[Path]:
     """The files that a request depends on, be it in part."""
-    found = (item if isinstance(item, Path) else item.path for item in GENERATORS[request.command].inputs(request))
+    inputs = GENERATORS[request.command].load(request).inputs
+    found = (item if isinstance(item, Path) else item.path for item in inputs)
     return [*dict.fromkeys(path.resolve() for path in found)]

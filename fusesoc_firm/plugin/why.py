@@ -15,7 +15,9 @@ from pathlib import Path
 from fusesoc_firm.converter.converter_core import order_of_request
 from fusesoc_firm.message.model import MessageName, nested_message
 from fusesoc_firm.message.signature import Definitions
-from fusesoc_firm.plugin.gapi import GENERATORS, read_call, read_request
+from fusesoc_firm.plugin.answer import read_request
+from fusesoc_firm.plugin.generators import GENERATORS
+from fusesoc_firm.request.calls import read_call
 from fusesoc_firm.request.request import GeneratedCore, Request
 from fusesoc_firm.request.requesting_core import find_requesting_core
 from fusesoc_firm.store.reads import Input
@@ -55,20 +57,20 @@ def why(path: Path) -> list[Reason]:
     """Why each line of a generated file of a build is as it is. Raises `InputError`."""
     call, name = call_file(path)
     command = _generator(call)
-    generator = GENERATORS[command]
-    request = read_request(command, call, generator, is_this_run=False)
+    request = read_request(command, call, GENERATORS[command])
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         fail(f"{path} is no text that can be read: {error}")
-    rendering = rendering_of(lambda: generator.generate(request), name, text, generator.inputs(request))
+    loaded = GENERATORS[command].load(request)
+    rendering = rendering_of(loaded.generate, name, text, loaded.inputs)
     return reasons(rendering, _names(request))
 
 
 def _generator(path: Path) -> str:
     """The generator that a call is for. FuseSoC's file does not say it, but the core that makes the call does."""
     call = read_call(path)
-    generator = find_requesting_core(call.files_root, call.vlnv.split(":")[2]).generator
+    generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
     if generator not in GENERATORS:
         fail(
             f"no core in {call.files_root} has a generator of ours make {call.vlnv} any more",

@@ -1,26 +1,38 @@
 """What passes between FuseSoC's generator call and the stages that answer it: a request in, a generated core out.
 
-It knows no stage, so `converter` and `system` can return what `gapi` writes.
+It knows no stage, so `converter` and `system` can return what `plugin` writes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.yaml_text import yaml_dump
 
 _LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None
 """What a generator's parameter can be; None is one that was not given and has no default."""
+CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
+"""Finds the folders of the messages of cores, given by name and place. Raises `InputError` for an unknown one."""
+
+
+def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
+    """Where no core can be looked up."""
+    for name, source in names.items():
+        fail(f"core '{name}' cannot be looked up here", source, "name the folder of its messages")
+    return ()
 
 
 @dataclass(frozen=True)
 class GeneratorCall:
-    """A call of a generator as FuseSoC will make it: the new core's name, the requesting core's folder, parameters."""
+    """A call of a generator as FuseSoC makes it: the new core's name, the requesting core's folder, parameters."""
 
     generator: str
     vlnv: str
@@ -28,12 +40,27 @@ class GeneratorCall:
     parameters: Mapping[str, Any]
 
 
+class MessageFolders:
+    """The folders of the cores whose messages are used; `find` is asked for each core once, and `found` has them."""
+
+    def __init__(self, find: CoreFolders = no_core_folders) -> None:
+        self.found: dict[str, Sequence[Path]] = {}
+        self._find = find
+
+    def of(self, cores: Mapping[str, SourceRef | None]) -> list[Path]:
+        """The folders of some cores, each with its place. Raises `InputError` for an unknown one."""
+        for name, source in cores.items():
+            if name not in self.found:
+                self.found[name] = self._find({name: source})
+        return [folder for name in cores for folder in self.found[name]]
+
+
 @dataclass(frozen=True)
 class Request:
     """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's.
 
-    `places` tells where the items of a list parameter stand, as far as that is known; they are no part of the request.
-    `message_folders` are those of the cores that it, or its specification, names as carriers of messages.
+    `places` tells where the items of a list parameter are, as far as that is known; they are no part of the request.
+    `message_folders` finds those of the cores that it, or its specification, names as carriers of messages.
     """
 
     command: str
@@ -41,16 +68,12 @@ class Request:
     files_root: Path
     parameters: Mapping[str, Plain]
     places: Mapping[str, Sequence[SourceRef]] = field(default_factory=dict, compare=False)
-    message_folders: Mapping[str, Sequence[Path]] = field(default_factory=dict)
+    message_folders: MessageFolders = field(default_factory=MessageFolders, compare=False)
 
     @property
     def name(self) -> str:
         """The new core's name, `<requesting core>-<instance>`."""
         return self.vlnv.split(":")[2]
-
-    def folders_of(self, cores: Iterable[str]) -> list[Path]:
-        """The folders of some of the cores that carry messages."""
-        return [folder for core in cores for folder in self.message_folders[core]]
 
     def listed(self, parameter: str) -> dict[str, SourceRef | None]:
         """The items of a list parameter, each with its place; none where it is not given."""
@@ -82,6 +105,20 @@ class GeneratedCore:
 
     description: str
     files: Mapping[str, GeneratedFile] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LoadedRequest:
+    """A request, and what it leads to, derived once.
+
+    `inputs` are the files whose content the core depends on; a path of them need not exist. `generate` makes the core,
+    `definitions` gives the library of each message with all definitions within it. Both raise `InputError`.
+    """
+
+    request: Request
+    inputs: Sequence[Input]
+    generate: Callable[[], GeneratedCore]
+    definitions: Callable[[], Sequence[tuple[MessageLibrary, Definitions]]]
 
 
 def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:

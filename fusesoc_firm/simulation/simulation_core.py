@@ -28,6 +28,7 @@ from fusesoc_firm.system.hardware.verilog_bench import (
     translated_unit,
     verilog_bench_configuration,
 )
+from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.render import render
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
@@ -36,15 +37,14 @@ from fusesoc_firm.tools.simulators import SIMULATORS, fitting
 _BENCH_TAGS = ("simulation",)
 
 
-def inputs(request: Request) -> list[Input]:
+def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
     """What the system depends on, the stimuli, the model, the environment, and what else code of the user reads."""
-    stimuli, model = _path(request, "stimuli"), _path(request, "model")
-    return [*system_core.inputs(request), *_stimuli_files(stimuli), model, *_environment(request), *_files(request)]
+    found = [*live_inputs(request, loaded), *_files(request)]
+    return [*found, *_stimuli_files(_path(request, "stimuli")), _path(request, "model")]
 
 
-def generate(request: Request) -> GeneratedCore:
+def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     """The core; it belongs beside the one that the same specification gives as a system. Raises `InputError`."""
-    loaded = system_core.load_requested(request)
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "sim")
     stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
@@ -68,14 +68,13 @@ def generate(request: Request) -> GeneratedCore:
     return GeneratedCore(f"Simulation of system {system.name}", files)
 
 
-def live_inputs(request: Request) -> list[Input]:
+def live_inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
     """What the system depends on, and the environment."""
-    return [*system_core.inputs(request), *_environment(request)]
+    return [*system_core.inputs(request, loaded), *_environment(request)]
 
 
-def generate_live(request: Request) -> GeneratedCore:
+def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
     """The core of a live simulation. Seed and rate of stalls are given where it is started. Raises `InputError`."""
-    loaded = system_core.load_requested(request)
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "live")
     environment = environment_files(_environment(request), system)
@@ -88,9 +87,7 @@ def generate_live(request: Request) -> GeneratedCore:
     return GeneratedCore(f"Live simulation of system {system.name}", files)
 
 
-def _surroundings(
-    loaded: system_core.LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile]
-) -> dict[str, GeneratedFile]:
+def _surroundings(loaded: LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile]) -> dict[str, GeneratedFile]:
     """What every test bench of a system needs: kernels that can be simulated, and the environment."""
     files: dict[str, GeneratedFile] = {}
     for kernel in loaded.system.kernels:

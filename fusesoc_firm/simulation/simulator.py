@@ -25,10 +25,10 @@ from typing import Any
 import yaml
 
 from fusesoc_firm.request.core_reader import CoreFile, read_core
+from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.store.layout import default_root
 from fusesoc_firm.system.beside import core_of, load_beside
 from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
-from fusesoc_firm.system.system_core import CoreFolders, no_core_folders
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.file_lock import locked
 from fusesoc_firm.text.files import write_if_changed

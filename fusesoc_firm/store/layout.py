@@ -1,9 +1,8 @@
-"""What lies in the store, and how: `store` says what is kept there, `recall` answers from it in a hurry.
+"""What lies in the store, and how: `store` says what is kept there, `plugin.recall` answers from it in a hurry.
 
-    <root>/v3/<first two digits>/<key>.entry                     generated files
-    <root>/v3/<first two digits>/<digest of a request>.uses      names of our own files that made it
-    <root>/v3/<first two digits>/<digest of a call>.call         what decided the answer to a call, and its key
-    <root>/v3/<first two digits>/<digest of a request>.lock      held while an entry is made
+    <root>/v4/<first two digits>/<key>.entry                 generated files
+    <root>/v4/<first two digits>/<digest of a call>.call     what decided the answer to a call, and its key
+    <root>/v4/<first two digits>/<key>.lock                  held while an entry is made
 
 Each but the lock is a line with the SHA-256 of the rest, and appears by one rename: it is whole, or not there. An entry
 goes on with a line of JSON (what was asked for, names, lengths) and the contents; the others are JSON.
@@ -28,9 +27,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-LAYOUT = "v3"
-ENTRY, USES, CALL, LOCK = ".entry", ".uses", ".call", ".lock"
-KEPT = (ENTRY, USES, CALL)
+LAYOUT = "v4"
+ENTRY, CALL, LOCK = ".entry", ".call", ".lock"
+KEPT = (ENTRY, CALL)
 """The endings of what is kept; what is used less goes first."""
 
 # Of plain data, and of all else. They are read at once, so there is a bound.
@@ -41,6 +40,8 @@ _LONGEST_NAME_BYTES, _LONGEST_PATH_BYTES = 255, 4000
 _DIGITS = frozenset("0123456789abcdef")
 _DIGEST_DIGITS = 64
 _FACT_PARTS, _FILE_PARTS = 3, 2
+# Of the note of a call.
+_WORDS = ("name", "core", "marks")
 
 
 def default_root(environment: Mapping[str, str] = os.environ) -> str:
@@ -75,18 +76,12 @@ def write_entry(root: str, name: str, about: Mapping[str, str], files: Mapping[s
     write(root, name, b"".join([json.dumps(header).encode(), b"\n", *files.values()]))
 
 
-def read_uses(root: str, name: str) -> list[str] | None:
-    """Names of our own files that were kept; None if they are missing or damaged."""
-    names = _plain(_read(root, name))
-    return names if isinstance(names, list) and _are_texts(names) else None
-
-
 def read_note(root: str, name: str) -> dict[str, Any] | None:
-    """The note of a call: `key`, `facts`, `name` and `marks`; None if it is missing or damaged."""
+    """The note of a call: `key`, `facts`, `name`, `core` and `marks`; None if it is missing or damaged."""
     note = _plain(_read(root, name))
-    if not isinstance(note, dict) or not {"key", "facts", "name", "marks"} <= note.keys():
+    if not isinstance(note, dict) or not {"key", "facts", *_WORDS} <= note.keys():
         return None
-    is_good = _is_digest(note["key"]) and _are_printable([note["name"], note["marks"]]) and _are_facts(note["facts"])
+    is_good = _is_digest(note["key"]) and _are_printable([note[word] for word in _WORDS]) and _are_facts(note["facts"])
     return note if is_good else None
 
 
@@ -109,7 +104,7 @@ def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] 
 
 def is_whole(root: str, name: str) -> bool:
     """Whether something that is kept is undamaged."""
-    reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, USES: read_uses, CALL: read_note}
+    reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, CALL: read_note}
     return reads[name[name.rindex(".") :]](root, name) is not None
 
 

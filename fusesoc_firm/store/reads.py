@@ -1,4 +1,4 @@
-"""Which files and folders this process reads, as Python itself tells (audit hooks, PEP 578).
+"""Which files and folders this process reads, and in which state, as Python itself tells (audit hooks, PEP 578).
 
 What a generator reads has to be among the inputs that its key covers, or an edit would go unnoticed. What Python
 consists of and what its packages hold is left out, as their versions count, and so is this package, whose files are
@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from fusesoc_firm.store.facts import Fact, state
 from fusesoc_firm.store.own_code import PACKAGE
 
 # Events of Python with a path as their first argument.
@@ -53,16 +54,26 @@ Input = Path | Part
 
 @dataclass
 class Reads:
-    """Absolute paths of what was read, in the order in which it was; `python_path` is where Python finds packages.
+    """What was read: absolute paths in the order in which they were, each in its state before the first reading.
 
     `parts` are files that were read in part. What lies in `apart`, or in a new temporary folder, is not noted.
+    `python_path` is where Python finds packages.
     """
 
-    files: dict[str, None] = field(default_factory=dict)
-    parts: dict[str, None] = field(default_factory=dict)
-    folders: dict[str, None] = field(default_factory=dict)
+    files: dict[str, str | None] = field(default_factory=dict)
+    parts: dict[str, str | None] = field(default_factory=dict)
+    folders: dict[str, str | None] = field(default_factory=dict)
     apart: list[str] = field(default_factory=lambda: [*_apart()])
     python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
+
+    def note_file(self, path: str) -> None:
+        """Note a file that is going to be read."""
+        _note_state(self.files, "file", path)
+
+    def facts(self) -> list[Fact]:
+        """All that was noted."""
+        kinds = {"file": self.files, "part": self.parts, "folder": self.folders}
+        return [(kind, path, was) for kind, found in kinds.items() for path, was in found.items()]
 
 
 # Those that are noted now, the innermost last.
@@ -87,7 +98,8 @@ def in_part(files: Iterable[Path]) -> Iterator[None]:
     """Within it, these files are read in part."""
     paths = {_absolute(str(file)) for file in files}
     if _current:
-        _current[-1].parts |= dict.fromkeys(sorted(paths))
+        for path in sorted(paths):
+            _note_state(_current[-1].parts, "part", path)
     _partly.append(paths)
     try:
         yield
@@ -139,7 +151,14 @@ def _note(path: object, *, is_file: bool) -> None:
     # An archive may be on Python's path, too.
     is_apart = is_file and absolute in reads.python_path
     if not is_apart and not _is_below(absolute, reads.apart) and not _is_of_package(absolute, reads):
-        (reads.files if is_file else reads.folders)[absolute] = None
+        _note_state(reads.files if is_file else reads.folders, "file" if is_file else "folder", absolute)
+
+
+def _note_state(found: dict[str, str | None], kind: str, path: str) -> None:
+    if path not in found:
+        # It is read for that, which is not to be noted again.
+        found[path] = None
+        found[path] = state(kind, path)
 
 
 def _absolute(path: str) -> str:

@@ -1,15 +1,11 @@
 """A content-addressed store of generated files, so that nothing is generated twice.
 
 FuseSoC's own generator cache cannot be used: it sees neither the code nor the templates that a core is made with,
-keeps partial output after an interrupt, and is not locked. Here an entry's key covers all that decides its content.
+keeps partial output after an interrupt, and is not locked. Here an entry's key covers all that decides its content,
+this package's own files included.
 
-Which of this package's own files do so is known only when they have been used. So there are two steps: what was asked
-for leads to the names of the files that it used when it was last made, and these with their present digests to the
-entry. An entry is right whichever names led to it: what used just these files, in this state, for this request, will do
-so again.
-
-A call that was answered leaves a note of all facts that its key follows from, by which `recall` answers it the next
-time without making the key. `store_files` tells how all this lies in the store.
+A call that was answered leaves a note of all facts that its key follows from, by which `plugin.recall` answers it the
+next time without making the key. `layout` tells how all this lies in the store.
 
 A file is written beside its place and appears there by one rename; it is read whole and checked before it is used. So
 no reader, on this machine or on another that shares the folder, sees half of it or is disturbed by its removal. Locks
@@ -24,7 +20,7 @@ import re
 import stat
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cache
@@ -32,8 +28,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from fusesoc_firm.store import layout, shared_files
-from fusesoc_firm.store.layout import CALL, ENTRY, KEPT, LAYOUT, LOCK, USES, digest, digest_of, place
-from fusesoc_firm.store.recall import IMPORTED, Fact
+from fusesoc_firm.store.layout import CALL, ENTRY, KEPT, LAYOUT, LOCK, digest, digest_of, place
+from fusesoc_firm.store.own_code import IMPORTED
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.file_lock import take
 from fusesoc_firm.text.files import TEMPORARY
@@ -41,7 +37,7 @@ from fusesoc_firm.text.files import TEMPORARY
 Files = Mapping[str, bytes]
 """Contents by file name; a name may hold `/`."""
 
-_FORMER_LAYOUTS = ("v1", "v2")
+_FORMER_LAYOUTS = ("v1", "v2", "v3")
 _DEFAULT_LIMIT = "1G"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 # When the store is too large, so much is left that it is not so again at once.
@@ -54,29 +50,10 @@ _ABANDONED_SECONDS = 3600
 
 @dataclass(frozen=True)
 class Key:
-    """What decides a result: the digest of what was asked for, and those of our own files by name, used or not.
+    """The digest of what decides a result; `about` is plain data that tells people what was asked for."""
 
-    `about` is plain data that tells people what was asked for.
-    """
-
-    request: str
-    code: Mapping[str, str]
+    digest: str
     about: Mapping[str, str] = field(default_factory=dict, compare=False)
-
-    def with_code(self, used: Iterable[str]) -> str | None:
-        """The key of a result that used these of our files; None if one of them is no more."""
-        names = sorted(set(used))
-        if not set(names) <= self.code.keys():
-            return None
-        return digest_of([self.request, {name: self.code[name] for name in names}])
-
-
-@dataclass(frozen=True)
-class Made:
-    """Generated files, and the names of our own files that they were made with."""
-
-    files: Files
-    used: Iterable[str]
 
 
 @dataclass(frozen=True)
@@ -85,18 +62,6 @@ class Entry:
 
     files: Files
     is_from_store: bool
-
-
-@dataclass(frozen=True)
-class Call:
-    """A call as `recall` knows it: its digest, the facts that its key follows from, and what else the note holds.
-
-    `facts` are told for those of our own files that were used, in their state at that moment.
-    """
-
-    digest: str
-    facts: Callable[[Iterable[str]], Sequence[Fact]]
-    note: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -115,26 +80,30 @@ class Store:
     root: Path
     limit: int
 
-    def obtain(self, key: Callable[[], Key], build: Callable[[], Made], call: Call | None = None) -> Entry:
+    def obtain(self, key: Key, build: Callable[[], Files], is_current: Callable[[], bool] = lambda: True) -> Entry:
         """The files of a key, from the store if it has them undamaged, else from `build`, which are then kept.
 
-        The key is asked for again after `build`, and nothing is kept if it has changed: then something was edited while
-        it was read. Processes that want the same at once wait for the first of them. Whatever `build` raises passes
-        through. If the store cannot be written, one line on stderr says so and the files are made without it. The
-        answer to a `call` is noted, so that it can be recalled.
+        Nothing is kept unless the key `is_current` after `build`: otherwise something was edited while it was read.
+        Processes that want the same at once wait for the first of them. Whatever `build` raises passes through. If the
+        store cannot be written, one line on stderr says so and the files are made without it.
         """
-        wanted = key()
-        if (files := self._find(wanted)) is not None:
-            if call and self.is_writable():
-                self._note(key, wanted, call)
+        if (files := self._find(key)) is not None:
             return Entry(files, True)
-        with self._lock(wanted):
+        with self._lock(key):
             # While this process waited for the lock another one may have made the entry.
-            if (files := self._find(wanted)) is not None:
+            if (files := self._find(key)) is not None:
                 return Entry(files, True)
-            made = build()
-            self._keep(key, wanted, made, call)
-        return Entry(made.files, False)
+            files = build()
+            if is_current():
+                self._keep(key, files)
+        return Entry(files, False)
+
+    def note(self, call: str, note: Mapping[str, object]) -> None:
+        """Note the answer to a call, by its digest, so that it can be recalled."""
+        # It only saves time.
+        with suppress(OSError):
+            if self.is_writable():
+                layout.write_json(self._root, place(call, CALL), note)
 
     def entries(self) -> list[StoredFile]:
         """Every entry, the one that was used last first."""
@@ -177,25 +146,20 @@ class Store:
         """Remove all of it, that of former versions too; the number of bytes removed. Raises `OSError`."""
         return sum(shared_files.remove(self._root, layout) for layout in (*_FORMER_LAYOUTS, LAYOUT))
 
-    def uses(self, key: Key) -> list[str] | None:
-        """Which of our own files were used for what was asked for when it was last made; None if that is not known."""
-        return layout.read_uses(self._root, place(key.request, USES))
-
     def _find(self, key: Key) -> Files | None:
-        uses = self.uses(key)
-        full = None if uses is None else key.with_code(uses)
-        if full is None or (found := layout.read_entry(self._root, place(full, ENTRY))) is None:
+        name = place(key.digest, ENTRY)
+        if (found := layout.read_entry(self._root, name)) is None:
             return None
-        layout.mark_used(self._root, place(full, ENTRY), place(key.request, USES))
+        layout.mark_used(self._root, name)
         return found[1]
 
     @contextmanager
     def _lock(self, key: Key) -> Iterator[None]:
-        """Hold the request's lock, which the system frees if the process dies.
+        """Hold the lock of a key, which the system frees if the process dies.
 
         Who cannot have it, or has waited too long for it, goes on without.
         """
-        name = place(key.request, LOCK)
+        name = place(key.digest, LOCK)
         try:
             handle, is_held = _locked(self._root, name)
         except OSError:
@@ -211,38 +175,14 @@ class Store:
                     shared_files.remove(self._root, name)
             os.close(handle)
 
-    def _keep(self, key: Callable[[], Key], wanted: Key, made: Made, call: Call | None) -> None:
-        used = sorted(made.used)
-        full = wanted.with_code(used)
-        facts = call.facts(used) if call else ()
-        # The key after the facts: what is edited in between is found now, and what is edited later differs from them.
-        # None if one of our own files is no more, or is new.
-        if full is None or key() != wanted:
-            return
+    def _keep(self, key: Key, files: Files) -> None:
         try:
-            layout.write_entry(self._root, place(full, ENTRY), wanted.about, made.files)
-            layout.write_json(self._root, place(wanted.request, USES), used)
-            if call:
-                self._write_note(call, full, facts)
+            layout.write_entry(self._root, place(key.digest, ENTRY), key.about, files)
             self._shrink_if_needed()
         except OSError as error:
             # Who may only read a store of others knows, or is told by `firm cache show`.
             if self.is_writable():
                 print(f"warning: nothing is kept in the store {self.root}: {error.strerror}", file=sys.stderr)
-
-    def _note(self, key: Callable[[], Key], wanted: Key, call: Call) -> None:
-        """Note a call whose entry was found by the key, unless something is edited meanwhile."""
-        used = self.uses(wanted) or []
-        full = wanted.with_code(used)
-        facts = call.facts(used)
-        if full is not None and key() == wanted:
-            # It only saves time.
-            with suppress(OSError):
-                self._write_note(call, full, facts)
-
-    def _write_note(self, call: Call, full: str, facts: Sequence[Fact]) -> None:
-        note = {**call.note, "key": full, "facts": facts}
-        layout.write_json(self._root, place(call.digest, CALL), note)
 
     def _shrink_if_needed(self) -> None:
         if self.size() > self.limit:
@@ -284,16 +224,15 @@ def parse_size(text: str) -> int | None:
     return int(found[1]) * _UNITS[found[2]] if found else None
 
 
-def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | None], code: Iterable[str]) -> str:
-    """The digest of all that decides what comes of `request` (plain data), but for the content of our own files.
+def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | None], code: str) -> str:
+    """The digest of all that decides what comes of `request` (plain data).
 
-    `inputs` are the bytes of each file by name, None if there is none. The names of our own files, `code`, count: a new
-    one can take the place of another.
+    `inputs` are the bytes of each file by name, None if there is none; `code` is the digest of our own files.
     """
     parts = {
         "request": request,
         "inputs": {name: None if data is None else digest(data) for name, data in inputs.items()},
-        "code": sorted(code),
+        "code": code,
         "versions": {name: _version(name) for name in IMPORTED},
         "python": sys.version_info[:2],
         # What a compiler made of an accelerator runs on one kind of machine only.

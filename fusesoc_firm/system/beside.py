@@ -14,7 +14,8 @@ from pathlib import Path
 
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.request.core_reader import CoreFile, read_core
-from fusesoc_firm.system.system_core import CoreFolders, LoadedSystem, load_system, no_core_folders, with_paths
+from fusesoc_firm.request.request import CoreFolders, no_core_folders
+from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
 # The instance of the generator that makes the system.

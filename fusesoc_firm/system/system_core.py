@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path, PurePosixPath
 
 from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
@@ -14,11 +14,11 @@ from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
-from fusesoc_firm.message.library import MessageLibrary, libraries
-from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
+from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import Definitions
-from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
+from fusesoc_firm.request.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.boards.block_design import (
     BLOCK_DESIGN_TEMPLATE,
@@ -45,12 +45,9 @@ from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import WRAPPER_TEMPLATE, wrapper_configuration
 from fusesoc_firm.system.written.specification import Accelerator, Specification, is_core, read_specification
-from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef, fail
+from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import render
-
-CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
-"""Finds the folders of the messages of cores, given by name and place. Raises `InputError` for an unknown one."""
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {
@@ -64,13 +61,6 @@ _FILE_TYPES = {
 _INCLUDE_SUFFIXES = (".vh", ".svh")
 
 
-def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
-    """Where no core can be looked up."""
-    for name, source in names.items():
-        fail(f"core '{name}' cannot be looked up here", source, "name the folder of its messages")
-    return ()
-
-
 @dataclass(frozen=True)
 class LoadedSystem:
     """A specification, the folder its paths are relative to, the board if one is given, and the system derived.
@@ -80,7 +70,7 @@ class LoadedSystem:
 
     specification: Specification
     folder: Path
-    libraries: dict[Middleware, MessageLibrary]
+    libraries: Mapping[Middleware, MessageLibrary]
     system: DerivedSystem
     board: Board | None = None
     warnings: tuple[Diagnostic, ...] = ()
@@ -108,7 +98,7 @@ class LoadedSystem:
 
 def load_system(
     path: Path,
-    libraries: dict[Middleware, MessageLibrary],
+    libraries: Mapping[Middleware, MessageLibrary],
     *,
     needs_sources: bool = True,
     board: Board | None = None,
@@ -124,13 +114,15 @@ def load_system(
     if board:
         specification = on_board(specification, board)
     own = {str(item): item.source for item in specification.paths}
-    libraries = with_paths(libraries, own, path.parent, core_folders, faults)
+    spoken = {MIDDLEWARES[word] for word in specification.middlewares if word in MIDDLEWARES} or {*libraries}
+    needed = Libraries({ros: partial(libraries.__getitem__, ros) for ros in libraries if ros in spoken})
+    libraries = with_paths(needed, own, path.parent, core_folders, faults)
     system = derive(specification, path.parent, libraries, faults, needs_sources=needs_sources)
     return LoadedSystem(specification, path.parent, libraries, system, board, faults.warnings)
 
 
 def with_paths(
-    known: dict[Middleware, MessageLibrary],
+    known: Mapping[Middleware, MessageLibrary],
     paths: Mapping[str, SourceRef | None],
     folder: Path,
     core_folders: CoreFolders,
@@ -147,27 +139,15 @@ def with_paths(
             places |= dict.fromkeys(core_folders({item: source}) if is_core(item) else [folder / item], source)
         except InputError as error:
             faults.take(error, source)
-    own = dict(known)
-    for ros, library in known.items():
+    own: dict[Middleware, MessageLibrary] = {}
+    for ros in known:
         try:
-            own[ros] = library.before(places)
+            own[ros] = known[ros].before(places)
         except InputError as error:
             faults.take(error, None)
     if len(faults.found) > before:
         faults.raise_if_any()
     return own
-
-
-def message_cores(request: Request) -> dict[str, SourceRef | None]:
-    """The cores that the specification of a generator call names; none where it cannot be read."""
-    path = specification_path(request)
-    try:
-        # Most name none, and are spared a second reading.
-        if "paths" not in path.read_text(encoding="utf-8"):
-            return {}
-        return read_specification(path, str(path), Diagnostics()).message_cores
-    except (OSError, UnicodeDecodeError, InputError):
-        return {}
 
 
 def load_requested(request: Request) -> LoadedSystem:
@@ -176,7 +156,7 @@ def load_requested(request: Request) -> LoadedSystem:
         specification_path(request),
         libraries(*library_sources(request)),
         board=_board(request),
-        core_folders=request.folders_of,
+        core_folders=request.message_folders.of,
     )
 
 
@@ -185,10 +165,10 @@ def specification_path(request: Request) -> Path:
     return request.files_root / str(request.parameters["spec"])
 
 
-def inputs(request: Request) -> list[Input]:
-    """The specification and every file that it leads to. Raises `InputError`."""
+def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
+    """The specification of a request and every file that it leads to, as it was loaded."""
     board = [_board_path(request)] if request.parameters.get("board") else []
-    return [specification_path(request), *board, *load_requested(request).inputs()]
+    return [specification_path(request), *board, *loaded.inputs()]
 
 
 def _board_path(request: Request) -> Path:
@@ -247,13 +227,8 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
     yield Artifact(f"{system.entity}.vhd", Part.COMPONENTS, SYSTEM_TEMPLATE, system_configuration(system))
 
 
-def generate(request: Request) -> GeneratedCore:
-    """The system as a core, its files in the order in which a tool reads them. Raises `InputError`."""
-    return system_core(load_requested(request))
-
-
 def system_core(loaded: LoadedSystem) -> GeneratedCore:
-    """The core of a loaded system."""
+    """The core of a loaded system, its files in the order in which a tool reads them. Raises `InputError`."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
     top = f"{system.entity}.vhd"

@@ -2,8 +2,8 @@
 
 Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics`
 collector, goes on as far as it can, and lets the collector raise one `InputError` that holds all faults of
-the file. The two doors (`cli`, `gapi`) print it and exit with 1; nobody else catches it. Warnings are only printed:
-they change neither what is made nor the exit status.
+the file. The two doors (`cli`, `plugin.answer`) print it and exit with 1; nobody else catches it. Warnings are only
+printed: they change neither what is made nor the exit status.
 """
 
 from __future__ import annotations

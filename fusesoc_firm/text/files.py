@@ -12,20 +12,6 @@ from contextlib import suppress
 
 TEMPORARY = ".new-"
 """What the name of a file begins with that is not whole yet."""
-# Where FuseSoC starts generators, each in a folder of its own; and what keeps it from searching a folder for cores.
-_GENERATED, _IGNORE = "generator_cache", "FUSESOC_IGNORE"
-
-
-def hide_generated() -> None:
-    """Keep what is generated beside the current folder from being found as cores of a library.
-
-    FuseSoC takes every `.core` below a library's folder. If that is a project's own, its builds are there, too.
-    """
-    folder = os.path.dirname(os.getcwd())
-    if os.path.basename(folder) == _GENERATED:
-        # Without it, all else works.
-        with suppress(OSError), open(os.path.join(folder, _IGNORE), "ab"):
-            pass
 
 
 def write_whole(path: str | os.PathLike[str], data: bytes) -> None:

@@ -35,9 +35,6 @@ from chevron.tokenizer import ChevronError, tokenize
 from fusesoc_firm.text.quoting import QUOTES, Quote
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
-# Those of them that this process has read: what it made depends on no others.
-_READ: set[str] = set()
-_RENDERED: set[str] = set()
 
 
 class TemplateError(Exception):
@@ -171,23 +168,7 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
 
 def template_text(name: str, templates: Path = TEMPLATES) -> str:
     """The text of `templates/<name>.mustache`. Raises `OSError`."""
-    if templates == TEMPLATES:
-        _READ.add(f"{name}.mustache")
-    return _text(name, templates)
-
-
-def _text(name: str, templates: Path) -> str:
     return (templates / f"{name}.mustache").read_text(encoding="utf-8")
-
-
-def templates_read() -> frozenset[str]:
-    """Which files below `TEMPLATES` this process has read or rendered so far."""
-    return frozenset(_READ | _RENDERED)
-
-
-def forget_rendered() -> None:
-    """Forget which files were rendered. Those whose text was asked for count as long as the process lives."""
-    _RENDERED.clear()
 
 
 @dataclass(frozen=True)
@@ -361,17 +342,11 @@ def _require_plain(value: object, path: str) -> None:
         raise TemplateError(f"'{path or 'the context'}' is {_kind(value)}; a context holds plain data only")
 
 
-def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file, which is rendered now."""
-    if templates == TEMPLATES:
-        _RENDERED.add(f"{name}.mustache")
-    return _parse_once(name, templates)
-
-
 @cache
-def _parse_once(name: str, templates: Path) -> tuple[_Node, ...]:
+def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
+    """The tree of a template file."""
     try:
-        return _tree(name, _text(name, templates))
+        return _tree(name, template_text(name, templates))
     except OSError as error:
         raise TemplateError(f"cannot read {name.rpartition('/')[2]}.mustache: {error.strerror}") from error
 

@@ -15,7 +15,7 @@ import yaml
 from fusesoc_firm import __version__
 from fusesoc_firm.building.cores import project_cores
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.gapi import main as generate
+from fusesoc_firm.plugin.answer import main as generate
 from fusesoc_firm.store.own_code import PACKAGE
 from fusesoc_firm.tools.library_path import library_root
 from fusesoc_firm.tools.programs import Program
@@ -123,18 +123,12 @@ def test_a_new_file_that_hides_another_one_counts(project: Path, capsys: Capture
     assert touched(capsys) == {"top": "top/msg/geometry_msgs/msg/Point.msg"}
 
 
-def test_our_own_files_count_where_they_were_used(
-    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ["templates/core/system.core.mustache", "text/naming.py"])
+def test_our_own_files_touch_what_is_generated(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    def edited(name: str) -> dict[str, str]:
-        monkeypatch.setattr("fusesoc_firm.plugin.project.changed_files", lambda *_: [PACKAGE / name])
-        return touched(capsys)
-
-    # What was never made may use any of them.
-    assert "top" in edited("templates/core/system.core.mustache")
-    monkeypatch.setattr("fusesoc_firm.plugin.project.used_before", lambda *_: ["naming.py"])
-    assert edited("templates/core/system.core.mustache") == {}
-    assert list(edited("naming.py"))[-1] == "top"
+    monkeypatch.setattr("fusesoc_firm.plugin.project.changed_files", lambda *_: [PACKAGE / name])
+    assert touched(capsys) == {"top": str(PACKAGE / name)}
 
 
 def test_what_is_no_revision_or_no_repository_is_a_fault(project: Path, capsys: Captured) -> None:
@@ -156,6 +150,30 @@ def test_files_of_all_targets_and_flags_are_found(project: Path) -> None:
         "geometry_msgs/Point",
     ]
     assert "firm_generator.py" in {path.name for path in cores["generators"].files}
+
+
+def test_conditions_and_appended_lists_are_read_as_fusesoc_does(project: Path) -> None:
+    filesets = """\
+filesets:
+  base: &base
+    files: ["!tool_ghdl ? (a.vhd target_sim ? (b.vhd c.vhd))", "d.vhd e.vhd": {file_type: vhdlSource-93}]
+    depend: [">=me:p:leaf:0.9", "tool_ghdl ? (^me:p:branch:1.0)"]
+  rest: {files_append: [f.vhd], depend_append: ["me:p:top:1.0"]}
+"""
+    (project / "other/other.core").write_text(OTHER.replace("targets:", f"{filesets}targets:"))
+    (core,) = [core for core in project_cores() if core.vlnv == "me:p:other:1.0"]
+    assert [path.stem for path in core.files] == ["other", *"abcdef"]
+    assert core.depends == {"me:p:leaf", "me:p:branch", "me:p:top"}
+
+
+def test_the_configuration_is_the_one_that_fusesoc_is_told(
+    project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    conf = (project / "fusesoc.conf").rename(project / "another.conf")
+    assert main(["graph", "me:p:branch", "--format", "dot"]) == 1
+    monkeypatch.setenv("FUSESOC_CONFIG", str(conf))
+    assert main(["graph", "me:p:branch", "--format", "dot"]) == 0
+    assert "me:p:branch" in capsys.readouterr().out
 
 
 def test_graph(project: Path, capsys: Captured) -> None:
@@ -292,7 +310,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     capsys.readouterr()
     install("GHDL 2.0.0")
     assert locked(capsys) == []
-    monkeypatch.setattr("fusesoc_firm.store.own_code.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.store.own_code.digest", lambda: "edited")
     (found,) = locked(capsys)
     assert found.startswith("tool fusesoc-firm: sha256 is ")
 
@@ -357,7 +375,7 @@ def test_a_generator_refuses_what_is_not_locked(
     size.write_text("uint8 a\n")
     # It is in the store, and compared all the same.
     assert call(project, **more) == 0
-    monkeypatch.setattr("fusesoc_firm.store.own_code.digests", lambda: {"naming.py": "edited"})
+    monkeypatch.setattr("fusesoc_firm.store.own_code.digest", lambda: "edited")
     assert call(project, **more) == 1
     assert "tool fusesoc-firm: sha256 is " in capsys.readouterr().err
     monkeypatch.undo()

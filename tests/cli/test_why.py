@@ -10,8 +10,9 @@ import yaml
 
 from fusesoc_firm import __version__
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
-from fusesoc_firm.request.request import as_files
+from fusesoc_firm.plugin.generators import GENERATORS
+from fusesoc_firm.request.calls import make_request
+from fusesoc_firm.request.request import GeneratorCall, as_files
 from fusesoc_firm.text.render import TEMPLATES, Rendering, recorded, render, traced_lines
 
 SPECS = Path(__file__).resolve().parents[2] / "specs"
@@ -33,9 +34,11 @@ def build(folder: Path, application: str = "quat2euler", **parameters: object) -
         given, root = parameters, folder
         core = {"name": f"robot:sys:{application}:1", "generate": {"system": {"generator": "firm"}}}
         (folder / "converters.core").write_text(f"CAPI=2:\n{yaml.safe_dump(core)}")
-    request = make_request(generator, Call(vlnv, root, given), GENERATORS[generator], no_messages)
+    request = make_request(
+        GeneratorCall(generator, vlnv, str(root), given), GENERATORS[generator].parameters, no_messages
+    )
     made = folder / "generator_cache" / f"robot_sys_{application}-system_{__version__}-1234"
-    for name, content in as_files(GENERATORS[generator].generate(request), request).items():
+    for name, content in as_files(GENERATORS[generator].load(request).generate(), request).items():
         (made / name).parent.mkdir(parents=True, exist_ok=True)
         (made / name).write_bytes(content)
     call = {"files_root": str(root), "vlnv": vlnv, "parameters": given}
@@ -64,10 +67,10 @@ def why(capsys: Captured, path: Path, text: str) -> dict[str, list[str]]:
 @pytest.mark.parametrize("application", APPLICATIONS)
 def test_every_line_is_that_of_the_template_named(application: str) -> None:
     """The rest of a template's line, without its tags, stands on the line that is made of it."""
-    call = Call(f"a:b:{application}-x:1", SPECS / application, {"spec": f"{application}.yaml"})
-    request = make_request("far", call, GENERATORS["far"], no_messages)
+    call = GeneratorCall("far", f"a:b:{application}-x:1", str(SPECS / application), {"spec": f"{application}.yaml"})
+    request = make_request(call, GENERATORS["far"].parameters, no_messages)
     with recorded() as renderings:
-        GENERATORS["far"].generate(request)
+        GENERATORS["far"].load(request).generate()
     for text, rendering in renderings.items():
         lines = traced_lines(rendering)
         assert [line.text for line in lines] == text.splitlines()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.converter.converter_core import constants_files, generate
+from fusesoc_firm.converter.converter_core import constants_files, load
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
@@ -99,7 +99,7 @@ def test_the_versions_of_one_message_have_packages_of_two_names() -> None:
 
 def test_the_package_is_the_first_file_of_a_core(tmp_path: Path) -> None:
     parameters: dict[str, Plain] = {"message": "geometry_msgs/Point", "ros": 1, "direction": "both", "width": 8}
-    core = generate(Request("firm", "me:robots:arm-point:1.0", tmp_path, parameters))
+    core = load(Request("firm", "me:robots:arm-point:1.0", tmp_path, parameters)).generate()
     assert list(core.files) == [
         "geometry_msgs_point_pkg.vhd",
         "axis_to_geometry_msgs_point.vhd",

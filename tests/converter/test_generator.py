@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from fusesoc_firm.converter.converter_core import generate, inputs
+from fusesoc_firm.converter.converter_core import load
 from fusesoc_firm.converter.interfaces import interface_configuration
 from fusesoc_firm.converter.order import order_of_config
 from fusesoc_firm.message.library import libraries
@@ -55,7 +55,7 @@ def demo(tmp_path: Path) -> Path:
 
 def made(folder: Path, config: str) -> GeneratedCore:
     (folder / "robot.yaml").write_text(config)
-    return generate(request(folder, config="robot.yaml"))
+    return load(request(folder, config="robot.yaml")).generate()
 
 
 def stems(core: GeneratedCore) -> list[str]:
@@ -83,19 +83,19 @@ def stems(core: GeneratedCore) -> list[str]:
     ],
 )
 def test_a_message_of_a_service_or_an_action_is_one_like_any_other(demo: Path, name: str, stem: str) -> None:
-    core = generate(request(demo, message=name, ros=2))
+    core = load(request(demo, message=name, ros=2)).generate()
     assert stems(core) == [f"{stem}_pkg", f"axis_to_{stem}", f"{stem}_to_axis"]
 
 
 @pytest.mark.parametrize("name", ["AddRequest", "AddResponse", "CountGoal", "CountResult", "CountFeedback"])
 def test_the_names_of_ros_1(demo: Path, name: str) -> None:
-    core = generate(request(demo, message=f"demo_msgs/{name}", ros=1))
+    core = load(request(demo, message=f"demo_msgs/{name}", ros=1)).generate()
     assert f"axis_to_demo_msgs_{name.lower()}" in stems(core)
 
 
 @pytest.mark.parametrize("name", ["demo_msgs/Add", "demo_msgs/srv/Add"])
 def test_a_service_is_all_that_its_ends_exchange(demo: Path, name: str) -> None:
-    core = generate(request(demo, message=name, ros=2, direction="subscriber"))
+    core = load(request(demo, message=name, ros=2, direction="subscriber")).generate()
     assert stems(core) == [
         "demo_msgs_add_request_pkg",
         "demo_msgs_add_response_pkg",
@@ -103,11 +103,11 @@ def test_a_service_is_all_that_its_ends_exchange(demo: Path, name: str) -> None:
         "axis_to_demo_msgs_add_response",
     ]
     assert re.fullmatch(r"Converters of demo_msgs/srv/Add \(ROS 2, RIHS01_\w{64}\)", core.description)
-    assert inputs(request(demo, message=name, ros=2)) == [demo / "." / "demo_msgs" / "srv" / "Add.srv"]
+    assert [*load(request(demo, message=name, ros=2)).inputs] == [demo / "." / "demo_msgs" / "srv" / "Add.srv"]
 
 
 def test_an_action_is_its_goal_result_and_feedback_and_what_is_around_them(demo: Path) -> None:
-    files = stems(generate(request(demo, message="demo_msgs/action/Count", ros=2)))
+    files = stems(load(request(demo, message="demo_msgs/action/Count", ros=2)).generate())
     parts = (
         "goal result feedback sendgoal_request sendgoal_response getresult_request getresult_response feedbackmessage"
     )
@@ -117,8 +117,8 @@ def test_an_action_is_its_goal_result_and_feedback_and_what_is_around_them(demo:
 
 def test_a_service_that_a_message_hides_is_named_in_full(demo: Path) -> None:
     (demo / "demo_msgs" / "msg" / "Add.msg").write_text("uint8 value\n")
-    assert len(generate(request(demo, message="demo_msgs/Add", ros=2)).files) == 3
-    assert len(generate(request(demo, message="demo_msgs/srv/Add", ros=2)).files) == 6
+    assert len(load(request(demo, message="demo_msgs/Add", ros=2)).generate().files) == 3
+    assert len(load(request(demo, message="demo_msgs/srv/Add", ros=2)).generate().files) == 6
 
 
 # --- the configuration file --------------------------------------------------------------------------------------
@@ -156,7 +156,7 @@ def test_every_name_is_an_entity_and_every_converter_comes_once(demo: Path) -> N
         "Grip2AXIS",
         "Twist2AXIS",
     ]
-    assert inputs(request(demo, config="robot.yaml")) == [
+    assert [*load(request(demo, config="robot.yaml")).inputs] == [
         demo / "robot.yaml",
         demo / "." / "demo_msgs" / "msg" / "Grip.msg",
     ]
@@ -203,7 +203,7 @@ def test_packages_are_namespaces(demo: Path) -> None:
 
 def test_a_file_that_is_not_there(demo: Path) -> None:
     with pytest.raises(InputError, match=r"cannot read .*robot\.yaml: No such file"):
-        inputs(request(demo, config="robot.yaml"))
+        [*load(request(demo, config="robot.yaml")).inputs]
 
 
 def test_a_port_called_like_the_instance(tmp_path: Path) -> None:
@@ -216,7 +216,7 @@ def test_a_port_called_like_the_instance(tmp_path: Path) -> None:
 
 
 def test_every_unit_of_a_core_follows_its_name(demo: Path) -> None:
-    core = generate(request(demo, message="demo_msgs/srv/Add", ros=2, name="left"))
+    core = load(request(demo, message="demo_msgs/srv/Add", ros=2, name="left")).generate()
     assert stems(core) == [
         "left_demo_msgs_add_request_pkg",
         "left_demo_msgs_add_response_pkg",

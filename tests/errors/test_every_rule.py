@@ -17,31 +17,27 @@ from tests.errors.test_spec_errors import SPECIFICATIONS, derive_file
 
 PACKAGE = Path(sys.modules["fusesoc_firm"].__path__[0])
 # What a specification is read and judged by.
-SOURCES = (
-    *sorted((PACKAGE / "system").glob("*.py")),
-    *(
-        PACKAGE / name
-        for name in ("yaml_text.py", "yaml_sections.py", "frame/select.py", "converter/limits.py", "message/library.py")
-    ),
-)
+BESIDE = """
+    text/yaml_text.py text/yaml_sections.py frame/select.py converter/limits.py message/library.py
+""".split()
+SOURCES = (*sorted((PACKAGE / "system").rglob("*.py")), *(PACKAGE / name for name in BESIDE))
 # What notes a fault, and functions whose faults are of something else than the specification's text.
 NOTING_METHODS, NOTING_FUNCTIONS = ("error", "_error", "take"), ("fail", "InputError")
 OTHER_FAULTS = {
-    ("system/diagram.py", "diagram"): "a program or package that is not installed",
+    ("system/views/diagram.py", "diagram"): "a program or package that is not installed",
     ("message/library.py", "libraries"): "an option of the command line",
     ("message/library.py", "_content"): "a message that is no file, in test_hostile_input",
     ("message/library.py", "_note_depth"): "a message of 65 files, in test_hostile_input",
     ("message/library.py", "_bag"): "the file of a bag",
     ("message/library.py", "_check_equal"): "the file of a bag",
-    ("system/board.py", "read_board"): "the file of a board",
-    ("system/board.py", "_check_pins"): "the file of a board",
-    ("system/board.py", "_check_streams"): "the file of a board",
-    ("system/board.py", "check_fits"): "a board that a right specification does not fit on",
-    ("system/board.py", "_check_places"): "a board that a right specification does not fit on",
-    ("system/core_file.py", "new_core"): "an option of the command line",
-    ("system/core_file.py", "updated_core"): "the file of a core",
-    ("system/core_file.py", "_instances"): "the file of a core",
-    ("system/timing.py", "tasks_of"): "a question that a right specification does not answer",
+    ("system/boards/board.py", "read_board"): "the file of a board",
+    ("system/boards/board.py", "_check_pins"): "the file of a board",
+    ("system/boards/board.py", "_check_streams"): "the file of a board",
+    ("system/boards/board.py", "check_fits"): "a board that a right specification does not fit on",
+    ("system/boards/board.py", "_check_places"): "a board that a right specification does not fit on",
+    ("system/scaffold/core_file.py", "new_core"): "an option of the command line",
+    ("system/scaffold/core_file.py", "updated_core"): "the file of a core",
+    ("system/derived/timing.py", "tasks_of"): "a question that a right specification does not answer",
 }
 
 

@@ -93,7 +93,8 @@ def translated(request: Request, folder: Path, *cores: str) -> tuple[str, list[P
     request = Request(request.command, request.vlnv, request.files_root, {**request.parameters, "simulator": "icarus"})
     work: list[Path] = []
     verilog: list[Path] = []
-    for core in (system_core.generate(request), simulation_core.generate(request)):
+    loaded = system_core.load_requested(request)
+    for core in (system_core.system_core(loaded), simulation_core.simulation_core(request, loaded)):
         for name, file in core.files.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ from fusesoc_firm import __version__
 
 GENERATORS = Path(__file__).resolve().parents[2] / "generators"
 # Stands in for the package: it says who answers, and with what.
-GAPI = "import sys\ndef main(command, argv):\n    print(command, *argv, 'in', sys.prefix)\n    return 3\n"
+ANSWER = "import sys\ndef main(command, argv):\n    print(command, *argv, 'in', sys.prefix)\n    return 3\n"
 
 
 def make_environment(folder: Path, *, has_package: bool) -> Path:
@@ -24,7 +24,7 @@ def make_environment(folder: Path, *, has_package: bool) -> Path:
     site_packages = folder / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
     if has_package:
         (site_packages / "fusesoc_firm" / "plugin").mkdir(parents=True)
-        (site_packages / "fusesoc_firm" / "plugin" / "gapi.py").write_text(GAPI)
+        (site_packages / "fusesoc_firm" / "plugin" / "answer.py").write_text(ANSWER)
         packages = ("fusesoc_firm/__init__.py", "fusesoc_firm/plugin/__init__.py")
         for name in (*packages, "chevron.py", "rosbags.py", "yaml.py"):
             (site_packages / name).write_text("")
@@ -140,7 +140,7 @@ def test_the_folder_it_is_called_in_does_not_count(tmp_path: Path, bare: Path, m
     other = make_environment(tmp_path / "other", has_package=False)
     here = tmp_path / "here"
     (here / "fusesoc_firm" / "plugin").mkdir(parents=True)
-    for name in ("fusesoc_firm/__init__.py", "fusesoc_firm/plugin/gapi.py", "chevron.py", "rosbags.py", "yaml.py"):
+    for name in ("fusesoc_firm/__init__.py", "fusesoc_firm/plugin/answer.py", "chevron.py", "rosbags.py", "yaml.py"):
         (here / name).write_text("")
     monkeypatch.chdir(here)
     done = call(bare, put_generators(other.parents[1] / "lib" / "generators"), "input.yml")

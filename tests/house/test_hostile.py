@@ -23,7 +23,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.gapi import GENERATORS
+from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request, as_files
 from fusesoc_firm.simulation.simulator import _build_folder
 from fusesoc_firm.system.boards.board import read_board
@@ -105,7 +105,7 @@ class Project:
         defaults = dict.fromkeys(names) | {"product": "system", "simulator": "ghdl", "seed": 1, "stall_percent": 0}
         given = {**defaults, "paths": ["odd_msgs_1" if parameters["spec"] == self.ros_1.name else "odd_msgs_2"]}
         request = Request(generator, "me:sys:robot-made:0", self.folder, {**given, **parameters})
-        return as_files(GENERATORS[generator].generate(request), request)
+        return as_files(GENERATORS[generator].load(request).generate(), request)
 
 
 @pytest.fixture(scope="module")

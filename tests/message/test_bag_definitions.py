@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
@@ -21,10 +20,12 @@ from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request, obtain
-from fusesoc_firm.request.request import GeneratedCore, Request
+from fusesoc_firm.plugin.answer import Basis, load, obtain
+from fusesoc_firm.plugin.generators import GENERATORS
+from fusesoc_firm.request.calls import make_request
+from fusesoc_firm.request.request import GeneratedCore, GeneratorCall, Request
+from fusesoc_firm.store.facts import state
 from fusesoc_firm.store.reads import Part, Reads, noted
-from fusesoc_firm.store.recall import state
 from fusesoc_firm.text.diagnostics import InputError
 
 KINDS = ("ros1", "sqlite3", "mcap")
@@ -113,6 +114,9 @@ def test_what_is_no_bag_or_has_no_definitions(tmp_path: Path) -> None:
 # --- the store ----------------------------------------------------------------------------------------------------
 
 
+FIRM = GENERATORS["firm"]
+
+
 class Calls:
     """Calls of the generator `firm` for a message that a bag beside the core defines."""
 
@@ -123,11 +127,12 @@ class Calls:
 
     def request(self) -> Request:
         given = {"message": "odd_msgs/Odd", "ros": version(self.kind).number, "paths": [self.bag.name]}
-        (self.root / "call_input.yml").write_text(yaml.safe_dump(given))
-        return make_request("firm", Call("me:p:a-b:1.0", self.root, given), GENERATORS["firm"], lambda _: ())
+        call = GeneratorCall("firm", "me:p:a-b:1.0", str(self.root), given)
+        return make_request(call, FIRM.parameters, lambda _: ())
 
     def is_stored(self) -> bool:
-        return obtain(self.request(), GENERATORS["firm"], self.root / "call_input.yml").is_from_store
+        request, basis = self.request(), Basis("")
+        return obtain(load(request, FIRM, basis), FIRM, basis)[1].is_from_store
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -149,7 +154,7 @@ def test_a_bag_is_read_in_part_and_never_whole(tmp_path: Path, kind: str) -> Non
     calls = Calls(tmp_path, kind)
     reads = Reads()
     with noted(reads):
-        (part, *_) = GENERATORS["firm"].inputs(calls.request())
+        (part, *_) = FIRM.load(calls.request()).inputs
     files = [calls.bag] if calls.bag.is_file() else sorted(calls.bag.iterdir())
     assert isinstance(part, Part)
     assert [*reads.parts] == [str(file) for file in files]
@@ -164,17 +169,18 @@ def test_whoever_reads_the_bag_itself_must_declare_it(
     (tmp_path / "project").mkdir()
     calls = Calls(tmp_path / "project", kind)
     file = calls.bag if calls.bag.is_file() else next(calls.bag.glob("*.mcap" if kind == "mcap" else "*.db3"))
-    firm = GENERATORS["firm"]
+    request, basis = calls.request(), Basis("")
+    loaded = load(request, FIRM, basis)
 
-    def generate(request: Request) -> GeneratedCore:
+    def generate() -> GeneratedCore:
         if kind == "sqlite3":
             sqlite3.connect(f"file:{file}?mode=ro", uri=True).close()
         else:
             file.read_bytes()
-        return firm.generate(request)
+        return loaded.generate()
 
     with pytest.raises(InputError, match="was read, which is no input"):
-        obtain(calls.request(), replace(firm, generate=generate))
+        obtain(replace(loaded, generate=generate), FIRM, basis)
 
 
 def test_a_repeated_call_is_recalled_until_the_bag_is_touched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -188,7 +189,11 @@ def definitions(draw: st.DrawFn) -> MessageDefinition:
     return MessageDefinition(NAME, ros, tuple(fields), tuple(constants), NOWHERE)
 
 
-@settings(deadline=None, max_examples=300, print_blob=True)
-@given(definitions())
-def test_text_reads_back(definition: MessageDefinition) -> None:
-    assert without_places(parse(to_text(definition), definition.ros)) == definition
+@pytest.mark.parametrize("examples", [50, pytest.param(300, marks=pytest.mark.check)])
+def test_text_reads_back(examples: int) -> None:
+    @settings(deadline=None, max_examples=examples, print_blob=True)
+    @given(definitions())
+    def reads_back(definition: MessageDefinition) -> None:
+        assert without_places(parse(to_text(definition), definition.ros)) == definition
+
+    reads_back()

@@ -1,11 +1,11 @@
-"""Parcel, a middleware that there is not: the example of docs/how-to/add-a-middleware.md.
+"""Parcel, a fictitious middleware: the example of docs/how-to/add-a-middleware.md.
 
 A definition is a file `<Message>.parcel` in the folder of its package, a line for each field:
 
     id: u16                 # a number, flag or stamp
     place: lab/Place        # another message; without a package, of the same
     values: 3 f32           # three of them
-    samples: any i16        # as many as there are
+    samples: any i16        # a variable number of them
 
 On the wire a payload begins with the bytes CA FE. Numbers are aligned to two bytes, counted from behind these.
 """
@@ -60,7 +60,7 @@ TYPES = frozenset(RULES.scalars) | frozenset(RULES.compounds) | {"text"}
 
 
 def parse(text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics) -> MessageDefinition:
-    """Reads a definition; a line that is wrong is noted, and hides nothing in the next."""
+    """Parse a definition; a fault in one line does not hide faults in later lines."""
     lines = [line.partition("#")[0] for line in read_lines(text, file)]
     fields = [_field(line, name.package, diagnostics) for line in lines if line.text]
     found = tuple(field for field in fields if field)

@@ -20,6 +20,7 @@ def play(driver: Driver, count: int, longest: int, buffer: int, fault: str = "no
     return driver.answers([], *map(str, [count, longest, buffer, SEED, fault, at]))[0]
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize(
     ("count", "longest", "buffer"), [(500, 300, 64), (500, 300, 1024), (20, 100_000, 4096), (50, 0, 0)]
 )

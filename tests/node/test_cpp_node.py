@@ -77,6 +77,7 @@ def by_converter(messages: Sequence[tuple[int, bytes]]) -> dict[int, list[bytes]
     return found
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize(("width", "run_beats"), [(8, 0), (8, 3), (64, 0), (64, 2), (512, 1)])
 def test_what_is_put_comes_back_whole_and_in_order(node_driver: Driver, width: int, run_beats: int) -> None:
     print(f"seed {SEED}")
@@ -102,6 +103,7 @@ def test_large_and_empty_payloads(node_driver: Driver) -> None:
     assert outcome.published == by_converter(messages)
 
 
+@pytest.mark.check
 def test_threads_do_not_race() -> None:
     print(f"seed {SEED}")
     driver = cpp_driver("node", "thread")

@@ -12,7 +12,7 @@ import pytest
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.node.package import cpp_package, generated_files, headers
-from fusesoc_firm.plugin.gapi import GENERATORS
+from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
 from fusesoc_firm.system.system_core import LoadedSystem, load_system
 from fusesoc_firm.text.diagnostics import InputError
@@ -172,14 +172,15 @@ def test_a_generated_system_has_its_node_beside_it(tmp_path: Path) -> None:
         tmp_path / "obstacle",
         {"spec": "obstacle.yaml", "product": "system", "board": None, "paths": None, "distro": None},
     )
-    core = GENERATORS["far"].generate(request)
+    loaded = GENERATORS["far"].load(request)
+    core = loaded.generate()
     node = {path: file for path, file in core.files.items() if path.startswith("node/")}
     assert {path.removeprefix("node/"): file.content for path, file in node.items()} == cpp_package(
         load(tmp_path / "obstacle/obstacle.yaml")
     )
     assert {file.file_type for file in node.values()} == {"user"}
     # An edit of theirs makes the core anew.
-    assert {*headers()} <= {*GENERATORS["far"].inputs(request)}
+    assert {*headers()} <= {*loaded.inputs}
 
 
 def test_a_generated_system_that_no_node_can_serve_has_none(tmp_path: Path) -> None:

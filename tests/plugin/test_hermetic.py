@@ -22,7 +22,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.building.cores import project_cores
-from fusesoc_firm.plugin.gapi import main
+from fusesoc_firm.plugin.answer import main
 from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.store.layout import CALL
 from fusesoc_firm.store.own_code import PACKAGE
@@ -40,7 +40,7 @@ CONVERTERS: tuple[Mapping[str, object], ...] = (
 # What is answered first may leave something behind in the process.
 GENERATE = """
 import json, os, sys
-from fusesoc_firm.plugin.gapi import main
+from fusesoc_firm.plugin.answer import main
 for folder, command in json.load(sys.stdin):
     os.chdir(folder)
     if main(command, ["call.yml"]):
@@ -58,6 +58,8 @@ THERE = {
     "USER": "there",
     "HOME": "/tmp",
 }
+# What all compare with is made once.
+pytestmark = pytest.mark.xdist_group("hermetic")
 IS_NAMESPACE_ALLOWED = subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
 
 

@@ -124,6 +124,7 @@ def test_a_core_that_is_not_depended_on_has_no_messages_here(project: Project) -
     assert "there are no messages of core 'me:msgs:arm'" in done.stderr + done.stdout
 
 
+@pytest.mark.check
 def test_a_core_of_a_similar_name_is_another_one(project: Project) -> None:
     """FuseSoC's folders have names in which a core's and an instance's cannot be told apart."""
     similar = (

@@ -68,6 +68,7 @@ def slack(policy: str, tasks: list[Task], first: Times, pauses: Times, cycles: i
     return left
 
 
+@pytest.mark.one_in(3)
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("count", [2, 3])
 def test_over_the_hyperperiod_from_every_phase(policy: str, count: int) -> None:
@@ -100,6 +101,7 @@ def test_alone(policy: str) -> None:
         assert left == [0] or overheads_of(policy, 1).acceptance, f"seed {SEED}: {tasks}, {left}"
 
 
+@pytest.mark.one_in(5)
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("count", [4, 7, 12, 20])
 def test_with_random_requests(policy: str, count: int) -> None:

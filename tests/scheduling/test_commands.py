@@ -68,9 +68,10 @@ def test_bench_writes_tables_figures_and_all_values(tmp_path: Path, capsys: Capt
     assert [row["granted"] for row in rows if row["requesters"] == "2"] == ["2"] * 4
 
 
-def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("options", [["--dataset", "large"], pytest.param([], marks=pytest.mark.check)])
+def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, options: list[str]) -> None:
     for name in ("one", "two"):
-        assert small_bench("--output", str(tmp_path / name)) == 0
+        assert small_bench("--output", str(tmp_path / name), *options) == 0
     for path in (tmp_path / "one").iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
 

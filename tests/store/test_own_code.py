@@ -1,4 +1,4 @@
-"""Which of our own files were used: what an edit makes anew, and what it leaves."""
+"""Our own code decides what is generated: an edit of it is noticed, and nothing else is."""
 
 from __future__ import annotations
 
@@ -6,20 +6,23 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import yaml
 
-from fusesoc_firm.store.own_code import PACKAGE, digests, used_code
+from fusesoc_firm.store import own_code
+from fusesoc_firm.store.own_code import PACKAGE, digest, names, state
 
 
-def test_modules_templates_and_data_count_but_not_the_library(tmp_path: Path) -> None:
-    def put(name: str, text: str) -> dict[str, str]:
+@pytest.mark.parametrize("told", [digest, state])
+def test_modules_templates_and_data_count_but_not_the_library(tmp_path: Path, told: Callable[[Path], str]) -> None:
+    def put(name: str, text: str) -> str:
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-        return digests(tmp_path)
+        return told(tmp_path)
 
     found = [
         put("render.py", "a"),
@@ -29,17 +32,59 @@ def test_modules_templates_and_data_count_but_not_the_library(tmp_path: Path) ->
         put("templates/vhdl/a.mustache", "b"),
         put("scheduling/area.csv", "a"),
     ]
-    assert len({str(each) for each in found}) == len(found)
-    assert list(found[-1]) == ["message/parser.py", "render.py", "scheduling/area.csv", "templates/vhdl/a.mustache"]
+    assert len(set(found)) == len(found)
+    assert names(tmp_path) == ["message/parser.py", "render.py", "scheduling/area.csv", "templates/vhdl/a.mustache"]
     assert put("library/generators/x.py", "a") == found[-1]
+    assert put("docs/x.csv", "a") == found[-1]
     assert put("__pycache__/x.py", "a") == found[-1]
     assert put("notes.txt", "a") == found[-1]
+    (tmp_path / "render.py").unlink()
+    assert told(tmp_path) != found[-1]
 
 
-def test_what_is_used_is_counted() -> None:
-    used = used_code()
-    assert "store/own_code.py" in used
-    assert set(used) <= digests().keys()
+def aged(folder: Path) -> Path:
+    """A module that was written long before this process started, and a link that an editor left beside it."""
+    path = folder / "old.py"
+    path.write_text("a")
+    os.utime(path, ns=(10**18, 10**18))
+    (folder / ".#old.py").symlink_to("me@here.1")
+    return path
+
+
+def test_an_edit_of_the_same_size_and_time_is_noticed(tmp_path: Path) -> None:
+    """No program can set the time at which a file's state changed, and a new file counts by its content."""
+    path = aged(tmp_path)
+    before = digest(tmp_path), state(tmp_path)
+    path.write_text("b")
+    os.utime(path, ns=(10**18, 10**18))
+    assert digest(tmp_path) != before[0]
+    assert state(tmp_path) != before[1]
+
+
+def test_what_is_old_is_not_read_for_its_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+    content = own_code._content
+
+    def note(path: str) -> str:
+        read.append(path)
+        return content(path)
+
+    monkeypatch.setattr(own_code, "_content", note)
+    path = aged(tmp_path)
+    state(tmp_path)
+    assert read == [str(path)]
+    # As if this process had started an hour later.
+    monkeypatch.setattr(own_code, "_STARTED", own_code._STARTED + 3600 * 10**9)
+    state(tmp_path)
+    assert read == [str(path)]
+
+
+def test_a_copy_has_the_same_digest(tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "a.py").write_text("a")
+    assert digest(tmp_path / "one") == digest(tmp_path / "other")
+    assert state(tmp_path / "one") != state(tmp_path / "other")
 
 
 class Project:
@@ -62,7 +107,7 @@ class Project:
         parameters = {"message": message, "ros": 2, "paths": ["msgs"]}
         call = {"files_root": str(self.folder), "vlnv": f"a:b:c-{message.rpartition('/')[2].lower()}:1"}
         (work / "call.yml").write_text(yaml.safe_dump(call | {"parameters": parameters}))
-        script = "import sys; from fusesoc_firm.plugin.gapi import main; sys.exit(main('firm', sys.argv[1:]))"
+        script = "import sys; from fusesoc_firm.plugin.answer import main; sys.exit(main('firm', sys.argv[1:]))"
         done = subprocess.run(
             [sys.executable, "-c", script, "call.yml"],
             cwd=work,
@@ -88,17 +133,17 @@ def project(tmp_path: Path) -> Project:
     return Project(tmp_path)
 
 
-def test_an_edit_makes_just_its_dependants_anew(project: Project) -> None:
+def test_an_edit_is_generated_anew_and_undone_without(project: Project) -> None:
     made, found = "generated", "from store"
     assert project.origins() == [made, made, made]
     assert project.origins() == [found, found, found]
     project.message.write_text("uint8 b\n")
     assert project.origins() == [found, made, found]
+    template = project.package / "templates/vhdl/subscriber.vhd.mustache"
+    text = template.read_text()
     project.edit("templates/vhdl/subscriber.vhd.mustache")
-    assert project.origins() == [made, made, found]
-    project.edit("node/bursts.py")
-    assert project.origins() == [found, found, found]
-    project.edit("naming.py")
     assert project.origins() == [made, made, made]
+    template.write_text(text)
+    assert project.origins() == [found, found, found]
     project.message.write_text("uint8 a\n")
-    assert project.origins() == [found, made, found]
+    assert project.origins() == [found, found, found]

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.store.layout import ENTRY, LAYOUT, LOCK, USES, place, read_entry, read_note, read_uses
-from fusesoc_firm.store.store import Key, Made, Store
+from fusesoc_firm.store.layout import ENTRY, LAYOUT, LOCK, read_entry, read_note
+from fusesoc_firm.store.store import Key, Store
 
 REQUEST = "ab" + "0" * 62
 FILES = {"rtl/a.vhd": b"entity a\n", "top.core": b"CAPI=2:\n"}
@@ -47,7 +47,7 @@ def is_unharmed(victim: Path) -> bool:
 
 def obtain(root: Path, limit: int = 2**30) -> bool:
     """Ask for the files; whether the store had them."""
-    entry = Store(root, limit).obtain(lambda: Key(REQUEST, {}), lambda: Made(FILES, []))
+    entry = Store(root, limit).obtain(Key(REQUEST), lambda: FILES)
     assert entry.files == FILES
     return entry.is_from_store
 
@@ -90,12 +90,12 @@ OBSTACLES: dict[str, Callable[[Path, Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("suffix", [ENTRY, USES, LOCK])
+@pytest.mark.parametrize("suffix", [ENTRY, LOCK])
 @pytest.mark.parametrize("obstacle", OBSTACLES)
 def test_what_is_no_file_of_the_store(root: Path, victim: Path, obstacle: str, suffix: str) -> None:
     """It is neither waited for nor followed nor emptied; it is replaced, or else removed by `firm cache verify`."""
     obtain(root)
-    path = kept(root, USES).with_suffix(LOCK) if suffix == LOCK else kept(root, suffix)
+    path = kept(root, ENTRY).with_suffix(suffix)
     path.unlink(missing_ok=True)
     OBSTACLES[obstacle](path, victim)
     assert obtain(root) == (suffix == LOCK)
@@ -206,16 +206,13 @@ def test_an_entry_of_another_form_is_damaged(root: Path, tmp_path: Path, forged:
     assert [*tmp_path.iterdir()] == [root]
 
 
-@pytest.mark.parametrize("forged", [b"8", b"{}", b'[["a"]]', b"[8]", DEEP, b"[", b"\xff", b""])
-def test_names_of_another_form_are_damaged(root: Path, forged: bytes) -> None:
-    obtain(root)
-    kept(root, USES).write_bytes(signed(forged))
-    assert read_uses(str(root), place(REQUEST, USES)) is None
-    assert not obtain(root)
-    assert obtain(root)
-
-
-NOTE: Mapping[str, object] = {"key": REQUEST, "facts": [["code", "", None]], "name": "a", "marks": ""}
+NOTE: Mapping[str, object] = {
+    "key": REQUEST,
+    "facts": [["code", "", None]],
+    "name": "a",
+    "core": "a:b:c:1",
+    "marks": "",
+}
 
 
 @pytest.mark.parametrize(
@@ -229,6 +226,7 @@ NOTE: Mapping[str, object] = {"key": REQUEST, "facts": [["code", "", None]], "na
         {"facts": [["file", "a"]]},
         {"facts": [["file", 8, None]]},
         {"name": "\x1b[2J"},
+        {"core": 8},
         {"marks": None},
     ],
 )
@@ -246,7 +244,7 @@ def test_a_store_that_is_emptied_while_it_is_written_is_written_again(
 ) -> None:
     obtain(root)
     Store(root, 0).clean()
-    real, moments = os.replace, iter([True, False, True, True])
+    real, moments = os.replace, iter([True, True])
 
     def replace(*paths: Any, **folders: Any) -> None:
         if next(moments, False):
@@ -256,7 +254,7 @@ def test_a_store_that_is_emptied_while_it_is_written_is_written_again(
     monkeypatch.setattr(os, "replace", replace)
     assert not obtain(root)
     assert capfd.readouterr().err == ""
-    assert kept(root, USES).exists()
+    assert kept(root, ENTRY).exists()
     assert next(moments, None) is None
 
 
@@ -272,7 +270,7 @@ def test_what_is_made_in_a_folder_for_a_group_is_for_it(root: Path) -> None:
     finally:
         os.umask(mask)
     made = [*root.rglob("*")]
-    assert len(made) >= 4
+    assert len(made) >= 3
     for path in made:
         assert path.stat().st_gid == group
         assert stat.S_IMODE(path.stat().st_mode) == (0o2770 if path.is_dir() else 0o660)

@@ -11,7 +11,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +21,8 @@ from fusesoc_firm.store import store as store_module
 from fusesoc_firm.store.layout import default_root, read_entry
 from fusesoc_firm.store.store import (
     Entry,
+    Files,
     Key,
-    Made,
     Store,
     default_store,
     parse_size,
@@ -32,25 +31,17 @@ from fusesoc_firm.store.store import (
 from fusesoc_firm.text.diagnostics import InputError
 
 REQUEST = "ab" + "0" * 62
-CODE = {"render.py": "1", "frame.py": "2", "a.mustache": "3"}
-USED = ["a.mustache", "render.py"]
 FILES = {"rtl/a.vhd": b"entity a\n", "top.core": b"CAPI=2:\n"}
 LARGE = 2**30
 
 
-def obtain(
-    root: Path,
-    files: Mapping[str, bytes] = FILES,
-    request: str = REQUEST,
-    code: Mapping[str, str] = CODE,
-    limit: int = LARGE,
-) -> Entry:
-    return Store(root, limit).obtain(lambda: Key(request, code, {"core": request}), lambda: Made(files, USED))
+def obtain(root: Path, files: Files = FILES, request: str = REQUEST, limit: int = LARGE) -> Entry:
+    return Store(root, limit).obtain(Key(request, {"core": request}), lambda: files)
 
 
-def find(root: Path, request: str = REQUEST, code: Mapping[str, str] = CODE) -> Mapping[str, bytes] | None:
+def find(root: Path, request: str = REQUEST) -> Files | None:
     """What the store has; it is not written to."""
-    return Store(root, LARGE)._find(Key(request, code))
+    return Store(root, LARGE)._find(Key(request))
 
 
 def stored(root: Path) -> dict[Path, bytes]:
@@ -63,36 +54,12 @@ def test_what_was_made_is_found(tmp_path: Path) -> None:
     assert made == Entry(FILES, False)
     assert found == Entry(FILES, True)
     assert list(found.files) == list(FILES)
-    assert sorted(path.suffix for path in stored(tmp_path)) == [".entry", ".uses"]
+    assert sorted(path.suffix for path in stored(tmp_path)) == [".entry"]
 
 
-def test_only_what_was_used_decides(tmp_path: Path) -> None:
+def test_damage_at_any_place_is_found(tmp_path: Path) -> None:
     obtain(tmp_path)
-    assert find(tmp_path, code=CODE | {"frame.py": "edited"}) == FILES
-    edited = CODE | {"render.py": "edited"}
-    assert find(tmp_path, code=edited) is None
-    assert find(tmp_path, code={name: CODE[name] for name in ("frame.py", "a.mustache")}) is None
-    assert find(tmp_path, "cd" + "0" * 62) is None
-    # The former state is found again, too.
-    assert obtain(tmp_path, {"b": b"after the edit"}, code=edited) == Entry({"b": b"after the edit"}, False)
-    assert find(tmp_path) == FILES
-    assert find(tmp_path, code=edited) == {"b": b"after the edit"}
-
-
-def test_other_names_of_what_was_used_lead_to_no_wrong_entry(tmp_path: Path) -> None:
-    """Two versions of our code may use different files for the same request."""
-    store = Store(tmp_path, LARGE)
-    one, other = CODE, CODE | {"render.py": "other"}
-    store.obtain(lambda: Key(REQUEST, one), lambda: Made({"x": b"one"}, ["render.py"]))
-    store.obtain(lambda: Key(REQUEST, other), lambda: Made({"x": b"other"}, ["render.py", "frame.py"]))
-    assert find(tmp_path, code=other) == {"x": b"other"}
-    assert find(tmp_path, code=one) is None
-
-
-@pytest.mark.parametrize("suffix", [".entry", ".uses"])
-def test_damage_at_any_place_is_found(tmp_path: Path, suffix: str) -> None:
-    obtain(tmp_path)
-    (path,) = (path for path in stored(tmp_path) if path.suffix == suffix)
+    (path,) = stored(tmp_path)
     whole = path.read_bytes()
     damaged = [whole[:length] for length in range(len(whole))]
     damaged += [
@@ -102,7 +69,7 @@ def test_damage_at_any_place_is_found(tmp_path: Path, suffix: str) -> None:
     ]
     for data in [*damaged, whole + b"\0", b"[1]", b"{}", b"\xff"]:
         path.write_bytes(data)
-        assert find(tmp_path) in (None, FILES) if suffix == ".uses" else find(tmp_path) is None
+        assert find(tmp_path) is None
     path.write_bytes(damaged[10])
     assert obtain(tmp_path) == Entry(FILES, False)
     assert find(tmp_path) == FILES
@@ -110,25 +77,17 @@ def test_damage_at_any_place_is_found(tmp_path: Path, suffix: str) -> None:
 
 @pytest.mark.parametrize("error", [ValueError("bad specification"), KeyboardInterrupt()])
 def test_a_build_that_ends_early_keeps_nothing(tmp_path: Path, error: BaseException) -> None:
-    def fail() -> Made:
+    def fail() -> Files:
         raise error
 
     with pytest.raises(type(error)):
-        Store(tmp_path, LARGE).obtain(lambda: Key(REQUEST, CODE), fail)
+        Store(tmp_path, LARGE).obtain(Key(REQUEST), fail)
     assert stored(tmp_path) == {}
     assert obtain(tmp_path) == Entry(FILES, False)
 
 
-@pytest.mark.parametrize("after", [Key(REQUEST, CODE | {"frame.py": "edited"}), Key("cd" + "0" * 62, CODE)])
-def test_what_was_edited_while_it_was_read_is_not_kept(tmp_path: Path, after: Key) -> None:
-    keys = iter([Key(REQUEST, CODE), after])
-    assert Store(tmp_path, LARGE).obtain(lambda: next(keys), lambda: Made(FILES, USED)) == Entry(FILES, False)
-    assert stored(tmp_path) == {}
-
-
-def test_what_was_made_with_a_file_that_is_no_more_is_not_kept(tmp_path: Path) -> None:
-    made = Made(FILES, [*USED, "gone.py"])
-    assert Store(tmp_path, LARGE).obtain(lambda: Key(REQUEST, CODE), lambda: made) == Entry(FILES, False)
+def test_what_was_edited_while_it_was_read_is_not_kept(tmp_path: Path) -> None:
+    assert Store(tmp_path, LARGE).obtain(Key(REQUEST), lambda: FILES, lambda: False) == Entry(FILES, False)
     assert stored(tmp_path) == {}
 
 
@@ -161,11 +120,11 @@ def test_a_store_that_can_only_be_read_gives_what_it_has(
 FULL = """
 import resource, sys
 from pathlib import Path
-from fusesoc_firm.store.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Store
 resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000))
 files = {"a.vhd": bytes(20_000)}
 store = Store(Path(sys.argv[1]), 2**30)
-assert store.obtain(lambda: Key(sys.argv[2], {}), lambda: Made(files, [])).files == files
+assert store.obtain(Key(sys.argv[2]), lambda: files).files == files
 """
 
 
@@ -179,16 +138,16 @@ def test_a_full_disk_is_done_without(tmp_path: Path) -> None:
 OBTAIN = """
 import sys
 from pathlib import Path
-from fusesoc_firm.store.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Store
 root, log, request = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3]
 FILES = {f"{n}.vhd": bytes([n]) * 100_000 for n in range(20)}
 def build():
     with log.open("a") as file:
         file.write("built\\n")
-    return Made(FILES, [])
+    return FILES
 print("ready", flush=True)
 sys.stdin.readline()
-assert Store(root, 2**30).obtain(lambda: Key(request, {}), build).files == FILES
+assert Store(root, 2**30).obtain(Key(request), build).files == FILES
 """
 # Without locks, as on some network file systems.
 OBTAIN_WITHOUT_LOCKS = (
@@ -228,8 +187,8 @@ def test_processes_at_once(tmp_path: Path, script: str) -> None:
     assert [process.returncode for process in processes] == [0] * 4
     built = (tmp_path / "log").read_text().count("built\n")
     assert built == 1 if script == OBTAIN else 1 <= built <= 4
-    assert find(tmp_path / "store", code={}) == {f"{n}.vhd": bytes([n]) * 100_000 for n in range(20)}
-    assert sorted(path.suffix for path in stored(tmp_path / "store")) == [".entry", ".uses"]
+    assert find(tmp_path / "store") == {f"{n}.vhd": bytes([n]) * 100_000 for n in range(20)}
+    assert sorted(path.suffix for path in stored(tmp_path / "store")) == [".entry"]
 
 
 HANG_IN_BUILD = """
@@ -239,17 +198,17 @@ from fusesoc_firm.store.store import Key, Store
 def build():
     print("in the middle", flush=True)
     sys.stdin.read()
-Store(Path(sys.argv[1]), 2**30).obtain(lambda: Key(sys.argv[2], {}), build)
+Store(Path(sys.argv[1]), 2**30).obtain(Key(sys.argv[2]), build)
 """
 HANG_BEFORE_RENAME = """
 import os, sys
 from pathlib import Path
-from fusesoc_firm.store.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Store
 def replace(*_, **__):
     print("in the middle", flush=True)
     sys.stdin.read()
 os.replace = replace
-Store(Path(sys.argv[1]), 2**30).obtain(lambda: Key(sys.argv[2], {}), lambda: Made({"a.vhd": b"whole"}, []))
+Store(Path(sys.argv[1]), 2**30).obtain(Key(sys.argv[2]), lambda: {"a.vhd": b"whole"})
 """
 
 
@@ -262,7 +221,7 @@ def test_a_process_that_ends_in_the_middle_leaves_no_entry_and_no_lock(
     wait_for(process, "in the middle")
     process.send_signal(number)
     process.communicate()
-    assert not any(path.suffix in (".entry", ".uses") for path in stored(tmp_path))
+    assert not any(path.suffix == ".entry" for path in stored(tmp_path))
     assert obtain(tmp_path) == Entry(FILES, False)
     assert find(tmp_path) == FILES
 
@@ -274,10 +233,10 @@ def test_one_that_is_stopped_is_not_waited_for_without_end(tmp_path: Path, monke
     monkeypatch.setattr(store_module, "_LONGEST_WAIT_SECONDS", 0.2)
     begin = time.monotonic()
     # What the other process asked for.
-    made = Store(tmp_path, LARGE).obtain(lambda: Key(REQUEST, {}), lambda: Made(FILES, []))
+    made = Store(tmp_path, LARGE).obtain(Key(REQUEST), lambda: FILES)
     assert time.monotonic() - begin >= 0.2
     assert made == Entry(FILES, False)
-    assert find(tmp_path, code={}) == FILES
+    assert find(tmp_path) == FILES
     # Its lock is its own to remove.
     assert len([*tmp_path.rglob("*.lock")]) == 1
     process.kill()
@@ -307,13 +266,13 @@ def test_what_is_gone_while_it_is_read_is_made(tmp_path: Path, monkeypatch: pyte
 FILL = """
 import itertools, sys
 from pathlib import Path
-from fusesoc_firm.store.store import Key, Made, Store
+from fusesoc_firm.store.store import Key, Store
 store = Store(Path(sys.argv[1]), int(sys.argv[2]))
 print("running", flush=True)
 for number in itertools.count():
     digit = number % 7
     files = {"a.vhd": bytes([digit]) * 50_000, "b.vhd": bytes([digit]) * 70_000}
-    found = store.obtain(lambda: Key(f"{digit:064x}", {}), lambda: Made(files, [])).files
+    found = store.obtain(Key(f"{digit:064x}"), lambda: files).files
     if found != files:
         print("wrong", flush=True)
 """
@@ -351,8 +310,7 @@ def age(root: Path, request: str, seconds: float) -> None:
         for file in Store(root, LARGE).entries()
         if (found := read_entry(str(root), file.name)) and found[0]["core"] == request
     )
-    for path in (entry, next(root.rglob(f"{request}.uses"))):
-        os.utime(path, (time.time() - seconds,) * 2)
+    os.utime(entry, (time.time() - seconds,) * 2)
 
 
 def test_what_was_not_used_for_longest_goes_first(tmp_path: Path) -> None:
@@ -415,23 +373,23 @@ def test_files_have_the_rights_that_others_of_the_user_have(tmp_path: Path) -> N
 
 
 def test_the_request_covers_inputs_names_and_versions(monkeypatch: pytest.MonkeyPatch) -> None:
-    base = request_digest({"width": 8}, {"a.yaml": b"1"}, ["a.py"])
-    assert base == request_digest({"width": 8}, {"a.yaml": b"1"}, ["a.py"])
+    base = request_digest({"width": 8}, {"a.yaml": b"1"}, "aa")
+    assert base == request_digest({"width": 8}, {"a.yaml": b"1"}, "aa")
     assert len(base) == 64
     others = [
-        request_digest({"width": 16}, {"a.yaml": b"1"}, ["a.py"]),
-        request_digest({"width": 8}, {"a.yaml": b"2"}, ["a.py"]),
-        request_digest({"width": 8}, {"b.yaml": b"1"}, ["a.py"]),
-        request_digest({"width": 8}, {"a.yaml": None}, ["a.py"]),
-        request_digest({"width": 8}, {}, ["a.py"]),
-        request_digest({"width": 8}, {"a.yaml": b"1"}, ["a.py", "b.py"]),
+        request_digest({"width": 16}, {"a.yaml": b"1"}, "aa"),
+        request_digest({"width": 8}, {"a.yaml": b"2"}, "aa"),
+        request_digest({"width": 8}, {"b.yaml": b"1"}, "aa"),
+        request_digest({"width": 8}, {"a.yaml": None}, "aa"),
+        request_digest({"width": 8}, {}, "aa"),
+        request_digest({"width": 8}, {"a.yaml": b"1"}, "bb"),
     ]
     with monkeypatch.context() as patch:
         patch.setattr(store_module, "_version", lambda name: f"{name} 99")
-        others.append(request_digest({"width": 8}, {"a.yaml": b"1"}, ["a.py"]))
+        others.append(request_digest({"width": 8}, {"a.yaml": b"1"}, "aa"))
     with monkeypatch.context() as patch:
         patch.setattr(platform, "machine", lambda: "abacus")
-        others.append(request_digest({"width": 8}, {"a.yaml": b"1"}, ["a.py"]))
+        others.append(request_digest({"width": 8}, {"a.yaml": b"1"}, "aa"))
     assert len({base, *others}) == 9
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.request.request import GeneratedFile, Request
-from fusesoc_firm.system.system_core import generate
+from fusesoc_firm.system.system_core import load_requested, system_core
 from fusesoc_firm.text.diagnostics import InputError
 
 SPECIFICATION = """\
@@ -46,7 +46,7 @@ def made(folder: Path, clocks: str = "", at: str = "", board: str = "zynq7000") 
     (folder / "board.yaml").write_text(BOARD, encoding="ascii")
     (folder / "spec.yaml").write_text(SPECIFICATION.format(clocks=clocks, at=at), encoding="ascii")
     parameters = {"spec": "spec.yaml", "board": board, "paths": None, "distro": None}
-    return dict(generate(Request("far", "test:sys:robot-system:0", folder, parameters)).files)
+    return dict(system_core(load_requested(Request("far", "test:sys:robot-system:0", folder, parameters))).files)
 
 
 def test_what_comes_for_a_processor(tmp_path: Path) -> None:
@@ -92,4 +92,4 @@ def test_a_processor_makes_four_clocks(tmp_path: Path) -> None:
     (tmp_path / "spec.yaml").write_text(head.replace("slow", "b0") + chain + out, encoding="ascii")
     parameters = {"spec": "spec.yaml", "board": "zcu104", "paths": None, "distro": None}
     with pytest.raises(InputError, match="board 'zcu104' makes 4 clocks, clk included; the system has 5"):
-        generate(Request("far", "test:sys:robot-system:0", tmp_path, parameters))
+        system_core(load_requested(Request("far", "test:sys:robot-system:0", tmp_path, parameters)))

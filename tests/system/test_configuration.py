@@ -127,7 +127,7 @@ def test_a_source_of_two_types_is_in_the_core_once(tmp_path: Path) -> None:
     )
     derived(folder, specification(blocks, types))
     parameters = {"spec": "spec.yaml", "paths": None, "distro": None}
-    core = system_core.generate(Request("far", "a:b:c-d:0", folder, parameters))
+    core = system_core.system_core(system_core.load_requested(Request("far", "a:b:c-d:0", folder, parameters)))
     assert [name for name in core.files if "/" in name] == ["one/acc.vhd", "one/sub/own.vhd", "two/above/own.vhd"]
     assert list(core.files)[-1] == "robot_system.vhd"
 
@@ -152,7 +152,7 @@ def test_packages_come_first_and_those_of_two_versions_have_two_names(tmp_path: 
     )
     derived(tmp_path, specification(blocks, BRIDGE))
     parameters = {"spec": "spec.yaml", "paths": None, "distro": None}
-    core = system_core.generate(Request("far", "a:b:c-d:0", tmp_path, parameters))
+    core = system_core.system_core(system_core.load_requested(Request("far", "a:b:c-d:0", tmp_path, parameters)))
     assert list(core.files)[:4] == [
         "geometry_msgs_point_ros1_pkg.vhd",
         "geometry_msgs_pose_pkg.vhd",
@@ -175,6 +175,6 @@ def test_two_messages_cannot_have_one_package(tmp_path: Path) -> None:
     (tmp_path / "spec.yaml").write_text(specification(blocks, types))
     request = Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": ["odd", "odd_msgs"], "distro": None})
     with pytest.raises(InputError) as raised:
-        system_core.generate(request)
+        system_core.system_core(system_core.load_requested(request))
     (fault,) = raised.value.diagnostics
     assert fault.message == "'p' and converter 's' need the package 'odd_msgs_point_pkg' for different messages"

@@ -40,7 +40,7 @@ def through(folder: Path, taken: str, given: str, length: str = "", buffer: str 
 
 def generated(folder: Path) -> GeneratedCore:
     parameters = {"spec": "spec.yaml", "paths": None, "distro": None}
-    return system_core.generate(Request("far", "a:b:c-d:0", folder, parameters))
+    return system_core.system_core(system_core.load_requested(Request("far", "a:b:c-d:0", folder, parameters)))
 
 
 def described(system: DerivedSystem) -> dict[str, Any]:
@@ -143,13 +143,17 @@ def test_a_buffer_is_as_deep_as_its_longest_frame(tmp_path: Path, width: int, de
 
 def test_the_length_entity_is_a_file_of_the_core(tmp_path: Path) -> None:
     through(tmp_path, IMAGE, IMAGE)
-    core = system_core.generate(
-        Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": None})
+    core = system_core.system_core(
+        system_core.load_requested(
+            Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": None})
+        )
     )
     assert "sensor_msgs_image_length.vhd" in core.files
     through(tmp_path, IMAGE, IMAGE, ", length: given")
-    core = system_core.generate(
-        Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": None})
+    core = system_core.system_core(
+        system_core.load_requested(
+            Request("far", "a:b:c-d:0", tmp_path, {"spec": "spec.yaml", "paths": None, "distro": None})
+        )
     )
     assert "sensor_msgs_image_length.vhd" not in core.files
 

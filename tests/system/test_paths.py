@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
+from fusesoc_firm.plugin.generators import GENERATORS
+from fusesoc_firm.request.calls import make_request
+from fusesoc_firm.request.request import GeneratorCall
 from fusesoc_firm.simulation.simulator import CoreSources, _write_core
 from tests.message.test_bag_definitions import record
 
@@ -63,9 +65,10 @@ class Project:
     def generated(self) -> str:
         (self.root / "acc.vhd").touch()
         is_in_core = "core]" in (self.root / "robot.core").read_text()
-        call = Call("me:p:a-b:1.0", self.root, {"spec": "robot.yaml"} | ({"paths": ["core"]} if is_in_core else {}))
-        request = make_request("far", call, GENERATORS["far"], lambda _: ())
-        return str(GENERATORS["far"].generate(request).files["robot_system.vhd"].content)
+        given = {"spec": "robot.yaml"} | ({"paths": ["core"]} if is_in_core else {})
+        call = GeneratorCall("far", "me:p:a-b:1.0", str(self.root), given)
+        request = make_request(call, GENERATORS["far"].parameters, lambda _: ())
+        return str(GENERATORS["far"].load(request).generate().files["robot_system.vhd"].content)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.text.render import TemplateError, render
+from fusesoc_firm.text.render import Rendering, TemplateError, render, traced_lines
 
 Expand = Callable[..., str]
 
@@ -96,6 +96,10 @@ def test_a_partial_within_a_line_is_not_indented(expand: Expand) -> None:
         ("{{#l}}{{.}}{{/l}}", {"l": [[1]]}, "'l[0]' is of type list; only a string or an integer can be printed"),
         ("{{#x}}a{{/x}}", {"x": "text"}, "'x' is of type str; a section takes a bool, a list, a mapping or None"),
         ("{{#x}}a{{/x}}", {"x": 0}, "'x' is of type int; a section takes a bool, a list, a mapping or None"),
+        ("{{x-1}}", {"x": "8"}, "'x' is of type str; only to an integer can -1 be added"),
+        ("{{#on}}{{../x}}{{/on}}", {"on": True, "x": 1}, "no scope is around the context for '../x'"),
+        ("{{#m}}{{../x}}{{/m}}", {"m": {"x": 1}}, "no 'x' in the context; it has m"),
+        ("{{@last}}", {"x": 1}, "no '@last' in the context; it has x"),
         ("{{> nowhere}}", {}, "cannot read nowhere.mustache: No such file or directory"),
         ("{{#a}}", {"a": True}, 't.vhd.mustache: Unexpected EOF the tag "a" was never closed was opened at line 1'),
     ],
@@ -129,3 +133,54 @@ def test_only_plain_data_is_a_context(expand: Expand, context: dict[str, object]
 def test_a_missing_template_is_named() -> None:
     with pytest.raises(TemplateError, match=r"template vhdl/nothing: cannot read nothing\.mustache"):
         render("vhdl/nothing", {})
+
+
+def test_sums_of_integers(expand: Expand) -> None:
+    assert expand("({{width-1}} downto {{{low+8}}})", {"width": 8, "low": 0}) == "(7 downto 8)"
+
+
+def test_the_scope_around(expand: Expand) -> None:
+    template = "{{#a}}{{#b}}{{../x}}{{../../x}}{{#../on}}!{{/../on}}{{/b}}{{/a}}"
+    assert expand(template, {"x": 1, "a": {"x": 2, "on": True, "b": [{"x": 3}]}}) == "21!"
+
+
+def test_what_is_there(expand: Expand) -> None:
+    template = "{{#x?}}yes {{n}}{{/x?}}{{^x?}}no{{/x?}}"
+    present: list[object] = [True, 0, 7, "text", ["a", "b"], {}]
+    absent: list[object] = [False, None, "", []]
+    assert {expand(template, {"x": value, "n": 1}) for value in present} == {"yes 1"}
+    assert {expand(template, {"x": value, "n": 1}) for value in absent} == {"no"}
+
+
+def test_the_first_and_the_last_turn(expand: Expand) -> None:
+    template = "{{#l}}{{#@first}}({{/@first}}{{.}}{{^@last}}, {{/@last}}{{#@last}}){{/@last}}{{/l}}"
+    assert expand(template, {"l": ["a", "b", "c"]}) == "(a, b, c)"
+    # A mapping within an item has no turns of its own.
+    assert expand("{{#l}}{{#m}}{{x}}{{^@last}},{{/@last}}{{/m}}{{/l}}", {"l": [{"m": {"x": 1}}] * 2}) == "1,1"
+
+
+def test_columns(expand: Expand) -> None:
+    template = "{{#ports}}\n  {{name}}{{|}} : {{type}};{{|}}{{#about?}} -- {{about}}{{/about?}}\n{{/ports}}\n  a : b;\n"
+    ports = [{"name": "ready", "type": "bit", "about": "x"}, {"name": "v", "type": "integer", "about": ""}]
+    assert expand(template, {"ports": ports}) == "  ready : bit;     -- x\n  v     : integer;\n  a : b;\n"
+
+
+def test_a_column_behind_some_characters_at_least(expand: Expand) -> None:
+    assert expand("{{#l}}\n{{.}}{{|4}}= 0\n{{/l}}\n", {"l": ["a", "bc"]}) == "a   = 0\nbc  = 0\n"
+    assert expand("{{#l}}\n{{.}}{{|4}}= 0\n{{/l}}\n", {"l": ["a", "bcdef"]}) == "a    = 0\nbcdef= 0\n"
+
+
+def test_columns_end_where_a_line_has_none_or_begins_anew(expand: Expand) -> None:
+    template = "a{{|}}=\n\n{{#l}}\n{{.}}{{|}}=\n{{/l}}\n{{|!}}b{{|}}=\n"
+    assert expand(template, {"l": ["long"]}) == "a=\n\nlong=\nb=\n"
+    assert expand(template.replace("{{|!}}", ""), {"l": ["long"]}) == "a=\n\nlong=\nb   =\n"
+
+
+def test_a_traced_line_is_as_it_is_rendered() -> None:
+    """Columns are those of the text, not of the marks in it."""
+    context: dict[str, object] = {"ports": [{"formal": "a", "actual": "b"}, {"formal": "long", "actual": "c"}]}
+    text = render("partials/port_map", context)
+    assert text == "a    => b,\nlong => c\n"
+    lines = traced_lines(Rendering("partials/port_map", context))
+    assert [line.text for line in lines] == text.splitlines()
+    assert [line.scope for line in lines] == ["ports[0]", "ports[1]"]

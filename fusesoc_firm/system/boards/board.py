@@ -221,7 +221,7 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
     link = [(name, direction) for name, direction, _ in LINK_PINS[system.link.kind] if name in ports]
     own = [(name, "out" if name.startswith("led") else "in") for name in ("led", "led_n", "reset", "reset_n")]
     declared = [(_CLOCK, "in"), *link, *((name, direction) for name, direction in own if name in ports)]
-    typed = [(name, direction, "std_logic") for name, direction in declared]
+    typed = [(name, direction, vhdl_type(None)) for name, direction in declared]
     typed += [(pin.name, pin.direction, vhdl_type(pin.width)) for pin in pins]
     return {
         "entity": board_entity(system, board),

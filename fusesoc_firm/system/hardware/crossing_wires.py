@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fusesoc_firm.converter.vhdl import bits, vhdl_type
+from fusesoc_firm.converter.vhdl import bit, bits, vhdl_type
 from fusesoc_firm.system.hardware.crossings import Crossing, Scope, parts_of, port_of, word
 from fusesoc_firm.system.hardware.names import AXIS, RELEASED, Names
 
@@ -43,12 +43,13 @@ def field_pairs(names: Names, crossing: Crossing, source: SourceSide) -> Iterato
         given, taken = (names.crossing(crossing, word(scope.handshake.part, name)) for name in ("given", "taken"))
         low = 0
         for port, width in scope.fields:
-            for_port = [
-                f"{name}({low})" if width is None else bits(name, low + width - 1, low) for name in (given, taken)
-            ]
+            yield _part(given, low, width), source.ports[port]
+            yield names.at(crossing.sink, port), _part(taken, low, width)
             low += width or 1
-            yield for_port[0], source.ports[port]
-            yield names.at(crossing.sink, port), for_port[1]
+
+
+def _part(vector: str, low: int, width: int | None) -> str:
+    return bit(vector, low) if width is None else bits(vector, low + width - 1, low)
 
 
 def _notes(crossing: Crossing) -> list[str]:
@@ -134,7 +135,7 @@ def _variable_sides(names: Names, crossing: Crossing, scope: Scope, source: Sour
             "idle": names.crossing(crossing, word(handshake.part, "idle")) if parent else "open",
         },
         "m": {
-            "enable": f"{names.at(sink, parent.segment_valid or '')}(0)" if parent else "",
+            "enable": bit(names.at(sink, parent.segment_valid or ""), 0) if parent else "",
             "fields": own["taken"],
             "segment_valid": names.at(sink, segment_valid) if segment_valid else "open",
             "valid": names.at(sink, handshake.valid),
@@ -158,7 +159,7 @@ def _stream(names: Names, crossing: Crossing, scope: Scope, stream: str, source:
     if crossing.is_clocked:
         found["enable"] = names.crossing(crossing, word(part, "settled"))
         found["idle"] = names.crossing(crossing, word(f"{stream}_axis", "idle"))
-        found["m_open"] = f"{names.at(sink, scope.handshake.segment_valid or '')}(0)"
+        found["m_open"] = bit(names.at(sink, scope.handshake.segment_valid or ""), 0)
     return found
 
 

@@ -10,12 +10,16 @@ from typing import Any
 
 from fusesoc_firm.converter.payload_length import length_entity, length_ports
 from fusesoc_firm.converter.ports import field_ports
+from fusesoc_firm.converter.vhdl import all_of, bit, bits
 from fusesoc_firm.system.derived.model import Connection, DerivedSystem, End, LengthSource, PayloadLength
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, Handshake, handshakes, side_ports
 from fusesoc_firm.system.hardware.crossing_wires import SourceSide, crossing_configuration, field_pairs
 from fusesoc_firm.system.hardware.crossings import Crossing, crossings, port_of
 from fusesoc_firm.system.hardware.maps import port_map
 from fusesoc_firm.system.hardware.names import Names, forked, is_found_out
+
+# A length of 32 bits.
+_LONGEST = 'x"FFFFFFFF"'
 
 
 def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
@@ -39,7 +43,7 @@ def _connection(
     pairs: list[tuple[str, str]] = []
     if _is(LengthSource.BUFFERED, length):
         # As long as it gets.
-        pairs.append((names.length(connection), 'x"FFFFFFFF"'))
+        pairs.append((names.length(connection), _LONGEST))
     if connection.frame.is_fixed_size:
         pairs += _fixed_pairs(names, system, connection, waiting)
     else:
@@ -70,13 +74,13 @@ def _fixed_pairs(
     arriving = _arriving(names, system, connection)
     for sink, frame, (valid, ready) in zip(connection.sinks, connection.frames, arriving, strict=True):
         yield from ((names.at(sink, port.name), names.at(source, port.name)) for port in field_ports(frame))
-        sink_valid, sink_ready = f"{names.at(sink, 'segment_valid')}(0)", names.at(sink, "msg_ready")
+        sink_valid, sink_ready = bit(names.at(sink, "segment_valid"), 0), names.at(sink, "msg_ready")
         if valid == waiting[sink][-1]:
-            whole = " and ".join(waiting[sink])
+            whole = all_of(waiting[sink])
             yield sink_valid, whole
             if sink.prefix:
                 yield names.at(sink, "msg_valid"), whole
-        yield ready, sink_ready if len(waiting[sink]) == 1 else f"{sink_ready} and {sink_valid}"
+        yield ready, sink_ready if len(waiting[sink]) == 1 else all_of((sink_ready, sink_valid))
 
 
 def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> list[tuple[str, str]]:
@@ -92,8 +96,8 @@ def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
     source = connection.source
     for fork in forked(connection):
         valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
-        return [(f"{valid}({number})", f"{ready}({number})") for number in range(len(connection.sinks))]
-    return [(f"{names.at(source, 'segment_valid')}(0)", names.at(source, "msg_ready"))]
+        return [(bit(valid, number), bit(ready, number)) for number in range(len(connection.sinks))]
+    return [(bit(names.at(source, "segment_valid"), 0), names.at(source, "msg_ready"))]
 
 
 def _pairs(
@@ -123,16 +127,16 @@ def _source_side(names: Names, connection: Connection, number: int, system: Deri
         for port in side_ports(connection.frames[number], system.width, gives=True, has_valid=True)
     }
     begun = {
-        item.part: f"{ports[item.segment_valid]}(0)" for item in handshakes(connection.frame) if item.segment_valid
+        item.part: bit(ports[item.segment_valid], 0) for item in handshakes(connection.frame) if item.segment_valid
     }
     for fork in forked(connection):
         low, high = fork.segments * number, fork.segments * (number + 1) - 1
-        ports[fork.valid] = f"{names.forked(source, fork, 'valid')}({number})"
-        ports[fork.ready] = f"{names.forked(source, fork, 'ready')}({number})"
+        ports[fork.valid] = bit(names.forked(source, fork, "valid"), number)
+        ports[fork.ready] = bit(names.forked(source, fork, "ready"), number)
         if fork.segment_valid is not None:
             segment_valid = names.forked(source, fork, "segment_valid")
-            ports[fork.segment_valid] = f"{segment_valid}({high} downto {low})"
-            begun[fork.part] = f"{segment_valid}({low})"
+            ports[fork.segment_valid] = bits(segment_valid, high, low)
+            begun[fork.part] = bit(segment_valid, low)
     return SourceSide(ports, begun)
 
 
@@ -156,7 +160,7 @@ def _fork(names: Names, connection: Connection, fork: Handshake, system: Derived
         "sinks": count,
         "clock": port_of(clock),
         "reset": clock.reset if clock else "rst_n",
-        "source_valid": f"{source_valid}(0)" if connection.frame.is_fixed_size else source_valid,
+        "source_valid": bit(source_valid, 0) if connection.frame.is_fixed_size else source_valid,
         "source_ready": names.at(source, fork.ready),
         "sink_valid": names.forked(source, fork, "valid"),
         "sink_ready": names.forked(source, fork, "ready"),

@@ -223,6 +223,13 @@ class Specification(Section):
         """The cores among `paths`, each with its place."""
         return {str(item): item.source for item in self.paths if is_core(item)}
 
+    @property
+    def middlewares(self) -> set[str]:
+        """The middlewares that it names, by its words."""
+        sides = [side for item in self.accelerators for side in (*item.interface.input, *item.interface.output)]
+        words = [*(block.middleware for block in self.blocks), *(side.middleware for side in sides)]
+        return {str(word) for word in words if word}
+
 
 def is_core(path: str) -> bool:
     """Whether an item of `paths` is the name of a core."""

@@ -14,7 +14,9 @@ from typing import Any
 
 import pytest
 
-from fusesoc_firm.plugin.gapi import GENERATORS, Call, make_request
+from fusesoc_firm.plugin.generators import GENERATORS
+from fusesoc_firm.request.calls import make_request
+from fusesoc_firm.request.request import GeneratorCall
 from tests.hdl.ghdl import REPOSITORY, core_files
 
 MESSAGE = "geometry_msgs/Point"
@@ -141,9 +143,9 @@ flow.run()
 def generated(name: str, ros: int, width: int) -> dict[str, str]:
     """The files of a core."""
     given: dict[str, Any] = {"message": MESSAGE, "ros": ros, "width": width} | ({"name": name} if name else {})
-    call = Call("me:p:top-a:1.0", Path("/nowhere"), given)
-    request = make_request("firm", call, GENERATORS["firm"], lambda _: ())
-    return {path: str(file.content) for path, file in GENERATORS["firm"].generate(request).files.items()}
+    call = GeneratorCall("firm", "me:p:top-a:1.0", "/nowhere", given)
+    request = make_request(call, GENERATORS["firm"].parameters, lambda _: ())
+    return {path: str(file.content) for path, file in GENERATORS["firm"].load(request).generate().files.items()}
 
 
 def design() -> str:

@@ -117,6 +117,7 @@ def simulate(folder: Path, frames: Sequence[Frame], tests: Iterable[tuple[int, V
     return result.output
 
 
+@pytest.mark.one_in(2)
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 def test_every_message_is_as_long_as_rosbags_makes_it(tmp_path: Path, ros: Middleware) -> None:
     print(f"seed {SEED}")

@@ -77,9 +77,10 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
     Raises `InputError` and `GhdlError`.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    *kernels, bench = _write(simulation_core.generate(request), folder)
+    loaded = system_core.load_requested(request)
+    *kernels, bench = _write(simulation_core.simulation_core(request, loaded), folder)
     # A kernel before the wrapper that instantiates it, the test bench last.
-    vhdl = [*kernels, *_write(system_core.generate(request), folder), bench]
+    vhdl = [*kernels, *_write(system_core.system_core(loaded), folder), bench]
     Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
     Library("work", folder).analyse(vhdl)
     return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
@@ -88,7 +89,8 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
 def generate_system(spec: Path, folder: Path) -> list[Path]:
     """Generate a system without its simulation into `folder`: its VHDL, in order. Raises `InputError`."""
     parameters: dict[str, Plain] = {"spec": spec.name, "product": "system", "paths": None, "distro": None}
-    return _write(system_core.generate(Request("far", "test:sys:system:0", spec.parent, parameters)), folder)
+    request = Request("far", "test:sys:system:0", spec.parent, parameters)
+    return _write(system_core.system_core(system_core.load_requested(request)), folder)
 
 
 def _write(core: GeneratedCore, folder: Path) -> list[Path]:

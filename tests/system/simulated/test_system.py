@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from fusesoc_firm.simulation import simulation_core
+from fusesoc_firm.system.system_core import load_requested
 from fusesoc_firm.text.diagnostics import InputError
 from tests.hdl.frames import traffic
 from tests.hdl.ghdl import CORES, REPOSITORY, GhdlError, Library, core_files
@@ -280,7 +281,7 @@ def test_no_path_gets_into_a_compiled_function(typed: GeneratedSystem, tmp_path:
     shutil.copytree(DATA, copy)
     stimuli = write_stimuli(tmp_path / "stimuli.yaml", list(typed_stimuli()))
     request = call(copy / "typed.yaml", stimuli, copy / "typed_model.py", paths=["typed_msgs"])
-    files = simulation_core.generate(request).files
+    files = simulation_core.simulation_core(request, load_requested(request)).files
     for name in ("libnegate.so", "libcopy.so", "libdifference.so"):
         assert files[name].content == (typed.folder / name).read_bytes()
 
@@ -293,8 +294,10 @@ def kernel_fault(folder: Path, code: str) -> str:
     spec.write_text(_TWICE, encoding="utf-8")
     (folder / "model.py").write_text("def respond(_, message):\n    return [('pub', message)]\n", encoding="utf-8")
     stimuli = write_stimuli(folder / "stimuli.yaml", [("sub", {"data": 0})])
+    request = call(spec, stimuli, folder / "model.py")
+    loaded = load_requested(request)
     with pytest.raises(InputError) as raised:
-        simulation_core.generate(call(spec, stimuli, folder / "model.py"))
+        simulation_core.simulation_core(request, loaded)
     assert f"{spec}:5:14: error: " in str(raised.value)
     return str(raised.value)
 

@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 import yaml
 
-from fusesoc_firm.plugin.gapi import GENERATORS, Generator, main
+from fusesoc_firm.plugin.answer import main
+from fusesoc_firm.plugin.generators import GENERATORS, Generator
 from fusesoc_firm.request.parameters import Parameter
-from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
+from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
 from fusesoc_firm.text.diagnostics import fail
 
 CORE = """\
@@ -32,12 +33,12 @@ class Echo:
     def __init__(self) -> None:
         self.calls = 0
 
-    def inputs(self, request: Request) -> list[Path]:
-        return [request.files_root / str(request.parameters["file"] or request.parameters["spec"])]
+    def load(self, request: Request) -> LoadedRequest:
+        path = request.files_root / str(request.parameters["file"] or request.parameters["spec"])
+        return LoadedRequest(request, [path], lambda: self.generate(request, path), list)
 
-    def generate(self, request: Request) -> GeneratedCore:
+    def generate(self, request: Request, path: Path) -> GeneratedCore:
         self.calls += 1
-        path = self.inputs(request)[0]
         if not path.exists():
             fail(f"no file {path.name}")
         text = f"{path.read_text()} at {request.parameters['width']}"
@@ -78,7 +79,7 @@ class Bench:
             Parameter("paths", "list", "folders"),
             Parameter("file", "str", "a file that says it all", replaces=("spec", "width")),
         )
-        generator = Generator(known, self.echo.inputs, self.echo.generate, lambda _: self.programs)
+        generator = Generator(known, self.echo.load, lambda _: self.programs)
         return main("echo", ["system_input.yml"], {"echo": generator})
 
 
@@ -141,11 +142,11 @@ def test_a_copy_of_the_project_elsewhere_shares_what_is_stored(bench: Bench) -> 
 def test_the_core_is_written_last(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     written: list[str] = []
 
-    def note(path: Path, content: str | bytes) -> bool:
-        written.append(str(path))
+    def note(path: str, content: bytes) -> bool:
+        written.append(path)
         return True
 
-    monkeypatch.setattr("fusesoc_firm.plugin.gapi.write_if_changed", note)
+    monkeypatch.setattr("fusesoc_firm.plugin.run.write_if_changed", note)
     bench.run(spec="spec.yaml")
     bench.run(spec="spec.yaml")
     assert written == ["rtl/b.vhd", "a.bin", "arm-system.core"] * 2
@@ -156,13 +157,13 @@ def test_a_full_disk_is_a_fault_and_leaves_no_core(
 ) -> None:
     written: list[str] = []
 
-    def fill(path: Path, content: str | bytes) -> bool:
+    def fill(path: str, content: bytes) -> bool:
         if written:
             raise OSError(28, "No space left on device")
-        written.append(path.name)
+        written.append(path)
         return True
 
-    monkeypatch.setattr("fusesoc_firm.plugin.gapi.write_if_changed", fill)
+    monkeypatch.setattr("fusesoc_firm.plugin.run.write_if_changed", fill)
     assert bench.run(spec="spec.yaml") == 1
     assert capsys.readouterr().err == f"error: cannot write {bench.work / 'a.bin'}: No space left on device\n"
     assert not list(bench.work.glob("*.core"))
@@ -171,7 +172,7 @@ def test_a_full_disk_is_a_fault_and_leaves_no_core(
 def test_ctrl_c_leaves_no_core_and_is_not_remembered(
     bench: Bench, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupt(_: Request) -> GeneratedCore:
+    def interrupt(*_: object) -> GeneratedCore:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -186,9 +187,9 @@ def test_ctrl_c_leaves_no_core_and_is_not_remembered(
 def test_an_input_that_is_edited_while_it_is_read_is_read_again(bench: Bench) -> None:
     generate = bench.echo.generate
 
-    def edit(request: Request) -> GeneratedCore:
-        (bench.project / "spec.yaml").write_text("edited")
-        return generate(request)
+    def edit(request: Request, path: Path) -> GeneratedCore:
+        path.write_text("edited")
+        return generate(request, path)
 
     bench.echo.generate = edit  # type: ignore[method-assign]
     bench.run(spec="spec.yaml")
@@ -257,7 +258,7 @@ def test_without_the_core_a_fault_has_no_place(bench: Bench, capsys: pytest.Capt
         "parameters": {"x": 1},
     }
     (bench.work / "call.yml").write_text(yaml.safe_dump(call))
-    assert main("echo", ["call.yml"], {"echo": Generator((), bench.echo.inputs, bench.echo.generate)}) == 1
+    assert main("echo", ["call.yml"], {"echo": Generator((), bench.echo.load)}) == 1
     assert capsys.readouterr().err == "error: unknown parameter 'x'\n"
 
 

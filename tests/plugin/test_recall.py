@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
-from fusesoc_firm.plugin.gapi import main
-from fusesoc_firm.store import recall
-from fusesoc_firm.store.layout import CALL, ENTRY, USES, read_note, write_json
+from fusesoc_firm.plugin import answer as answer_module
+from fusesoc_firm.plugin import recall
+from fusesoc_firm.plugin.answer import main
+from fusesoc_firm.plugin.recall import answer
+from fusesoc_firm.store import own_code
+from fusesoc_firm.store.layout import CALL, ENTRY, read_note, write_json
 from fusesoc_firm.store.own_code import PACKAGE
-from fusesoc_firm.store.recall import answer
+from fusesoc_firm.store.store import Key
 
 QUAT2EULER = Path(__file__).resolve().parents[2] / "specs" / "quat2euler"
 
@@ -151,30 +156,13 @@ def test_other_parameters_are_another_call(calls: Calls) -> None:
     assert not answer("far", calls.simulation(seed=2))
 
 
-def test_an_edit_of_a_module_or_template_of_ours_counts(calls: Calls, tmp_path: Path) -> None:
-    # Those that other tests read count in this process.
-    for name in ("_READ", "_RENDERED"):
-        calls.monkeypatch.setattr(f"fusesoc_firm.text.render.{name}", set())
+def test_an_edit_of_our_own_code_counts(calls: Calls) -> None:
     arguments = calls.converter()
     main("firm", arguments)
-    (note,) = calls.store.rglob(f"*{CALL}")
-    facts = yaml.safe_load(note.read_text().partition("\n")[2])["facts"]
-    files = {name for kind, name, _ in facts if kind == "file"}
-    assert str(PACKAGE / "naming.py") in files
-    assert str(PACKAGE / "templates/vhdl/subscriber.vhd.mustache") in files
-    assert str(PACKAGE / "templates/vhdl/system.vhd.mustache") not in files
-    state = recall.state
-
-    def edited(kind: str, name: str) -> str | None:
-        return "edited" if name == str(PACKAGE / "naming.py") else state(kind, name)
-
     with calls.monkeypatch.context() as patch:
-        patch.setattr(recall, "state", edited)
+        patch.setattr(own_code, "state", lambda: "edited")
         assert not answer("firm", arguments)
     assert answer("firm", arguments)
-    # A new one may take the place of another.
-    calls.monkeypatch.setattr(recall, "all_names", lambda: ["new.py"])
-    assert not answer("firm", arguments)
 
 
 def test_a_compiler_that_was_replaced_counts(calls: Calls, tmp_path: Path) -> None:
@@ -243,32 +231,28 @@ def test_nothing_is_answered_that_may_be_another(calls: Calls, change: Callable[
     assert written() == {}
 
 
-def test_an_answer_does_not_need_what_led_to_the_key(calls: Calls) -> None:
-    arguments = calls.converter()
-    main("firm", arguments)
-    _removed(USES)(calls)
-    assert answer("firm", arguments)
-
-
 @pytest.mark.parametrize("is_stored", [False, True])
-def test_what_is_edited_while_the_facts_are_noted_is_not_noted(calls: Calls, is_stored: bool) -> None:
+def test_what_is_edited_once_it_was_read_is_not_noted(calls: Calls, is_stored: bool) -> None:
     """The state in a note must be that which the key was made of."""
     arguments = calls.converter()
     if is_stored:
         main("firm", arguments)
         _removed(CALL)(calls)
-    edits = iter(["uint16 a\n"])
+    key_of = answer_module._key
 
-    def edit_after(kind: str, names: list[str]) -> list[tuple[str, str, str | None]]:
-        # Between the key and the facts.
-        for text in edits:
-            calls.write("msgs/second/my_msgs/msg/Size.msg", text)
-        return recall.facts(kind, names)
+    def edited(*arguments: Any) -> Key:
+        # After the request was loaded.
+        calls.write("msgs/second/my_msgs/msg/Size.msg", "uint16 a\n")
+        return key_of(*arguments)
 
-    calls.monkeypatch.setattr("fusesoc_firm.plugin.gapi.facts", edit_after)
-    assert main("firm", arguments) == 0
+    with calls.monkeypatch.context() as patch:
+        patch.setattr(answer_module, "_key", edited)
+        assert main("firm", arguments) == 0
     assert not answer("firm", arguments)
     assert [*calls.store.rglob(f"*{CALL}")] == []
+    # Nor is what was made of the former definition stored by the key of the present one.
+    assert main("firm", arguments) == 0
+    assert re.search(r"\ba +: out std_logic_vector\(15 downto 0\)", Path("axis_to_my_msgs_size.vhd").read_text())
 
 
 @pytest.mark.parametrize(
@@ -307,7 +291,7 @@ def test_next_to_nothing_is_imported(calls: Calls) -> None:
     """Time is lost with imports: those that an answer cannot do without are all there are."""
     main("firm", calls.converter())
     script = (
-        "import sys; before = {*sys.modules}; from fusesoc_firm.store.recall import answer; "
+        "import sys; before = {*sys.modules}; from fusesoc_firm.plugin.recall import answer; "
         "print(answer('firm', ['call.yml'])); print(*sorted({*sys.modules} - before))"
     )
     environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
@@ -319,3 +303,13 @@ def test_next_to_nothing_is_imported(calls: Calls) -> None:
     heavy = {"yaml", "chevron", "rosbags", "numpy", "dataclasses", "inspect", "subprocess", "shutil", "tempfile"}
     assert not imported & heavy
     assert "importlib.metadata" not in done[-1].split()
+
+
+def test_a_call_is_recalled_whose_folder_is_searched_for_messages(calls: Calls) -> None:
+    """As in a project that names its root, which builds lie below."""
+    calls.folder = calls.project / "build"
+    arguments = calls.call("size", message="my_msgs/Size", ros=2, paths=["."])
+    assert main("firm", arguments) == 0
+    # FuseSoC empties the folder of a call.
+    clear()
+    assert answer("firm", arguments)

@@ -1,0 +1,283 @@
+"""The door for FuseSoC: answers its call of a generator.
+
+FuseSoC starts a generator in an empty folder with one argument, a YAML file that holds the new core's name, the
+requesting core's folder and the parameters. It loads every `.core` that it finds in the folder afterwards, so that file
+is written last. What the generator prints is shown to the user as it is.
+
+A call is derived once (`Generator.load`): its inputs give the store's key, and the core is made of the same value if
+the store does not have it. Whatever the answer follows from is noted in the state that it had before it was used. If
+one of these facts has changed at the end, something was edited meanwhile, and nothing is kept.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fusesoc_firm.plugin import recall
+from fusesoc_firm.plugin.generators import GENERATORS, MESSAGES, Generator
+from fusesoc_firm.plugin.recall import LOCKED, SEARCHED, call_digest, hold, messages_fact
+from fusesoc_firm.plugin.run import message_folders, run_of, write_core
+from fusesoc_firm.request.calls import make_request, read_call
+from fusesoc_firm.request.core_reader import core_name
+from fusesoc_firm.request.request import LoadedRequest, Request, as_files
+from fusesoc_firm.request.requesting_core import find_requesting_core
+from fusesoc_firm.store import own_code
+from fusesoc_firm.store.facts import Fact, facts
+from fusesoc_firm.store.reads import Input, Reads, noted
+from fusesoc_firm.store.store import Entry, Files, Key, default_store, request_digest
+from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, fail
+from fusesoc_firm.tools.programs import explanation, missing
+
+# FuseSoC does so at the start of every run of a target.
+_REMOVED = """the folder that this generator was started in was removed: the same target is being run twice at once
+      = 'firm build' does this without harm"""
+
+
+class _NotStoredError(Exception):
+    """The store does not have what was asked for."""
+
+
+@dataclass
+class Basis:
+    """What an answer follows from: `reads` of whatever gives its key, and `further` facts, our own code at first.
+
+    Each is in the state that it had before it was used. `run` is the run of FuseSoC.
+    """
+
+    run: str
+    further: list[Fact] = field(default_factory=lambda: facts("code", [""]))
+    reads: Reads = field(default_factory=Reads)
+
+    def facts(self) -> list[Fact]:
+        """All of it."""
+        return [*self.further, *self.reads.facts()]
+
+    def holds(self) -> bool:
+        """Whether nothing of it has changed since it was used."""
+        return hold(self.facts(), self.run)
+
+
+def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GENERATORS) -> int:
+    """Run the generator `command` on the file that FuseSoC names; the exit status is 1 for faults, 130 for Ctrl-C."""
+    try:
+        if len(argv) != 1:
+            fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
+        _answer(command, generators[command], Path(argv[0]), run_of(os.getppid()))
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 1
+    except FileNotFoundError:
+        if _is_here():
+            raise
+        print(f"{command}: error: {_REMOVED}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    return 0
+
+
+def answer_from_store(command: str, path: Path) -> bool:
+    """Answer a call in FuseSoC's own process; False, and nothing is written, if its core must be made, or is faulty.
+
+    Whoever makes it then says what is wrong.
+    """
+    run = run_of(os.getpid())
+    try:
+        if not recall.answer(command, [str(path)], run):
+            _answer(command, GENERATORS[command], path, run, is_only_looked_up=True)
+    except (InputError, _NotStoredError):
+        return False
+    return True
+
+
+def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only_looked_up: bool = False) -> None:
+    """Write the core that FuseSoC's file asks for into the current folder, and report it; note it to be recalled.
+
+    Raises `InputError`, and `_NotStoredError` if it must be made where it is only looked up.
+    """
+    start = time.monotonic()
+    # The code first, as its modules are imported from here on.
+    basis = Basis(run)
+    basis.further += facts("folder", _searched())
+    request = read_request(command, path, generator, run, basis.further)
+    basis.further += facts("program", generator.programs(request))
+    absent = missing(generator.programs(request))
+    loaded = load(request, generator, basis)
+    is_locked = _check_locked(loaded)
+    key, entry = obtain(loaded, generator, basis, is_only_looked_up=is_only_looked_up)
+    marks = find_requesting_core(request.files_root, request.name).name if command == MESSAGES else ""
+    # What is locked is compared on every run, and what is missing is reported. This comes before the core is written,
+    # which may lie in a folder that was searched.
+    if not (absent or is_locked) and basis.holds():
+        note = {"key": key.digest, "facts": basis.facts(), "name": request.name, "core": request.vlnv, "marks": marks}
+        default_store().note(call_digest(command, path.read_bytes()), note)
+    _write(entry.files, request, marks, run)
+    # It can be generated and not be run.
+    if absent:
+        print(f"{command}: {explanation(absent)}", flush=True)
+    origin = "from store" if entry.is_from_store else "generated"
+    print(f"{command}: {request.name} {origin} in {time.monotonic() - start:.2f} s", flush=True)
+
+
+def read_request(
+    command: str, path: Path, generator: Generator, run: str | None = None, further: list[Fact] | None = None
+) -> Request:
+    """The request in FuseSoC's file, with messages of cores as they were made in a run, or in any.
+
+    Facts about these are added to `further`. Raises `InputError`.
+    """
+    generated = path.absolute().parent.parent
+
+    def find(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
+        if further is not None:
+            further.extend(messages_fact(str(generated), core_name(name), run or "") for name in names)
+        return _folders_of_run(names, str(generated), run)
+
+    return make_request(read_call(path, command), generator.parameters, find)
+
+
+def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
+    """What a request leads to. Raises `InputError`."""
+    with noted(basis.reads):
+        return generator.load(request)
+
+
+def obtain(
+    loaded: LoadedRequest, generator: Generator, basis: Basis, *, is_only_looked_up: bool = False
+) -> tuple[Key, Entry]:
+    """The core that a request asks for, with its key, from the store if it has it.
+
+    Raises `InputError`, and `_NotStoredError` if it must be made where it is only looked up.
+    """
+
+    def build() -> Files:
+        if is_only_looked_up:
+            raise _NotStoredError
+        reads = Reads()
+        with noted(reads):
+            core = loaded.generate()
+        _check_declared(reads, basis.reads)
+        return as_files(core, loaded.request)
+
+    key = _key(loaded, generator, basis)
+    return key, default_store().obtain(key, build, basis.holds)
+
+
+def _key(loaded: LoadedRequest, generator: Generator, basis: Basis) -> Key:
+    request = loaded.request
+    tools = dict(generator.tools(request))
+    basis.further += facts("program", sorted(tools))
+    asked = {
+        "command": request.command,
+        "vlnv": request.vlnv,
+        # What is locked is so beside what is made.
+        "parameters": {name: value for name, value in request.parameters.items() if name != "locked"},
+        "tools": tools,
+    }
+    for item in loaded.inputs:
+        if isinstance(item, Path):
+            basis.reads.note_file(str(item.absolute()))
+    inputs = dict(_named_content(item, request) for item in loaded.inputs)
+    about = {"core": request.vlnv, "generator": request.command}
+    return Key(request_digest(asked, inputs, own_code.digest()), about)
+
+
+def _searched() -> list[str]:
+    """The folders of the environment with message definitions."""
+    entries = [entry for name in SEARCHED for entry in os.environ.get(name, "").split(os.pathsep) if entry]
+    return [folder for entry in entries for folder in (entry, str(Path(entry, "share")))]
+
+
+def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: str | None) -> tuple[Path, ...]:
+    """The folders, below `generated`, of the messages of cores, made in a run, or in any.
+
+    Raises `InputError` for a core that has none, as it has if the requesting core does not depend on it.
+    """
+    faults = Diagnostics()
+    found: list[Path] = []
+    for name, source in names.items():
+        current = message_folders(generated, core_name(name), run)
+        if not current:
+            hint = "the requesting core depends on it, and it has the generator firm_messages in its target 'default'"
+            faults.error(f"there are no messages of core '{name}'", source, hint)
+        found += map(Path, current)
+    faults.raise_if_any()
+    return tuple(found)
+
+
+def _check_locked(loaded: LoadedRequest) -> bool:
+    """Tell whether a request is held to a lock file. Raises `InputError` with what differs from one."""
+    request = loaded.request
+    places: list[Path] = []
+    if name := request.parameters.get("locked"):
+        places.append(request.files_root / str(name))
+    if name := os.environ.get(LOCKED):
+        if not Path(name).is_absolute():
+            fail(f"{LOCKED} is '{name}'", hint=f"a generator has a folder of its own; write {LOCKED}=$PWD/{name}")
+        places.append(Path(name))
+    for place in places:
+        from fusesoc_firm.plugin.lock_file import check_request
+
+        check_request(place, loaded)
+    return bool(places)
+
+
+def _check_declared(of_build: Reads, of_key: Reads) -> None:
+    """Raise `InputError` if something was read that the key does not cover: an edit of it would never be noticed."""
+    faults = Diagnostics()
+    known = {os.path.realpath(file) for file in of_key.files}
+    parts = {os.path.realpath(file) for file in of_key.parts}
+    found = [(file, known) for file in of_build.files] + [(file, known | parts) for file in of_build.parts]
+    for file, covered in found:
+        if os.path.realpath(file) not in covered and Path(file).is_file():
+            faults.error(f"{file} was read, which is no input", hint="list it under the generator's parameter 'files'")
+    faults.raise_if_any()
+
+
+def _write(files: Files, request: Request, marks: str, run: str) -> None:
+    """Write a core into the current folder. Raises `InputError`."""
+    try:
+        found = write_core(files, request.vlnv, marks, run)
+    except OSError as error:
+        if not _is_here():
+            raise
+        fail(f"cannot write {error.filename}: {error.strerror}")
+    if found:
+        unit, other = found
+        fail(
+            f"{request.vlnv} and {other} define the design unit '{unit}' in two ways, and a tool keeps one",
+            find_requesting_core(request.files_root, request.name).instance(),
+            "the parameter 'name' of generator 'firm' gives the units of a core names of their own: name: left",
+        )
+
+
+def _is_here() -> bool:
+    """Whether the current folder has not been removed."""
+    try:
+        return bool(Path.cwd())
+    except FileNotFoundError:
+        return False
+
+
+def _name(path: Path, request: Request) -> str:
+    """An input's name in the key: the same for copies of a project in different folders."""
+    folders = [folder for found in request.message_folders.found.values() for folder in found]
+    for root in (request.files_root, *folders):
+        if path.is_relative_to(root):
+            number = folders.index(root) if root != request.files_root else None
+            name = str(path.relative_to(root))
+            return name if number is None else f"messages/{number}/{name}"
+    return str(path)
+
+
+def _named_content(item: Input, request: Request) -> tuple[str, bytes | None]:
+    """An input's name in the key, and what counts of it."""
+    if isinstance(item, Path):
+        return _name(item, request), item.read_bytes() if item.is_file() else None
+    return f"{_name(item.path, request)}:{item.name}", item.content

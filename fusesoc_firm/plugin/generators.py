@@ -1,0 +1,162 @@
+"""The table of generators: the parameters of each, and what it calls.
+
+A generator imports its stages when it is called, as these imports take longer than most of what they do.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from fusesoc_firm.request import message_core
+from fusesoc_firm.request.parameters import Parameter
+from fusesoc_firm.request.request import GeneratedCore, LoadedRequest, Request
+from fusesoc_firm.text.naming import PREFIX_RULE, is_prefix
+from fusesoc_firm.tools.programs import simulation_programs
+from fusesoc_firm.tools.simulators import SIMULATORS, default_simulator
+
+# The generator of cores that carry messages.
+MESSAGES = "firm_messages"
+# The largest that `math_real.uniform` takes, which draws the stalls.
+_LARGEST_SEED = 2147483562
+
+
+@dataclass(frozen=True)
+class Generator:
+    """A generator: its parameters, and what it makes of a request.
+
+    `load` derives all that a request leads to, and raises `InputError` for what its user did wrong. `programs` are
+    those without which the core cannot be run. `tools` are the versions of programs that make part of it.
+    """
+
+    parameters: tuple[Parameter, ...]
+    load: Callable[[Request], LoadedRequest]
+    programs: Callable[[Request], Sequence[str]] = lambda _: ()
+    tools: Callable[[Request], Mapping[str, str]] = lambda _: {}
+
+
+def _load_converters(request: Request) -> LoadedRequest:
+    from fusesoc_firm.converter import converter_core
+
+    return converter_core.load(request)
+
+
+def _load_system(request: Request) -> LoadedRequest:
+    from fusesoc_firm.node import package
+    from fusesoc_firm.simulation import simulation_core
+    from fusesoc_firm.system import system_core
+
+    def make_system(_: Request, loaded: system_core.LoadedSystem) -> GeneratedCore:
+        for warning in loaded.warnings:
+            print(warning, file=sys.stderr)
+        core = system_core.system_core(loaded)
+        return replace(core, files={**core.files, **package.generated_files(loaded)})
+
+    loaded = system_core.load_requested(request)
+    make: Callable[[Request, system_core.LoadedSystem], GeneratedCore]
+    if request.parameters["product"] == "live":
+        inputs, make = simulation_core.live_inputs(request, loaded), simulation_core.live_core
+    elif _is_simulation(request):
+        inputs, make = simulation_core.inputs(request, loaded), simulation_core.simulation_core
+    else:
+        inputs, make = [*system_core.inputs(request, loaded), *package.headers()], make_system
+    return LoadedRequest(request, inputs, lambda: make(request, loaded), loaded.definitions)
+
+
+def _simulator_programs(request: Request) -> Sequence[str]:
+    return simulation_programs(str(request.parameters["simulator"])) if _is_simulation(request) else []
+
+
+def _compiler(request: Request) -> Mapping[str, str]:
+    if not _is_simulation(request):
+        return {}
+    from fusesoc_firm.simulation.kernel import toolchain
+
+    return toolchain()
+
+
+def _is_simulation(request: Request) -> bool:
+    return request.parameters["product"] != "system"
+
+
+_PATHS = Parameter("paths", "list", "folders and bags with message definitions, relative to the core")
+
+_MESSAGES = Parameter(
+    "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
+)
+
+_DISTRO = Parameter("distro", "str", "the ROS distribution of standard messages")
+
+_LOCKED = Parameter("locked", "str", "a lock file, relative to the core; any difference from it is an error")
+
+GENERATORS: Mapping[str, Generator] = {
+    "firm": Generator(
+        (
+            Parameter(
+                "message",
+                "str",
+                "the type of a message, service or action, such as geometry_msgs/Quaternion",
+                is_required=True,
+            ),
+            Parameter("ros", "int", "the version of ROS", is_required=True, choices=(1, 2)),
+            Parameter("direction", "str", "converters to generate", "both", choices=("subscriber", "publisher", "both")),
+            Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter(
+                "name",
+                "str",
+                "prefix of the names of all generated units, such as left; required for a second core of the same message",
+                rule=(PREFIX_RULE, is_prefix),
+            ),
+            Parameter("include", "list", "fields with ports, such as pose.position; default all fields"),
+            Parameter("exclude", "list", "fields without ports; a publisher sends their defaults"),
+            Parameter(
+                "config",
+                "str",
+                "a file that lists messages and the names of their interfaces, relative to the core",
+                replaces=("message", "ros", "direction", "width", "name", "include", "exclude"),
+            ),
+            _PATHS,
+            _MESSAGES,
+            _DISTRO,
+            _LOCKED,
+        ),
+        _load_converters,
+    ),
+    "far": Generator(
+        (
+            Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
+            Parameter("product", "str", "the product to generate", "system", choices=("system", "simulation", "live")),
+            Parameter("board", "str", "the board: the name of a supported one, or a YAML file relative to the core"),
+            Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
+            Parameter("model", "str", "a Python file with a function that computes the system's answers"),
+            Parameter(
+                "environment", "list", "VHDL files of the environment at the pins; the last has the name of its entity"
+            ),
+            Parameter(
+                "simulator",
+                "str",
+                "the simulator",
+                default_simulator(),
+                choices=tuple(SIMULATORS),
+            ),
+            Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
+            Parameter("stall_percent", "int", "probability of a stall of a stream in a cycle, in percent", 25, bounds=(0, 99)),
+            Parameter("files", "list", "further files that the model or functions in software read"),
+            _PATHS,
+            _MESSAGES,
+            _DISTRO,
+            _LOCKED,
+        ),
+        _load_system,
+        _simulator_programs,
+        _compiler,
+    ),
+    MESSAGES: Generator(
+        (
+            Parameter("paths", "list", "folders with message definitions, relative to the core", is_required=True),
+            _MESSAGES,
+        ),
+        message_core.load,
+    ),
+}

@@ -1,0 +1,136 @@
+"""One run of FuseSoC: writes a generated core, and what the calls of the run leave for each other beside it.
+
+Each generator call is a process of its own. FuseSoC makes the calls of a run one after another, in folders side by side
+below `generator_cache`, where those of earlier runs may still lie. So what a call leaves there names its run.
+
+* The messages of a core: their generator marks its folder, and the generators of other cores find it.
+* The design units of a core: a tool keeps one unit of each name, and the later one silently replaces the earlier. So
+  each call compares its units with those of the calls before it. Other targets generate elsewhere.
+
+An answer from the store waits for this module, so it imports only what that takes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+
+from fusesoc_firm.text.files import read_file, write_if_changed
+
+# The folder in which FuseSoC has a folder for each call; what lies side by side elsewhere is no design.
+_GENERATED = "generator_cache"
+# What keeps FuseSoC from searching a folder for cores.
+_IGNORE = "FUSESOC_IGNORE"
+_MESSAGES, _UNITS = "firm_messages.run", "firm_units.run"
+_VHDL = re.compile(rb"^[ \t]*(?:entity|package)[ \t]+(\w+)[ \t\r\n]+is\b", re.MULTILINE | re.IGNORECASE)
+_VERILOG = re.compile(rb"^[ \t]*module[ \t]+(\w+)", re.MULTILINE)
+_PATTERNS = {".vhd": _VHDL, ".vhdl": _VHDL, ".v": _VERILOG, ".sv": _VERILOG}
+
+
+Clash = tuple[str, str]
+"""A unit, and another core of the run, by its full name, that defines it in another way."""
+
+
+def run_of(fusesoc: int) -> str:
+    """The run that this process of FuseSoC is, in a word that no other run on this machine has."""
+    # When it was started, behind the name in parentheses, which may hold blanks.
+    status = (read_file(f"/proc/{fusesoc}/stat") or b"").decode(errors="replace")
+    return f"{fusesoc} {''.join(status.rpartition(')')[2].split()[19:20])}"
+
+
+def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str) -> Clash | None:
+    """Write a generated core, by its full name, into the current folder; the last file is its `.core`.
+
+    `messages_of` is the core whose messages these are; "" for none. If another core of the run defines a unit in
+    another way, that is returned and nothing is written. Raises `OSError` with the absolute path that cannot be
+    written.
+    """
+    folder = os.getcwd()
+    units = _units_of(files)
+    if found := _clash(folder, units, run):
+        return found
+    if is_generated := os.path.basename(os.path.dirname(folder)) == _GENERATED:
+        _hide(os.path.dirname(folder))
+    for name, content in files.items():
+        _write(name, content)
+    if messages_of:
+        _write(_MESSAGES, f"{messages_of}\n{run}".encode())
+    if units and is_generated:
+        lines = [run, core, *(f"{digest} {unit}" for unit, digest in units.items())]
+        _write(_UNITS, "\n".join(lines).encode())
+    return None
+
+
+def message_folders(generated: str, core: str, run: str | None) -> list[str]:
+    """The folders in `generated` with the messages of a core (`vendor:library:name`), sorted; None is any run."""
+    found = []
+    for folder in _folders(generated):
+        marked, _, of_run = _read(folder, _MESSAGES).partition("\n")
+        if marked == core and run in (None, of_run):
+            found.append(folder)
+    return found
+
+
+def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
+    """Every design unit in generated files, as VHDL sees its name, with the digest of its file."""
+    found: dict[str, str] = {}
+    for name, content in files.items():
+        if pattern := _PATTERNS.get(os.path.splitext(name)[1].lower()):
+            digest = hashlib.sha256(content).hexdigest()
+            found |= dict.fromkeys((unit.decode().lower() for unit in pattern.findall(content)), digest)
+    return found
+
+
+def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
+    """The first unit that differs from one of the same name and run in the folders beside `folder`."""
+    for core, others in _others(folder, run):
+        for unit, digest in others.items():
+            if units.get(unit, digest) != digest:
+                return unit, core
+    return None
+
+
+def _others(folder: str, run: str) -> Iterator[tuple[str, dict[str, str]]]:
+    """Core and units of every call of the run but that of `folder`, in the order of their folders' names."""
+    generated = os.path.dirname(folder)
+    if os.path.basename(generated) != _GENERATED:
+        return
+    for place in _folders(generated):
+        if place == folder:
+            continue
+        of_run, _, rest = _read(place, _UNITS).partition("\n")
+        if of_run == run:
+            core, *lines = rest.split("\n")
+            yield core, {unit: digest for digest, _, unit in (line.partition(" ") for line in lines)}
+
+
+def _folders(generated: str) -> list[str]:
+    try:
+        names = sorted(os.listdir(generated))
+    except OSError:
+        return []
+    return [os.path.join(generated, name) for name in names]
+
+
+def _read(folder: str, name: str) -> str:
+    return (read_file(os.path.join(folder, name)) or b"").decode(errors="replace")
+
+
+def _hide(generated: str) -> None:
+    """Keep what is generated from being found as cores of a library.
+
+    FuseSoC takes every `.core` below a library's folder. If that is a project's own, its builds are there, too.
+    """
+    # Without it, all else works.
+    with suppress(OSError), open(os.path.join(generated, _IGNORE), "ab"):
+        pass
+
+
+def _write(name: str, content: bytes) -> None:
+    try:
+        write_if_changed(name, content)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, os.path.abspath(name)) from error
