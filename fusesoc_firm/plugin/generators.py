@@ -100,12 +100,14 @@ GENERATORS: Mapping[str, Generator] = {
                 is_required=True,
             ),
             Parameter("ros", "int", "the version of ROS", is_required=True, choices=(1, 2)),
-            Parameter("direction", "str", "converters to generate", "both", choices=("subscriber", "publisher", "both")),
+            Parameter(
+                "direction", "str", "converters to generate", "both", choices=("subscriber", "publisher", "both")
+            ),
             Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
             Parameter(
                 "name",
                 "str",
-                "prefix of the names of all generated units, such as left; required for a second core of the same message",
+                "prefix of the names of all generated units, such as left; required for a second core of a message",
                 rule=(PREFIX_RULE, is_prefix),
             ),
             Parameter("include", "list", "fields with ports, such as pose.position; default all fields"),
@@ -141,7 +143,9 @@ GENERATORS: Mapping[str, Generator] = {
                 choices=tuple(SIMULATORS),
             ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
-            Parameter("stall_percent", "int", "probability of a stall of a stream in a cycle, in percent", 25, bounds=(0, 99)),
+            Parameter(
+                "stall_percent", "int", "probability of a stall of a stream in a cycle, in percent", 25, bounds=(0, 99)
+            ),
             Parameter("files", "list", "further files that the model or functions in software read"),
             _PATHS,
             _MESSAGES,
