@@ -1,13 +1,13 @@
-"""Facts that an answer follows from: each a kind, a name and the state that was found when it was first looked at.
+"""The facts that determine the result of a call: each has a kind, a name and the state at its first reading.
 
     file        the SHA-256 of its content
     part        of a file of which a part was read: its size and time
-    folder      which names are in it
+    folder      the names in it
     code        of our own files
-    program     the file that the PATH leads to, its size and time
+    program     the file on the PATH, its size and time
 
-As long as all facts have these states, whatever follows from them is the same. An answer from the store waits for this
-module, so it imports only what that takes.
+As long as no state changes, the result does not change. A hit waits for this module, so it imports as little as
+possible.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Fact = tuple[str, str, str | None]
 
 
 def facts(kind: str, names: Iterable[str]) -> list[Fact]:
-    """These facts in their present state."""
+    """The facts of a kind, in their present state."""
     return [(kind, name, state(kind, name)) for name in names]
 
 
 def state(kind: str, name: str) -> str | None:
-    """The present state of a fact; None if what it is of is not there. Raises `ValueError` for an impossible name."""
+    """The present state of a fact; None if the object is missing. Raises `ValueError` for an impossible name."""
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)
@@ -41,7 +41,7 @@ def state(kind: str, name: str) -> str | None:
         return own_code.state()
     if kind == "program":
         return _program(name)
-    # That of another version of this module.
+    # A kind from another version of this module.
     return None
 
 

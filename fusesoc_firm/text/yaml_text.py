@@ -234,8 +234,7 @@ def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
 
 
 def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
-    """The root node of the lines above a fault or above the construct still open at the fault; None if there is none.
-    """
+    """The root node of the lines above a fault, or above the construct still open there; None if there is none."""
     for mark in (error.problem_mark, error.context_mark):
         if mark is not None:
             with suppress(yaml.YAMLError, TooLargeError):
