@@ -7,7 +7,7 @@ from setuptools import setup
 
 README = Path(__file__).with_name("README.md").read_text(encoding="utf-8")
 
-# The installation prints this text again: `firm path --docs` prints the folder of the pages.
+# An installation contains the pages with pictures and links: `firm path --docs` prints their folder.
 WITHOUT_PICTURES = re.sub(r"^(!\[.*|<!--.*-->)\n", "", README, flags=re.MULTILINE)
 
 setup(

@@ -67,9 +67,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
         self.edam = {**edam, "files": [netlist, *others]}
 
     def write_config_files(self) -> None:
-        """Write the request of the translation; the file changes, and the netlist is rebuilt, only if the request
-        changes.
-        """
+        """Write the request of the translation; the netlist is rebuilt only if the request changes."""
         self.update_config_file(self._request, self.translation.to_json())
 
     @property

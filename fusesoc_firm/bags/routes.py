@@ -73,8 +73,7 @@ class _Routing:
         return tuple(item for item in self.subscribers if item.name == absolute_name(topic))
 
     def _only_topic(self, subscriber: Topic, takers: Mapping[str, Sequence[Topic]]) -> str:
-        """The only topic that fits a subscriber whose topic name is not in the bag; empty if there is not exactly one.
-        """
+        """The only topic that fits a subscriber whose name is not in the bag; empty if there is not exactly one."""
         streams = self.bag.streams
         topics = [item.topic for item in streams if not takers[item.topic] and self._fits(item, subscriber)]
         rivals = [item for item in self.subscribers if _meant(item) == _meant(subscriber)]
@@ -122,9 +121,7 @@ class _Routing:
         return ""
 
     def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
-        """The bag's signatures of a message: as given, and that of its definition, since some writers compute it
-        wrongly.
-        """
+        """The bag's signatures of a message: the given one and, since some writers err, that of its definition."""
         said = [stream.signature] if _is_signature(stream.signature) else []
         if stream.definition and (defined := signature_of_text(message, stream.definition, self.bag.form.ros)):
             said.append(defined)

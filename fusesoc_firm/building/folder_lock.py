@@ -25,7 +25,7 @@ from pathlib import Path
 from fusesoc_firm.text.file_lock import locked
 
 BEAT_SECONDS = 2.0
-"""How often an owner has to call `beat`."""
+"""The longest time in seconds between an owner's calls of `beat`."""
 _SILENT_SECONDS = 30.0
 # The processes that an owner started end with it, but not at the same instant.
 _GRACE_SECONDS = 1.0

@@ -20,7 +20,7 @@ _POLL_SECONDS = 0.2
 _PATIENCE_SECONDS = 5.0
 _END_POLL_SECONDS = 0.02
 SHOWN_LINES = 20
-"""Of the log of a build that failed."""
+"""The number of lines shown of a failed build's log."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from typing import Any
 from fusesoc_firm.building.plan import Build
 
 Answer = Callable[[list[str]], bool]
-"""Answers a generator call, of which it takes the command line, in the current folder; False if FuseSoC is to do it."""
+"""Answers the generator call with this command line in the current folder; returns False to leave it to FuseSoC."""
 
 
 def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], alive: tuple[int, int]) -> None:

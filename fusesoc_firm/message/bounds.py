@@ -27,7 +27,7 @@ MOST_CONSTANTS = 4096
 MOST_NODES = 16384
 MOST_BYTES = 65536
 MOST_FILE_BYTES = 2**18
-"""Bytes of a `.msg`, `.srv` or `.action` file."""
+"""The size limit in bytes of a `.msg`, `.srv` or `.action` file."""
 
 _COUNT_BYTES = 4
 

@@ -95,7 +95,7 @@ class Middleware:
 _registered: dict[int, Middleware] = {}
 
 MIDDLEWARES: dict[str, Middleware] = {}
-"""By the words of the files of users."""
+"""The middlewares by their names in users' files."""
 
 
 def register(middleware: Middleware) -> None:

@@ -26,9 +26,7 @@ _LAUNCHER = "EDALIZE_LAUNCHER"
 
 @dataclass(frozen=True)
 class How:
-    """How to build: the folders, the last step, the number of parallel builds (0: one per core), and the cluster, if
-    any.
-    """
+    """How to build: the folders, the last step, the number of parallel builds (0: one per core), any cluster."""
 
     is_clean: bool = False
     is_setup_only: bool = False

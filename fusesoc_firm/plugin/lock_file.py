@@ -28,7 +28,7 @@ from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
 from fusesoc_firm.tools.programs import facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
-"""By kind (`messages`, `cores`, `tools`) and name: facts by name."""
+"""Facts by kind (`messages`, `cores`, `tools`), by name of the item, and by name of the fact."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
 _HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"

@@ -38,9 +38,9 @@ from fusesoc_firm.store.own_code import IMPORTED, PACKAGE
 from fusesoc_firm.text.files import read_file
 
 SEARCHED = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
-"""Variables with folders where message definitions are searched."""
+"""The environment variables that list folders with message definitions."""
 LOCKED = "FUSESOC_FIRM_LOCKED"
-"""Names the lock file that every call must comply with."""
+"""The environment variable that names the lock file with which every call must comply."""
 
 
 def answer(command: str, arguments: Sequence[str], run: str = "") -> bool:

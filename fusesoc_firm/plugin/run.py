@@ -31,7 +31,7 @@ _PATTERNS = {".vhd": _VHDL, ".vhdl": _VHDL, ".v": _VERILOG, ".sv": _VERILOG}
 
 
 Clash = tuple[str, str]
-"""A unit, and another core of the run, by its full name, that defines it in another way."""
+"""A unit, and the full name of another core of the run that defines it differently."""
 
 
 def run_of(fusesoc: int) -> str:

@@ -46,8 +46,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Names:
-    """The places of all names on a line: blocks, and fields and constants of each block's messages and of all messages.
-    """
+    """The places of the names on a line: blocks, and the fields and constants of each block's messages and of all."""
 
     blocks: Mapping[str, SourceRef]
     fields: Mapping[str, Mapping[str, SourceRef]]

@@ -106,8 +106,7 @@ class SystemRun:
         return found
 
     def take(self, topic: Topic, payload: bytes, stamp: int) -> None:
-        """Send a message to the system and wait until the hardware is at rest. Raises `StuckError` and
-        `TransportError`.
+        """Send a message to the system and wait for the hardware to rest. Raises `StuckError` and `TransportError`.
 
         If the message is rejected, a fault is added.
         """

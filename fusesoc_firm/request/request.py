@@ -18,9 +18,9 @@ from fusesoc_firm.text.yaml_text import yaml_dump
 
 _LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None
-"""What a generator's parameter can be; None is one that was not given and has no default."""
+"""A value of a generator's parameter; None means not given and without default."""
 CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
-"""Finds the folders of the messages of cores, given by name and place. Raises `InputError` for an unknown one."""
+"""Finds the folders with the messages of cores, given by name and place. Raises `InputError` for an unknown core."""
 
 
 def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:

@@ -20,7 +20,7 @@ from fusesoc_firm.store.layout import digest, digest_of
 from fusesoc_firm.text.files import read_file
 
 Fact = tuple[str, str, str | None]
-"""Kind, name and state; None as the state of what is not there."""
+"""Kind, name and state of a fact; the state of a missing object is None."""
 
 
 def facts(kind: str, names: Iterable[str]) -> list[Fact]:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 LAYOUT = "v4"
 ENTRY, CALL, LOCK = ".entry", ".call", ".lock"
 KEPT = (ENTRY, CALL)
-"""The endings of what is kept; what is used less goes first."""
+"""The endings of the files that are kept; the least recently used are removed first."""
 
 # The limits for plain data and for all other files, since each is read at once.
 _MOST_PLAIN_BYTES = 2**24

@@ -14,7 +14,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
 IMPORTED = ("chevron", "numpy", "pyyaml", "rosbags")
-"""What generated text can depend on beside our own code."""
+"""The packages that affect generated text besides our own code."""
 
 # Modules, templates and data. The other folders hold cores and pages, as files or links.
 _COUNTED = (".py", ".mustache", ".yaml", ".csv")

@@ -49,7 +49,7 @@ class Part:
 
 
 Input = Path | Part
-"""What a generator depends on: a whole file, or part of one."""
+"""An input of a generator: a whole file, or part of one."""
 
 
 @dataclass

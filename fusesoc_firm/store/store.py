@@ -36,7 +36,7 @@ from fusesoc_firm.text.file_lock import take
 from fusesoc_firm.text.files import TEMPORARY
 
 Files = Mapping[str, bytes]
-"""Contents by file name; a name may hold `/`."""
+"""Contents by file name; a name may contain `/`."""
 
 _FORMER_LAYOUTS = ("v1", "v2", "v3")
 _DEFAULT_LIMIT = "1G"

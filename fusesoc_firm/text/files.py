@@ -11,7 +11,7 @@ import stat
 from contextlib import suppress
 
 TEMPORARY = ".new-"
-"""What the name of a file begins with that is not whole yet."""
+"""The prefix of the names of incomplete files."""
 
 
 def write_whole(path: str | os.PathLike[str], data: bytes) -> None:

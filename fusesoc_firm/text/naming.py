@@ -60,7 +60,7 @@ LONGEST_TEXT = 200
 LONGEST_PATH = 4096
 
 PREFIX_RULE = "lower-case letters, digits and single '_' between them, a letter first, at most 100"
-"""What a prefix of design units is made of."""
+"""The form of a legal prefix of design units."""
 
 _PREFIX = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _LONGEST_PREFIX = 100

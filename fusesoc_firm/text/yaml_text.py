@@ -23,7 +23,7 @@ from fusesoc_firm.text.files import read_regular
 
 MOST_LEVELS = 64
 LONGEST_NUMBER = 40
-"""Characters of a number. Python itself refuses to read one of thousands of digits, with a `ValueError`."""
+"""The most characters of a number. Python itself raises `ValueError` for numbers with thousands of digits."""
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
@@ -44,9 +44,9 @@ class Bounds:
 
 
 SMALL = Bounds(2**20, 50_000)
-"""A specification, a configuration, a board."""
+"""The limits of a specification, a configuration or a board."""
 LARGE = Bounds(2**26, 5_000_000)
-"""Data, such as stimuli with images, and what others may have generated, such as a core."""
+"""The limits of data, such as stimuli with images, and of files that others may generate, such as cores."""
 
 
 class TooLargeError(Exception):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Live:
-    """How to build a simulator that another program starts, and how to start it (docs/transport.md).
+    """How to build a simulator that another program starts, and how to start it (docs/reference/transports.md).
 
     `parameter` precedes `NAME=value` on its command line. If FuseSoC's build produces nothing, the makefile's target
     `made_by` does. The start command is the line of the makefile's target `run` that begins with `started_by`, or else
@@ -69,7 +69,7 @@ SIMULATORS: dict[str, Simulator] = {
         live=Live("+"),
     ),
 }
-"""By Edalize's name, the one first that a system is simulated with where nothing else is said."""
+"""The simulators by Edalize's names; the first suitable one is the default."""
 
 
 def default_simulator(*, has_verilog: bool = False, is_live: bool = False) -> str:
