@@ -42,7 +42,7 @@ def version(kind: str) -> Middleware:
 def record(
     folder: Path, kind: str, texts: dict[str, str], *, name: str = "drive", count: int = 1, size: int = 9
 ) -> Path:
-    """Write a bag with two topics for each type, the second after a blank message, with invalid payloads."""
+    """Write a bag with a topic for each type and invalid payloads; a blank at the end makes a type distinct."""
     path = folder / (f"{name}.bag" if kind == "ros1" else name)
     shutil.rmtree(path, ignore_errors=True)
     path.unlink(missing_ok=True)

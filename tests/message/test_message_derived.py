@@ -396,7 +396,7 @@ def test_every_type_of_an_installed_ros2() -> None:
         if interface := library.interface(name, kind):
             definitions = library.joint_closure(interface.messages)
             found[full_name] = signature(name, definitions, interface.kind)
-        elif name in library.names():  # skips an action's services, which have no names here, and messages of .idl files
+        elif name in library.names():  # skips an action's services, which are unnamed here, and messages of .idl files
             found[full_name] = signature(name, library.closure(name))
     print(f"{len(found)} of {len(expected)} types compared, {len(library.interfaces())} services and actions in all")
     assert found == {full_name: expected[full_name] for full_name in found}
