@@ -16,9 +16,9 @@ from typing import Any
 
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     FieldType,
     InterfaceKind,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,
@@ -26,8 +26,6 @@ from fusesoc_firm.message.model import (
     StringType,
     nested_message,
 )
-
-Definitions = Mapping[MessageName, MessageDefinition]
 
 # Source: type_description_interfaces/FieldType. rosidl_adapter converts `char` to an IDL uint8, never to char.
 _TYPE_IDS = {
