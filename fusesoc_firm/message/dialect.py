@@ -1,4 +1,4 @@
-"""The rules of `.msg` files in ROS 1 and ROS 2: one table each, so that the parser does not distinguish them.
+"""The rules of `.msg` files in ROS 1 and ROS 2: one table each, so that the parser needs no special cases.
 
 ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few places where FIRM
 accepts more (blanks, `pkg/msg/Type`) or less (values that no generator could use).

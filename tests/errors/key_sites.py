@@ -1,5 +1,6 @@
-"""Every key of a specification and where it stands, found by the grammar; and what goes wrong with keys: texts without
-one, with one misspelt, with one indented otherwise, and texts that end at one.
+"""Finds every key of a specification by the grammar, and makes faulty texts from it.
+
+A faulty text lacks the key, misspells it, indents it differently, or ends at it.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ CONVERTERS: tuple[Mapping[str, object], ...] = (
     {"message": "sensor_msgs/JointState", "ros": 1, "width": 512},
     {"message": "std_msgs/Empty", "ros": 2, "direction": "publisher"},
 )
-# What is answered first may leave something behind in the process.
+# The first call may leave state behind in the process.
 GENERATE = """
 import json, os, sys
 from fusesoc_firm.plugin.answer import main
