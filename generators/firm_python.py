@@ -90,7 +90,7 @@ def _is_recalled(command: str) -> bool:
 def _start_next(command: str, tried: list[str], left: list[str]) -> NoReturn:
     """Start again in the next Python that may have the package, or end with a message.
 
-    A check beforehand would itself require a start.
+    The package is not looked for beforehand, since this would itself start the other Python.
     """
     while left:
         tried.append(left.pop(0))

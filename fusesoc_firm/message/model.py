@@ -143,4 +143,4 @@ class MessageDefinition:
 
 
 Definitions = Mapping[MessageName, MessageDefinition]
-"""A message and all within it, by their names."""
+"""A message and all nested messages, by name."""

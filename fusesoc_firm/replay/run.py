@@ -38,7 +38,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Sent:
-    """A message that left the system, and its cause: the last message sent before it.
+    """A message that left the system, and its cause: the last earlier message whose route leads to it.
 
     `last_cycle` is that of its last beat; None if software sent it.
     """

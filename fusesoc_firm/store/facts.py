@@ -1,10 +1,10 @@
 """The facts that determine the result of a call: each has a kind, a name and the state at its first reading.
 
-    file        the SHA-256 of its content
-    part        of a file of which a part was read: its size and time
-    folder      the names in it
-    code        of our own files
-    program     the file on the PATH, its size and time
+    file        the SHA-256 of the content
+    part        the size and time of a file that was read in part
+    folder      the names in the folder
+    code        the state of this package's own files
+    program     the path, size and time of the file on the PATH
 
 As long as no state changes, the result does not change. A hit waits for this module, so it imports as little as
 possible.

@@ -36,7 +36,7 @@ from chevron.tokenizer import ChevronError, tokenize
 from fusesoc_firm.text.quoting import QUOTES, Quote
 
 Context = dict[str, Any]
-"""What a template is rendered for: plain data."""
+"""The context of a template: plain data."""
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 
