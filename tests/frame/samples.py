@@ -49,7 +49,7 @@ _ROS1 = {
     "Zero": "uint8[0] none\nuint16 value\nInner[0] nobody\nbool[0] nowhere\n",
 }
 
-# The payload is 4 bytes longer; with up to 3 trailing bytes, its lengths are around a carry of the count's lowest byte.
+# The payload is 4 bytes longer. With up to 3 trailing bytes, the lengths lead to a carry out of the length's low byte.
 _ROS2 = {
     "Tuned": "uint8 gain 7\nfloat32 rate 0.5\n",
     "Defaults": """float64 x 1.5\nint16[3] triple [1, -2, 3]\nbool flag true\nuint8 plain\nTuned tuned\nTuned[2] pair

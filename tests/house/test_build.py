@@ -184,8 +184,7 @@ def test_programs_are_started_by_firm_tool_unless_the_user_says_otherwise(projec
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files that FuseSoC and generators wrote, except GHDL's library, which has dates, and files that name the run.
-    """
+    """All files of FuseSoC and generators, except GHDL's library, which has dates, and files that name the run."""
     files = (path for path in folder.rglob("*") if path.is_file() and path.suffix not in (".cf", ".o", ".run"))
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 

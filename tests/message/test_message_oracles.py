@@ -128,7 +128,7 @@ def of_genmsg(field: Any) -> FieldType:
 
 
 def rosidl_content(text: str, name: MessageName) -> Content | None:
-    """The content that rosidl_adapter reads, or None; it raises exceptions of many types, and prints."""
+    """The content that rosidl_adapter reads, or None; it prints, and raises exceptions of many types."""
     parser = pytest.importorskip("rosidl_adapter.parser")
     with contextlib.redirect_stderr(io.StringIO()):
         try:
