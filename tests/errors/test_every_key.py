@@ -241,7 +241,7 @@ def test_a_file_that_ends_behind_a_key(checker: Checker, shift: int) -> None:
 
 
 def _what_no_fault_tells(answer: Answer, site: KeySite) -> str:
-    """The fault of an unreported line, or "": a line that fits nowhere must be shown, or named by another line's fault."""
+    """The fault of an unreported line: one that fits nowhere must be shown, or named by another line's fault."""
     told = [
         fault
         for fault in answer.faults
