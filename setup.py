@@ -1,4 +1,4 @@
-"""The description of a wheel: README.md without its pictures and links, which lead somewhere in a checkout alone."""
+"""Builds the wheel's description: README.md without pictures and links, which work only in a checkout."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ from setuptools import setup
 
 README = Path(__file__).with_name("README.md").read_text(encoding="utf-8")
 
-# What is shown once more by an installation: `firm path --docs` prints the folder of the pages.
+# An installation contains the pages with pictures and links: `firm path --docs` prints their folder.
 WITHOUT_PICTURES = re.sub(r"^(!\[.*|<!--.*-->)\n", "", README, flags=re.MULTILINE)
 
 setup(

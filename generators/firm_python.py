@@ -1,8 +1,8 @@
-"""Run a generator in a Python that has the fusesoc_firm package.
+"""Runs a generator in a Python that has the fusesoc_firm package.
 
-FuseSoC starts generators with the `python3` that is first on PATH. That need be neither the one FuseSoC runs in nor the
-one this package was installed for, unless an environment is activated. So a generator first looks for the right one.
-Started itself, by the launcher of a build, this file prints which one that is, or nothing.
+FuseSoC starts generators with the first `python3` on PATH. Unless an environment is activated, this may be neither
+FuseSoC's own Python nor the one with this package. So a generator first looks for the right one. If the launcher of a
+build starts this file itself, it prints the path of that Python, or nothing.
 
 This file runs in any Python 3.9 or later.
 """
@@ -14,23 +14,23 @@ import signal
 import sys
 from collections.abc import Iterator
 
-# What only a second start needs is imported for it: most calls are answered out of the store, at once.
+# Modules that only a second start needs are imported late: most calls are hits and need to be fast.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import NoReturn
 
 _NEEDED = ("fusesoc_firm", "chevron", "rosbags", "yaml")
-# Set to a Python to use just that.
+# If set, only this Python is used.
 _CHOSEN = "FUSESOC_FIRM_PYTHON"
-# Set for a further start: the Pythons that were tried, and those that are left, both in lines.
+# Set for a further start: the Pythons that were tried and those that are left, one per line.
 _TRIED, _LEFT = "_FUSESOC_FIRM_TRIED", "_FUSESOC_FIRM_LEFT"
 
 
 def run(command: str) -> NoReturn:
-    """Answer FuseSoC's call of the generator `command`, in this Python or in another that takes this one's place."""
+    """Answer FuseSoC's call of the generator `command`, in this Python or in another that replaces this process."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-        # Whoever started FuseSoC in the background of a script had it ignored.
+        # A script that starts FuseSoC in the background makes it ignore SIGINT.
         signal.signal(signal.SIGINT, signal.default_int_handler)
     tried, left = ([*filter(None, os.environ.pop(name, "").split("\n"))] for name in (_TRIED, _LEFT))
     chosen = os.environ.get(_CHOSEN)
@@ -56,9 +56,9 @@ def run(command: str) -> NoReturn:
 
 
 def _warn_of_another_version(command: str) -> None:
-    """Warn if the library that this file is in and the package of this Python have different versions.
+    """Warn if this file's library and the package of this Python have different versions.
 
-    The hardware that is generated is made for the cores of the package's own library.
+    The generated hardware requires the cores of the package's own library.
     """
     folder = os.path.dirname(os.path.abspath(__file__))
     try:
@@ -79,7 +79,7 @@ def _warn_of_another_version(command: str) -> None:
 
 
 def _is_recalled(command: str) -> bool:
-    """Tell whether the call was answered as it was answered before."""
+    """Whether the call is a hit."""
     try:
         from fusesoc_firm.plugin.recall import answer
     except ImportError:
@@ -90,7 +90,7 @@ def _is_recalled(command: str) -> bool:
 def _start_next(command: str, tried: list[str], left: list[str]) -> NoReturn:
     """Start again in the next Python that may have the package, or end with a message.
 
-    It is not asked beforehand whether it has: that would take a start by itself.
+    The package is not looked for beforehand, since this would itself start the other Python.
     """
     while left:
         tried.append(left.pop(0))
@@ -98,7 +98,7 @@ def _start_next(command: str, tried: list[str], left: list[str]) -> NoReturn:
         try:
             os.execve(tried[-1], [tried[-1], *sys.argv], environment)
         except OSError:
-            # It is no program, or is no more.
+            # It is not a program, or no longer exists.
             continue
     lines = "\n".join(f"  {python}" for python in tried)
     sys.exit(
@@ -108,17 +108,17 @@ def _start_next(command: str, tried: list[str], left: list[str]) -> NoReturn:
 
 
 def _others(parent: int) -> list[str]:
-    """What to try beside this Python, in order, where FuseSoC is the process `parent`."""
+    """The other Pythons to try, in order; FuseSoC is the process `parent`."""
     return [python for python in dict.fromkeys(_candidates(parent)) if python != sys.executable]
 
 
 def _candidates(parent: int) -> Iterator[str]:
-    """Pythons that may have the package, the likeliest first."""
+    """Yield Pythons that may have the package, the likeliest first."""
     import shutil
     from pathlib import Path
 
     interpreter, script = _command(parent)
-    # Where no Python but, say, a shell is the parent, it is not to be asked what only Python understands.
+    # The parent may be a shell, for example, which does not understand Python's options.
     if Path(interpreter).name.startswith(("python", "pypy")) and (found := shutil.which(interpreter)):
         yield found
     for file in filter(None, (script, __file__)):
@@ -127,7 +127,7 @@ def _candidates(parent: int) -> Iterator[str]:
 
 
 def _command(process: int) -> tuple[str, str]:
-    """Interpreter and script of a process, which is FuseSoC; "" where the system does not tell."""
+    """Interpreter and script of FuseSoC's process; "" if the system does not provide them."""
     from pathlib import Path
 
     try:
@@ -135,7 +135,7 @@ def _command(process: int) -> tuple[str, str]:
         folder = Path(f"/proc/{process}/cwd").readlink()
     except OSError:
         return "", ""
-    # A relative path is meant from where the process stands.
+    # Relative paths refer to the current folder of the process.
     absolute = [str(folder / word) if "/" in word else word for word in words]
     return absolute[0], next((word for word in absolute[1:] if "/" in word), "")
 
@@ -149,11 +149,11 @@ def _environments_above(path: Path) -> Iterator[str]:
 
 
 def _print_suitable() -> None:
-    """Print, for a shell, the Python that a generator would run in; nothing if there is none."""
+    """Print, for a shell, the Python in which a generator would run, or nothing."""
     import shlex
     import subprocess
 
-    # Without the current folder, which `-c` can import from and a script cannot.
+    # The current folder is excluded: `-c` can import from it, but a script cannot.
     probe = f"""
 import sys
 from importlib.util import find_spec
@@ -172,7 +172,7 @@ sys.exit(not all(map(find_spec, {_NEEDED})))
 
 
 def _above_make() -> int:
-    """The process that started the make in whose makefile this one is, maybe below several shells."""
+    """The process that started the make that runs this file, perhaps through several shells."""
     process = os.getppid()
     for name in ("sh", "make"):
         while (parent := _parent(process, name)) is not None:
@@ -185,7 +185,7 @@ def _parent(process: int, name: str) -> int | None:
     from pathlib import Path
 
     try:
-        # After the program's name, which may hold anything: its state, its parent.
+        # The state and the parent follow the program's name, which may contain any character.
         program, _, rest = Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")
     except OSError:
         return None

@@ -1,10 +1,10 @@
-"""Edalize's tool `ghdlsynth`: all VHDL of a build to one Verilog netlist, as a frontend of any flow that takes Verilog.
+"""Edalize's tool `ghdlsynth`: translates all VHDL of a build to one Verilog netlist, as a frontend of any Verilog flow.
 
     flow: sim
     flow_options: {tool: icarus, frontends: [ghdlsynth], ghdlsynth_top: robot_system}
 
-Edalize finds a tool by its file's name, and its packages are namespace packages; so this one can lie in another wheel.
-What it does stands in `fusesoc_firm.netlist`.
+Edalize finds a tool by its file's name, and its packages are namespace packages, so this one can be in another wheel.
+The implementation is in `fusesoc_firm.netlist`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fusesoc_firm.tools.programs import programs_of
 
 
 class Ghdlsynth(Edatool):  # type: ignore[misc]
-    """VHDL to Verilog; files with the tag `simulation`, such as test benches, are left out."""
+    """Translates VHDL to Verilog; files with the tag `simulation`, such as test benches, are excluded."""
 
     description = "Translate VHDL to a Verilog netlist with GHDL"
 
@@ -33,7 +33,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
     }
 
     def setup(self, edam: dict[str, Any]) -> None:
-        """Add the command that makes the netlist, and hand on the netlist in place of the VHDL."""
+        """Add the command that makes the netlist, and replace the VHDL files with the netlist."""
         super().setup(edam)
         vhdl = [file for file in self.files if file.get("file_type", "").startswith("vhdlSource")]
         others = [file for file in self.files if file not in vhdl]
@@ -67,7 +67,7 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
         self.edam = {**edam, "files": [netlist, *others]}
 
     def write_config_files(self) -> None:
-        """What to translate; it changes only if that does, and then the netlist is made again."""
+        """Write the request of the translation; the netlist is rebuilt only if the request changes."""
         self.update_config_file(self._request, self.translation.to_json())
 
     @property
@@ -76,11 +76,11 @@ class Ghdlsynth(Edatool):  # type: ignore[misc]
 
 
 def _programs(edam: dict[str, Any]) -> list[str]:
-    """What the tools of the flow start; Edalize has options for each of them."""
+    """The programs that the tools of the flow start; Edalize has options for each tool."""
     tools = edam.get("tool_options", {})
     return [program for tool, options in tools.items() for program in programs_of(tool, options)]
 
 
 def _standard(files: Sequence[dict[str, Any]]) -> str:
-    """GHDL reads all files by one standard."""
+    """The VHDL standard, which in GHDL is the same for all files."""
     return "08" if any(file["file_type"].endswith("-2008") for file in files) else "93"

@@ -1,4 +1,4 @@
-"""Who takes the messages of a bag: each topic's way to the subscribers of a system."""
+"""Routes the messages of a bag: each topic to the subscribers of a system."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ Message = tuple[Middleware, MessageName]
 
 @dataclass(frozen=True)
 class Route:
-    """Who takes the messages of a stream, and why they cannot if they cannot."""
+    """The subscribers of a stream, and the reason if they cannot take its messages."""
 
     subscribers: tuple[Topic, ...]
     misfit: str = ""
 
 
 def renamed(topics: Iterable[AnyTopic], names: Mapping[str, str]) -> list[AnyTopic]:
-    """The topics, those of some blocks under other `names`."""
+    """The topics, with the topics of some blocks renamed to `names`."""
     return [replace(item, given_name=names.get(item.block, item.given_name)) for item in topics]
 
 
 def routes_of(
     bag: Bag, subscribers: Sequence[Topic], signatures: Mapping[Message, str] | None = None
 ) -> dict[Stream, Route]:
-    """The route of each stream that has one; all streams of a topic have one, or none.
+    """The route of each stream that has one; either all streams of a topic have a route, or none.
 
-    A topic goes to all subscribers whose topic is called so. One that has none such in the bag takes the only topic of
-    its type, if it is the only subscriber of it. `signatures` are those of the system's messages, where they are known.
-    Raises `InputError` with every topic that does not fit.
+    A topic goes to all subscribers with the same topic name. A subscriber whose name is not in the bag takes the only
+    topic of its type, if it is the only such subscriber. `signatures` are those of the system's messages, as far as
+    known. Raises `InputError` with every topic that does not fit.
     """
     return _Routing(bag, subscribers, signatures or {}).routes()
 
 
 @dataclass
 class _Routing:
-    """The making of routes."""
+    """Computes routes."""
 
     bag: Bag
     subscribers: Sequence[Topic]
@@ -73,7 +73,7 @@ class _Routing:
         return tuple(item for item in self.subscribers if item.name == absolute_name(topic))
 
     def _only_topic(self, subscriber: Topic, takers: Mapping[str, Sequence[Topic]]) -> str:
-        """The topic of a subscriber that no topic is called like; empty if there is none, or no single one."""
+        """The only topic that fits a subscriber whose name is not in the bag; empty if there is not exactly one."""
         streams = self.bag.streams
         topics = [item.topic for item in streams if not takers[item.topic] and self._fits(item, subscriber)]
         rivals = [item for item in self.subscribers if _meant(item) == _meant(subscriber)]
@@ -93,12 +93,12 @@ class _Routing:
         return self._is_of(stream, subscriber) and self.bag.form.ros == subscriber.frame.ros
 
     def _is_of(self, stream: Stream, subscriber: Topic) -> bool:
-        """Whether a stream has the subscriber's message by name, in whichever version of ROS."""
+        """Whether a stream's message has the name of the subscriber's, in either version of ROS."""
         name = _message(stream)
         return name is not None and _present(name, self.bag.form.ros) == _meant(subscriber)
 
     def _check_versions(self, takers: Mapping[str, Sequence[Topic]]) -> None:
-        """Note each topic of a message that the system takes of the other version of ROS alone."""
+        """Add a fault for each topic whose message the system takes only in the other version of ROS."""
         ros = self.bag.form.ros
         for stream in self.bag.streams:
             fitting = [item for item in self.subscribers if self._is_of(stream, item)]
@@ -108,7 +108,7 @@ class _Routing:
                 self.faults.error(f"topic {stream.topic} of {self.bag.path} {versions}")
 
     def _misfit(self, stream: Stream, subscribers: Sequence[Topic]) -> str:
-        """Why subscribers cannot take a stream that is theirs by name; empty if they can."""
+        """Why subscribers cannot take a stream that matches them by name; empty if they can."""
         for item in subscribers:
             wanted = item.frame.message
             if not self._is_of(stream, item):
@@ -121,7 +121,7 @@ class _Routing:
         return ""
 
     def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
-        """What the bag says of a message: that of its definition, too, as not every writer knows all rules."""
+        """The bag's signatures of a message: the given one and, since some writers err, that of its definition."""
         said = [stream.signature] if _is_signature(stream.signature) else []
         if stream.definition and (defined := signature_of_text(message, stream.definition, self.bag.form.ros)):
             said.append(defined)
@@ -129,7 +129,7 @@ class _Routing:
 
 
 def _message(stream: Stream) -> MessageName | None:
-    """The message of a stream; None if it is none that a specification can name."""
+    """The message of a stream; None if a specification cannot name it."""
     try:
         return parse_name(stream.type)
     except InputError:
@@ -141,7 +141,7 @@ def _meant(topic: Topic) -> MessageName:
 
 
 def _present(name: MessageName, ros: Middleware) -> MessageName:
-    """The present name of a message that may have had another one."""
+    """The present name of a message that may have been renamed."""
     return ros.aliases.get(name, name)
 
 
@@ -150,14 +150,14 @@ def _spelled(stream: Stream) -> str:
 
 
 def _is_signature(text: str) -> bool:
-    """Whether a bag says something; ROS 1 has `*` for any message, and old bags of ROS 2 have nothing."""
+    """Whether the text is a signature; ROS 1 has `*` for any message, and old bags of ROS 2 have none."""
     return text.startswith("RIHS01_") or re.fullmatch(r"[0-9a-f]{32}", text) is not None
 
 
 def read_bag(
     path: Path, subscribers: Sequence[Topic], hint: str = BAGS
 ) -> Iterator[tuple[Topic, bytes, dict[str, Any]]]:
-    """Subscriber, payload and decoded message of all messages that somebody takes, by time. Raises `InputError`."""
+    """Yield subscriber, payload and decoded message of all routed messages, in order of time. Raises `InputError`."""
     with open_bag(path, hint) as bag:
         routes = routes_of(bag, subscribers)
         for stream, route in routes.items():

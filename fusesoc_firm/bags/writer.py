@@ -1,4 +1,4 @@
-"""Bags to write: each appears when it is complete, and the same messages give the same bytes."""
+"""Writes bags: each appears when it is complete, and the same messages give the same bytes."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from fusesoc_firm.text.outputs import check_parent
 
 _FILES = {".bag": Form.ROS1, ".mcap": Form.MCAP, ".db3": Form.SQLITE3}
 _PLUGINS = {Form.SQLITE3: StoragePlugin.SQLITE3, Form.MCAP: StoragePlugin.MCAP}
-# What the folder of a bag may hold and be one that may be replaced.
+# A folder with only these files counts as a bag and may be replaced.
 _IN_A_BAG = ("metadata.yaml", "*.db3", "*.mcap", "*.db3.zstd", "*.mcap.zstd")
 
 
 @dataclass(frozen=True)
 class RecordedTopic:
-    """A topic with its type, such as geometry_msgs/msg/Point, and what that means to its reader."""
+    """A topic with its type, such as geometry_msgs/msg/Point, and the definition and signature of the type."""
 
     name: str
     type: str
@@ -39,7 +39,7 @@ class RecordedTopic:
 
     @classmethod
     def of(cls, name: str, definitions: Definitions) -> RecordedTopic:
-        """The topic of the last message of `definitions`, which hold all within it."""
+        """The topic of the last message in `definitions`, which contains all nested messages."""
         message = list(definitions)[-1]
         kind = definitions[message].kind
         type_ = f"{message.package}/{kind}/{message.name}"
@@ -48,17 +48,17 @@ class RecordedTopic:
 
 @dataclass
 class BagWriter:
-    """A bag that is being written; it has every topic, even one without a message."""
+    """A bag being written; it contains every topic, even those without messages."""
 
     _writer: Rosbag1Writer | Rosbag2Writer
     _connections: dict[RecordedTopic, Connection] = field(default_factory=dict)
 
     def add(self, topic: RecordedTopic) -> None:
-        """Let the bag have a topic; a second time changes nothing."""
+        """Add a topic; adding it again has no effect."""
         if topic in self._connections:
             return
         if isinstance(self._writer, Rosbag1Writer):
-            # ROS 1 knows no kinds of messages, rosbags' writer only this one.
+            # ROS 1 has no kinds of interface, and rosbags' writer expects this one.
             type_ = "/msg/".join(topic.type.split("/")[::2])
             made = self._writer.add_connection(topic.name, type_, msgdef=topic.definition, md5sum=topic.signature)
         else:
@@ -71,12 +71,12 @@ class BagWriter:
 
 
 def form_of(path: Path) -> Form | None:
-    """The form that a bag's name says: that of a file with its ending, if it has one."""
+    """The format that a bag's ending implies, or None."""
     return _FILES.get(path.suffix)
 
 
 def check_writable(path: Path, *, force: bool) -> None:
-    """Raise `InputError` if there is something that must not, or without `force` should not, be replaced."""
+    """Raise `InputError` if `path` holds something that must not, or without `force` should not, be replaced."""
     check_parent(path)
     if path.is_dir() and (other := next((file for file in path.iterdir() if not _is_of_bag(file)), None)):
         fail(f"{path} is a folder, and no bag's: it holds {other.name}")
@@ -90,7 +90,7 @@ def _is_of_bag(file: Path) -> bool:
 
 @contextmanager
 def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterator[BagWriter]:
-    """A bag at `path` with some topics; it takes the place of what is there at the context's end, unless that fails.
+    """Write a bag with some topics; if the context ends without an error, the bag replaces what is at `path`.
 
     Raises `InputError` if it cannot be written.
     """
@@ -110,9 +110,9 @@ def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterat
 
 
 def _put(made: Path, path: Path) -> None:
-    """Let a bag take its place."""
+    """Move a bag to its place."""
     if path.suffix in _FILES and made.is_dir():
-        # A bag of ROS 2 as one file: the folder has it beside its metadata, which it holds, too.
+        # A ROS 2 bag as a single file: the folder also contains metadata, which the file contains, too.
         made = made / f"{path.name}{path.suffix}"
     if path.is_dir():
         shutil.rmtree(path)

@@ -1,4 +1,4 @@
-"""Builds on the machines of a Dask cluster that share the folder: each is a `firm build` there."""
+"""Runs builds on the machines of a Dask cluster that share the folder: each is a `firm build` there."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.pool import SHOWN_LINES, Outcome
 from fusesoc_firm.tools.workers import Workers
 
-# What a worker must be told of the environment; where its programs are, it knows itself.
+# The environment variables that workers need; they know the paths of their own programs.
 _PREFIXES = ("FUSESOC", "EDALIZE", "ROS_", "AMENT_")
 _POLL_SECONDS = 0.2
 
 
 @dataclass(frozen=True)
 class _Task:
-    """A build, with the arguments of `firm build`, and a file that is there as long as it is wanted."""
+    """A build, with the arguments of `firm build`, and a file that exists as long as the build is wanted."""
 
     build: Build
     arguments: tuple[str, ...]
@@ -39,7 +39,7 @@ class _Result:
 
 
 def build_on(workers: Workers, plan: Plan, arguments: Sequence[str]) -> Iterator[Outcome]:
-    """Each build's outcome, as they come, of `firm build` with these arguments. When it is left, none runs on."""
+    """Yield each build's outcome as it finishes, of `firm build` with these arguments. All builds end on exit."""
     wanted = plan.build_root / f".firm_build.{token_hex(8)}"
     plan.build_root.mkdir(parents=True, exist_ok=True)
     wanted.touch()
@@ -47,7 +47,7 @@ def build_on(workers: Workers, plan: Plan, arguments: Sequence[str]) -> Iterator
     tasks = [_Task(build, tuple(arguments), Path.cwd(), environment, wanted) for build in plan.builds]
     try:
         for task, result in workers.run(_build, tasks):
-            # What it printed ends with the last lines of its log.
+            # Its output ends with the last lines of its log.
             lines = () if result.status == 0 else tuple(result.output.splitlines()[-SHOWN_LINES:])
             yield Outcome(task.build, result.status == 0, result.seconds, lines)
     finally:
@@ -55,7 +55,7 @@ def build_on(workers: Workers, plan: Plan, arguments: Sequence[str]) -> Iterator
 
 
 def _build(task: _Task) -> _Result:
-    """A build on this machine, until it is done or not wanted any more."""
+    """Run a build on this machine until it finishes or is no longer wanted."""
     command = [sys.executable, "-m", "fusesoc_firm.cli", "build", task.build.core, "--target", task.build.target]
     started = time.monotonic()
     with subprocess.Popen(

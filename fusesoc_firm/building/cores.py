@@ -1,6 +1,6 @@
-"""The cores that FuseSoC knows here: what each consists of, and which of them an edit touches.
+"""The cores in FuseSoC's libraries: their parts, and those that an edit affects.
 
-What a core consists of is read for all its targets and flags together, so nothing that some build uses is left out.
+A core is read for all its targets and flags together, so that nothing that any build uses is missing.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ GRAPH_TEMPLATE = "dot/cores.dot"
 
 @dataclass(frozen=True)
 class ProjectCore:
-    """A core: its name, its files with its description first, what it depends on, the calls of generators it makes.
+    """A core: its name, its files with the `.core` file first, its dependencies, and its generator calls.
 
-    `names` are those by which others can depend on it, and `depends` names of that kind: vendor, library and name.
+    `names` are those by which others can depend on it, and `depends` are such names: vendor, library and name.
     """
 
     vlnv: str
@@ -45,7 +45,7 @@ def project_cores() -> list[ProjectCore]:
 def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
     """A core, and all others that one of its targets depends on, sorted by name.
 
-    Raises `InputError` if there is no such core, or if something that it depends on is missing.
+    Raises `InputError` if the core or one of its dependencies is missing.
     """
     fusesoc, top = _found(core)
     needed: dict[str, Path] = {}
@@ -56,9 +56,9 @@ def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
 
 
 def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
-    """The cores that are touched themselves or depend on such a core, each with the reason, in the order of `cores`.
+    """The cores that are touched, or depend on such a core, each with the reason, in the order of `cores`.
 
-    `touches` says what of a core itself is touched, or None.
+    `touches` returns the part of a core that is touched, or None.
     """
     cores = list(cores)
     reasons = {core.vlnv: reason for core in cores if (reason := touches(core))}
@@ -74,12 +74,12 @@ def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str 
 
 
 def changed_files(revision: str, folder: Path) -> list[Path]:
-    """The files of the repository around `folder` that differ from a revision, new and removed ones too, absolute.
+    """The absolute paths of the repository's files that differ from a revision, including new and removed ones.
 
-    Raises `InputError` if there is no repository or no such revision.
+    The repository is the one around `folder`. Raises `InputError` if the repository or the revision is missing.
     """
     root = Path(_git(folder, "rev-parse", "--show-toplevel").rstrip("\n"))
-    # As a commit: what begins with a dash is no option then.
+    # Resolved to a commit, so that a leading dash cannot be read as an option.
     commit = _git(folder, "rev-parse", "--verify", "--end-of-options", f"{revision}^{{commit}}").strip()
     listed = _git(root, "diff", "--name-only", "--no-renames", "-z", commit)
     listed += _git(root, "ls-files", "--others", "--exclude-standard", "-z")
@@ -97,9 +97,9 @@ def _git(folder: Path, *arguments: str) -> str:
 
 
 def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list[str]]) -> str:
-    """What a target of a core depends on, in Graphviz's language: cores, what is generated for them, and of what.
+    """The dependencies of a core's target in Graphviz's language: cores, generated cores, and their inputs.
 
-    Raises `InputError` if there is no such core or target, or if something that it depends on is missing.
+    Raises `InputError` if the core, the target or a dependency is missing.
     """
     fusesoc, top = _found(core)
     cores = solved(fusesoc, top, target)
@@ -128,16 +128,16 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
 
 
 def configuration() -> Any:
-    """What FuseSoC is configured to in the current folder, as its own command reads it."""
+    """FuseSoC's configuration in the current folder, as its own command reads it."""
     from fusesoc.config import Config
 
     return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
 
 
 def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, Any]]]:
-    """All cores of a target, those that others depend on first, the core itself last, each with its flags.
+    """All cores of a target with their flags, dependencies first and the core itself last.
 
-    Raises `InputError` if there is no such target, or if something that it depends on is missing.
+    Raises `InputError` if the target or a dependency is missing.
     """
     from fusesoc.coremanager import DependencyError
 
@@ -164,7 +164,7 @@ def _found(core: str) -> tuple[Any, Any]:
 
 
 def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:
-    """The calls of generators that a core of FuseSoC makes with these flags."""
+    """Yield the generator calls that a FuseSoC core makes with these flags."""
     for call in core.get_ttptttg(dict(flags)):
         yield _call(str(core.name), call["name"], call["generator"], core.files_root, call["config"])
 
@@ -185,7 +185,7 @@ def _core(vlnv: str, path: Path) -> ProjectCore:
 
 
 def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
-    """The call of each instance, and again with the parameters that a target changes."""
+    """Yield the call of each instance, and another one for each target that changes its parameters."""
     known = core.section("generate")
     changes: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
     for target in core.section("targets").values():
@@ -204,12 +204,12 @@ def _call(vlnv: str, instance: str, generator: str, folder: Path | str, paramete
 
 
 def _names(core: CoreFile) -> list[str]:
-    """The names that a core has or stands for."""
+    """The core's own name and the virtual names that it provides."""
     return [_short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
 
 
 def _listed(section: Mapping[str, Any], key: str) -> list[Any]:
-    """A list of a section, with what it adds to an inherited one."""
+    """A list in a section, including additions to an inherited list."""
     return [item for name in (key, f"{key}_append") for item in section.get(name) or ()]
 
 
@@ -219,7 +219,7 @@ def _file(item: object) -> str:
 
 
 def _words(item: object) -> list[str]:
-    """What a text means for any flags: `target_sim ? (x)` is x. One that FuseSoC refuses stays as it is."""
+    """The words of a text under all flags: `target_sim ? (x)` gives x. Text that FuseSoC rejects is unchanged."""
     from fusesoc.capi2.exprs import parse
 
     def words(tree: Iterable[Any]) -> Iterator[str]:
@@ -233,7 +233,7 @@ def _words(item: object) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """Vendor, library and name of a core, whatever its version. A name that FuseSoC refuses stays as it is."""
+    """Vendor, library and name of a core, without version. A name that FuseSoC rejects is unchanged."""
     from fusesoc.vlnv import Vlnv
 
     try:

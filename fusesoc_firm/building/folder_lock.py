@@ -1,14 +1,14 @@
-"""A lock on a folder of the build root, for one build at a time, on this machine and on all that share it.
+"""A lock on a folder of the build root, for one build at a time, on this machine and all that share the folder.
 
-FuseSoC and the tools behind it take a work root to be theirs alone. The lock is a file beside it, which is linked into
-its place: that either happens or fails, on network folders too, where locks of the system (`text/file_lock.py`) may
-hold on one machine only. It names its owner. An owner on this machine is gone when its process is; one on another
-machine when it has not touched the file for a while, which is seen by the file's time changing, so clocks are not
+FuseSoC and the tools that it starts assume exclusive use of a work root. The lock is a file next to it, put in place by
+a hard link. Linking either succeeds or fails, even on network folders, where system locks (`text/file_lock.py`) may
+cover only one machine. The file names the owner. An owner on this machine is gone when its process is; one on another
+machine is gone when it has not touched the file for a while. Only changes of the file's time count, so clocks are not
 compared.
 
-A lock whose owner is gone is removed under a lock of the system, so of several who wait only one removes it. Where that
-one does not hold between machines, two of them might do so at the same instant; then one owner finds that the lock is
-its own no more, and `beat` tells.
+A lock whose owner is gone is removed under a system lock, so that only one waiting process removes it. If the system
+lock does not work between machines, two of them might remove it at the same instant; one owner then loses its lock, and
+`beat` reports this.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from pathlib import Path
 from fusesoc_firm.text.file_lock import locked
 
 BEAT_SECONDS = 2.0
-"""How often an owner has to call `beat`."""
+"""The longest time in seconds between an owner's calls of `beat`."""
 _SILENT_SECONDS = 30.0
-# What a process starts is ended with it, but not in the same instant.
+# The processes that an owner started end with it, but not at the same instant.
 _GRACE_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
 class Owner:
-    """Who has a lock: a process, when it was started, the machine as the system knows it, and as people do."""
+    """The owner of a lock: a process, its start time, and the machine by its system id and its name."""
 
     token: str
     machine: str
@@ -47,15 +47,15 @@ class Owner:
 
 @dataclass
 class FolderLock:
-    """The lock of which the file is `path`; its folder is made. Not for several threads."""
+    """The lock in the file `path`, whose folder is created. Not thread-safe."""
 
     path: Path
     _mine: Owner | None = field(default=None, init=False)
-    # The owner that is waited for, the time of its file, and since when that has been so.
+    # The owner being waited for, the time of its file, and since when both are unchanged.
     _watched: tuple[Owner, int, float] | None = field(default=None, init=False)
 
     def acquire(self) -> Owner | None:
-        """Take the lock and return None; if somebody has it, return who, at once. Raises `OSError`."""
+        """Take the lock and return None, or return its present owner at once. Raises `OSError`."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         mine = Owner(secrets.token_hex(8), _machine(), os.getpid(), _started(os.getpid()), socket.gethostname())
         new = self.path.with_name(f"{self.path.name}.{mine.token}")
@@ -75,7 +75,7 @@ class FolderLock:
             new.unlink(missing_ok=True)
 
     def beat(self) -> bool:
-        """Show that the owner lives; False if the lock is its own no more."""
+        """Show that the owner is alive; False if it has lost the lock."""
         if self._mine is None or _owner(self.path) != self._mine:
             return False
         with suppress(FileNotFoundError):
@@ -83,7 +83,7 @@ class FolderLock:
         return True
 
     def release(self) -> None:
-        """Let others have it."""
+        """Release the lock."""
         if self._mine:
             with locked(self.path.parent):
                 if _owner(self.path) == self._mine:
@@ -109,18 +109,18 @@ class FolderLock:
 
 
 def _owner(path: Path) -> Owner | None:
-    """Who has the lock; None if nobody has."""
+    """The owner of the lock; None if it is free."""
     try:
         return Owner(**json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
         return None
     except (ValueError, TypeError, RecursionError):
-        # Damaged: it is removed when nobody has touched it for a while.
+        # A damaged file is removed when it has not been touched for a while.
         return Owner("", "", 0, "", "an unknown machine")
 
 
 def _machine() -> str:
-    """What tells machines apart, and containers in which the same process has another number."""
+    """An id of the machine, or of a container, in which process numbers differ."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
         return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
@@ -129,9 +129,9 @@ def _machine() -> str:
 
 
 def _started(process: int) -> str:
-    """When a process was started, as the system counts; "" if there is none."""
+    """The start time of a process, as the system counts it; "" if the process does not exist."""
     try:
-        # Behind the name in parentheses, which may hold blanks.
+        # The fields follow the name in parentheses, which may contain blanks.
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]
     except (FileNotFoundError, ProcessLookupError):
         return ""

@@ -1,4 +1,4 @@
-"""What is to be built: cores and targets as FuseSoC knows them, where each is built, and what is generated for it."""
+"""The plan of what to build: cores and targets in FuseSoC, their build folders, and their generated cores."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 @dataclass(frozen=True)
 class Build:
-    """A target of a core (its full name), and the folder that it is built in."""
+    """A target of a core (by its full name), and its build folder."""
 
     core: str
     target: str
@@ -24,12 +24,12 @@ class Build:
 
     @property
     def log(self) -> Path:
-        """Where its output goes."""
+        """The file for its output."""
         return self.work_root.with_name(f"{self.work_root.name}.log")
 
     @property
     def lock(self) -> Path:
-        """The file that says who works in its folder."""
+        """The lock file of its folder."""
         return self.work_root.with_name(f"{self.work_root.name}.lock")
 
     def __str__(self) -> str:
@@ -38,14 +38,14 @@ class Build:
 
 @dataclass(frozen=True)
 class Plan:
-    """Builds, and FuseSoC itself with its libraries read, to do them."""
+    """A list of builds, and a FuseSoC instance with its libraries loaded."""
 
     fusesoc: Any = field(repr=False)
     build_root: Path
     builds: tuple[Build, ...]
 
     def generator_calls(self) -> list[GeneratorCall]:
-        """All that is to be generated, once each. Raises `InputError` if something that is depended on is missing."""
+        """All generator calls, each once. Raises `InputError` if a dependency is missing."""
         found: dict[tuple[str, str, str], GeneratorCall] = {}
         for build in self.builds:
             for core, flags in self._cores(build):
@@ -54,7 +54,7 @@ class Plan:
         return list(found.values())
 
     def fetch(self) -> None:
-        """Have FuseSoC download the cores that are kept elsewhere, which it cannot do several times at once."""
+        """Download remote cores with FuseSoC, which cannot do this in parallel."""
         for build in self.builds:
             for core, _ in self._cores(build):
                 if core.provider and core.cache_status() != "downloaded":
@@ -71,14 +71,14 @@ class Plan:
 
 
 def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | None = None) -> Plan:
-    """Every one of the targets of every one of the cores, once, with the configuration that FuseSoC has here.
+    """A plan of all targets of all cores, each once, with FuseSoC's configuration in the current folder.
 
-    Raises `InputError` with all cores and targets that there are not.
+    Raises `InputError` with all unknown cores and targets.
     """
     from fusesoc.fusesoc import Fusesoc
 
     config = configuration()
-    # One folder for all that is built is no place for many builds.
+    # A single work root would be shared by all builds.
     config.args_work_root = None
     config.args_build_root = str(Path(build_root or config.build_root).absolute())
     fusesoc = Fusesoc(config)
@@ -94,9 +94,9 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
 
 
 def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnostics) -> str | None:
-    """The full name of a core; without a colon it is the name alone, as for `fusesoc run`.
+    """The full name of a core; a name without a colon is the bare name, as for `fusesoc run`.
 
-    For an unknown core, those that have all the targets are listed.
+    For an unknown core, the cores with all the targets are listed.
     """
     from fusesoc.coremanager import DependencyError
 
@@ -115,7 +115,7 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
 
 
 def _flags(fusesoc: Any, name: str, target: str, faults: Diagnostics) -> dict[str, Any] | None:
-    """The flags of a target; None, and it is said, if it cannot be built."""
+    """The flags of a target; None, with a fault added, if it cannot be built."""
     core = fusesoc.get_core(name)
     known = core.get_data({}).targets
     if target not in known:

@@ -1,4 +1,4 @@
-"""Builds on this machine, several at once; of one place in the build root, one at a time."""
+"""Runs several builds on this machine at once, but only one at a time in each build folder."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.process import build_in_this_process, last_lines
 
 _POLL_SECONDS = 0.2
-# Between being asked to end and being made to.
+# Between the request to end and the kill.
 _PATIENCE_SECONDS = 5.0
 _END_POLL_SECONDS = 0.02
 SHOWN_LINES = 20
-"""Of the log of a build that failed."""
+"""The number of lines shown of a failed build's log."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a build: whether all went well, the seconds it took, and the last lines of its log if not."""
+    """The result of a build: success, the duration in seconds and, after a failure, the last lines of its log."""
 
     build: Build
     is_good: bool
@@ -44,14 +44,14 @@ class _Running:
 
 @dataclass(frozen=True)
 class Pool:
-    """Does builds with the options of `fusesoc run`, at most `jobs` at once; `tell` hears of those that wait."""
+    """Runs builds with the options of `fusesoc run`, at most `jobs` at once; calls `tell` for builds that must wait."""
 
     options: tuple[str, ...]
     jobs: int
     tell: Callable[[str], None]
 
     def run(self, plan: Plan) -> Iterator[Outcome]:
-        """Each build's outcome, as they come. Whenever it is left, nothing that it started runs on."""
+        """Yield each build's outcome as it finishes. On exit, all processes that it started are ended."""
         waiting = {build: FolderLock(build.lock) for build in plan.builds}
         running: list[_Running] = []
         told: set[Build] = set()
@@ -88,7 +88,7 @@ class Pool:
 
 
 def _holds(item: _Running) -> bool:
-    """Whether a build still has its place; shows from time to time that it does."""
+    """Whether a build still holds its folder's lock; renews the lock from time to time."""
     if time.monotonic() - item.beaten < BEAT_SECONDS:
         return True
     item.beaten = time.monotonic()
@@ -110,7 +110,7 @@ def _finish(item: _Running) -> Outcome:
 
 
 def _end(items: list[_Running]) -> None:
-    """End what builds have started, as far as it runs, then let others have their places."""
+    """End the running processes of builds, then release their locks."""
     patience = time.monotonic() + _PATIENCE_SECONDS
     for item in items:
         _signal(item.process, signal.SIGTERM)
@@ -124,12 +124,12 @@ def _end(items: list[_Running]) -> None:
 
 
 def _signal(process: BaseProcess, number: signal.Signals) -> bool:
-    """Signal a build and all that it started; False if nothing of it is left."""
+    """Signal a build and all its processes; False if none is left."""
     assert process.pid
     try:
         os.killpg(process.pid, number)
     except ProcessLookupError:
-        # It leads no group yet, or is no more.
+        # The process does not lead its group yet, or has ended.
         if process.is_alive():
             os.kill(process.pid, number)
         return process.is_alive()

@@ -1,8 +1,7 @@
-"""One build, in a process of its own: FuseSoC's `run`, with all output in a log.
+"""Runs one build in a process of its own: FuseSoC's `run`, with all output in a log.
 
-The process is a copy of one in which FuseSoC has read its libraries already. It leads a group of its own, in which all
-programs that it starts are too, so that they can be ended together; they are also ended if the process that started it
-is no more.
+The process is a copy of one in which FuseSoC has already read its libraries. It leads a process group that contains all
+programs it starts, so that they can be ended together; they also end when the parent process does.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ from typing import Any
 from fusesoc_firm.building.plan import Build
 
 Answer = Callable[[list[str]], bool]
-"""Answers a generator call, of which it takes the command line, in the current folder; False if FuseSoC is to do it."""
+"""Answers the generator call with this command line in the current folder; returns False to leave it to FuseSoC."""
 
 
 def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], alive: tuple[int, int]) -> None:
-    """Do a build with the options of `fusesoc run`; exits with its status.
+    """Run a build with the options of `fusesoc run`, and exit with its status.
 
     `alive` is a pipe that ends when the parent does, once its other end is closed here.
     """
@@ -35,16 +34,16 @@ def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], 
     log = build.log.open("w", buffering=1, encoding="utf-8", errors="backslashreplace")
     for stream in (1, 2):
         os.dup2(log.fileno(), stream)
-    # By lines, so that they stand in order with those of the programs that are started.
+    # Line buffering keeps the order with the output of started programs.
     sys.stdout = sys.stderr = log
     _run(fusesoc, build, options)
 
 
 def save_time(answer: Answer) -> None:
-    """Spare FuseSoC two costs of each generated core: a process for its generator, and compiling a schema anew.
+    """Save FuseSoC two costs for each generated core: a process for its generator, and recompiling a schema.
 
-    This holds for the process and its copies. It changes nothing but the time: where FuseSoC does not have the names
-    that are replaced here, it takes longer.
+    This applies to the process and its copies. It affects only the time: if FuseSoC lacks the names that are replaced
+    here, builds take longer.
     """
     from fusesoc import edalizer
 
@@ -52,12 +51,12 @@ def save_time(answer: Answer) -> None:
         edalizer.Launcher = _answering(edalizer.Launcher, answer)
     if hasattr(edalizer, "Core2Parser"):
         edalizer.Core2Parser = cache(edalizer.Core2Parser)
-        # As FuseSoC does, so that copies of the process have it.
+        # The same call as FuseSoC's, so that copies of the process inherit the result.
         edalizer.Core2Parser(False, allow_additional_properties=False)
 
 
 def _answering(launcher: Any, answer: Answer) -> type:
-    """FuseSoC's class that starts a generator, which asks `answer` first."""
+    """A subclass of FuseSoC's launcher of generators, which calls `answer` first."""
 
     class Launcher(launcher):  # type: ignore[misc]
         def run(self) -> None:
@@ -79,13 +78,13 @@ def _run(fusesoc: Any, build: Build, options: tuple[str, ...]) -> None:
 
 
 def _end_with(alive: int) -> None:
-    """Wait until the parent is no more, then end this process and all that it started."""
+    """Wait until the parent has ended, then kill this process and all that it started."""
     os.read(alive, 1)
     os.killpg(0, signal.SIGKILL)
 
 
 def last_lines(path: Path, count: int) -> list[str]:
-    """The end of a log; none if there is none."""
+    """The last lines of a log; empty if there is no log."""
     try:
         return path.read_text(encoding="utf-8", errors="replace").splitlines()[-count:]
     except FileNotFoundError:

@@ -1,7 +1,7 @@
-"""Frames in Python: a message as nested dictionaries and lists to payload bytes, and back.
+"""Encodes and decodes frames in Python: nested dictionaries and lists to payload bytes, and back.
 
-The codec follows the same Frame that the hardware is made of. It is the tool of stimuli and reports, never
-the judge of the converters: those are compared with serialisers that are not ours.
+The codec uses the same Frame as the hardware generator. It serves stimuli and reports. It never verifies the
+converters: independent serialisers do this.
 """
 
 from fusesoc_firm.frame.decoder import decode, used_bytes

@@ -1,4 +1,4 @@
-"""Payload bytes -> a message as nested dictionaries and lists, and which of the bytes hold it."""
+"""Decodes payload bytes to nested dictionaries and lists, and finds the bytes that carry values."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from fusesoc_firm.frame.values import CodecError, check_bound, dotted, put, put_
 
 
 def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
-    """The message of a payload; numbers are Python numbers, arrays lists, but `bytes` for a variable one of `uint8`.
+    """Decode a payload. Numbers become Python numbers, arrays lists, and variable arrays of `uint8` `bytes`.
 
     Raises:
-        CodecError: the payload is too short or too long, of another encoding, or holds what no message can.
+        CodecError: the payload is too short or too long, has another encoding, or holds invalid values.
     """
     return _read(frame, payload)[0]
 
 
 def used_bytes(frame: Frame, payload: bytes) -> bytes:
-    """One byte for each byte of the payload: 1 where a value, a count or the prefix lies, 0 where only padding does.
+    """One byte for each byte of the payload: 1 for a value, a count or the prefix, 0 for padding.
 
-    Raises `CodecError` as `decode` does.
+    Raises `CodecError` like `decode`.
     """
     used = bytearray(len(payload))
     for first, end in _read(frame, payload)[1]:
@@ -30,7 +30,7 @@ def used_bytes(frame: Frame, payload: bytes) -> bytes:
 
 
 def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int]]]:
-    """The message, and the parts of the payload (first, end) that hold it."""
+    """The message, and the ranges (first, end) of the payload that carry it."""
     if frame.is_fixed_size and not 0 <= len(payload) - frame.payload_bytes <= frame.trailing_bytes:
         raise CodecError(f"{frame.message} takes {frame.payload_bytes} bytes, not {len(payload)}")
     checked = payload[: frame.checked_prefix]
@@ -44,7 +44,7 @@ def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int,
 
 
 class _Reader:
-    """The next byte's `position` in the payload; `used` are the parts (first, end) that hold something."""
+    """Reads a payload from `position` on; `used` lists the ranges (first, end) that carry values."""
 
     def __init__(self, frame: Frame, payload: bytes) -> None:
         self.position = 0
@@ -53,7 +53,7 @@ class _Reader:
         self._payload = payload
 
     def read(self, nodes: Sequence[Node], depth: int) -> Any:
-        """The message, or the element of a loop, that `nodes` hold; `depth` names lead to it."""
+        """Read the message, or the loop's element, that `nodes` describe; `depth` is the number of names above it."""
         message: dict[str, Any] = {}
         leaves: dict[Path, list[Any]] = {}
         for node in nodes:
@@ -63,7 +63,7 @@ class _Reader:
                 case Pad(alignment):
                     self._align(alignment)
                 case Data() | Loop():
-                    # What came before is put first, so that a message has its fields in wire order.
+                    # Earlier leaves are stored first, so that a message has its fields in wire order.
                     _put_leaves(message, leaves, depth)
                     value = self._data(node) if isinstance(node, Data) else self._loop(node)
                     if len(node.path) == depth:
@@ -125,7 +125,7 @@ class _Reader:
 
 
 def _put_leaves(message: dict[str, Any], leaves: dict[Path, list[Any]], depth: int) -> None:
-    """Put the leaves' elements into the message, and forget them."""
+    """Store the leaves' elements in the message, and clear `leaves`."""
     for path, elements in leaves.items():
         put_leaf(message, path[depth:], iter(elements))
     leaves.clear()

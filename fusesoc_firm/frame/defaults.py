@@ -1,4 +1,4 @@
-"""What is sent for a field that nobody gives a value: its default, or zeros."""
+"""Computes the bytes of fields without a value: the default, or zeros."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fusesoc_firm.message.model import Scalar
 
 
 def default_bytes(node: Fixed) -> bytes:
-    """The bytes of a `Fixed` whose fields all have their defaults; zeros where there is none, in padding and prefix.
+    """The bytes of a `Fixed` with all fields at their defaults; fields without one, padding and prefix are zero.
 
     Every element of an array of messages has the defaults of its members.
     """
@@ -27,7 +27,7 @@ def default_bytes(node: Fixed) -> bytes:
 
 
 def default_elements(leaf: FrameField) -> Iterator[tuple[int, bytes]]:
-    """The offset and bytes of each element of a leaf that lies here, if it has a default."""
+    """Yield the offset and bytes of each element of a leaf in this node, if the leaf has a default."""
     if leaf.default is not None:
         given = leaf.default if isinstance(leaf.default, tuple) else (leaf.default,)
         for number, offset in enumerate(leaf.offsets, leaf.first):
@@ -35,15 +35,15 @@ def default_elements(leaf: FrameField) -> Iterator[tuple[int, bytes]]:
 
 
 def default_payload(frame: Frame) -> bytes:
-    """The payload of a message of fixed size whose fields all have their defaults."""
+    """The payload of a message of fixed size with all fields at their defaults."""
     payload = b"".join(default_bytes(node) for node in frame.nodes if isinstance(node, Fixed))
     return frame.prefix + payload[len(frame.prefix) :]
 
 
 def encode_used(frame: Frame, message: MessageValue) -> bytes:
-    """The payload that a publisher of the used fields sends: the other ones, which may be missing, as defaults.
+    """The payload that a publisher of the used fields sends; unused fields, which may be missing, have their defaults.
 
-    Raises `CodecError` as `encode` does.
+    Raises `CodecError` like `encode`.
     """
     if not frame.is_fixed_size:
         return encode(frame, _as_sent(frame.nodes, message, 0))
@@ -60,13 +60,13 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
 
 
 def completed(frame: Frame, message: MessageValue) -> MessageValue:
-    """The message with what is missing in it: fields that are not used, by their defaults, zero or empty."""
+    """The message with missing unused fields added: by their defaults, or as zero or empty."""
     filled: MessageValue = _filled(_as_sent(frame.nodes, message, 0), message)
     return filled
 
 
 def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
-    """A message, or an element `depth` names below it, with what is not used as its default, or empty."""
+    """A message, or an element `depth` names below it, with unused parts set to their defaults or empty."""
     sent: dict[str, Any] = deepcopy(dict(value)) if isinstance(value, Mapping) else {}
     for node in nodes:
         match node:
@@ -84,7 +84,7 @@ def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
 
 
 def _part_as_sent(node: Data | Loop) -> Any:
-    """What is sent of a part that is not used."""
+    """The value sent for an unused part."""
     if node.default is not None:
         return node.default
     if isinstance(node, Data):
@@ -98,14 +98,14 @@ def _holds_texts(loop: Loop) -> bool:
 
 
 def _defaults(leaf: FrameField) -> Iterator[Scalar]:
-    """Every element of a leaf that is not used."""
+    """Yield the elements of an unused leaf."""
     given = leaf.default if isinstance(leaf.default, tuple) else (0 if leaf.default is None else leaf.default,)
     values = (given[number % len(given)] for number in range(leaf.count))
     return (bool(value) if leaf.type.code == "?" else value for value in values)
 
 
 def _filled(default: Any, value: Any) -> Any:
-    """`value` with what is missing in it from `default`."""
+    """`value`, with missing parts taken from `default`."""
     if isinstance(default, Mapping) and isinstance(value, Mapping):
         filled = {name: _filled(inner, value[name]) for name, inner in default.items() if name in value}
         return {**default, **value, **filled}

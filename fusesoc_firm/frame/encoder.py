@@ -1,4 +1,4 @@
-"""A message as nested dictionaries and lists -> payload bytes."""
+"""Encodes a message, given as nested dictionaries and lists, as payload bytes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from fusesoc_firm.message.wire import WireType
 def encode(frame: Frame, message: MessageValue) -> bytes:
     """The payload of `message`; padding bytes are zero.
 
-    A missing field takes its default. Arrays are lists or tuples; those of `uint8` may be bytes, too.
+    A missing field takes its default. Arrays are lists or tuples; those of `uint8` may also be bytes.
 
     Raises:
         CodecError: a field has neither value nor default, a value does not fit, or a name is unknown.
@@ -39,7 +39,7 @@ def encode(frame: Frame, message: MessageValue) -> bytes:
 
 
 class _Writer:
-    """The payload so far; alignment counts from behind its first `prefix_bytes`."""
+    """The payload so far; alignment counts from the end of its `prefix_bytes`."""
 
     def __init__(self, prefix_bytes: int) -> None:
         self.payload = bytearray()
@@ -108,7 +108,7 @@ def _pack_array(node: Data, value: Any) -> BytesLike:
 
 
 def _pack(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> bytes:
-    """The values side by side. Raises `CodecError` with the first that does not fit."""
+    """The values in sequence. Raises `CodecError` for the first that does not fit."""
     try:
         return _packed(type_, values)
     except (struct.error, OverflowError, TypeError, ValueError):
@@ -121,7 +121,7 @@ def _pack(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> byt
 
 
 def _packed(type_: WireType, values: Sequence[Any]) -> bytes:
-    # `struct` takes anything for a bool: the text "False" would be sent as true.
+    # `struct` accepts any value for a bool: it would send the text "False" as true.
     if type_.code == "?" and any(value not in (False, True) for value in values):
         raise TypeError
     return packed(type_.code, values)

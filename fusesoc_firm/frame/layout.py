@@ -1,4 +1,4 @@
-"""Message -> Frame: walks a definition in wire order and notes where every element of every leaf lies."""
+"""Computes the Frame of a message: walks the definition in wire order and records the position of every element."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER, WireRules, Wire
 
 
 def frame_of(name: MessageName, definitions: Definitions) -> Frame:
-    """The frame of message `name`; `definitions` holds it and every message below it."""
+    """The frame of message `name`; `definitions` contains it and all nested messages."""
     definition = definitions[name]
     rules = definition.ros.rules
     walk = _Walk(_Types(rules, definitions), Position(rules.max_alignment, frozenset({0})), size=len(rules.prefix))
@@ -55,7 +55,7 @@ def frame_of(name: MessageName, definitions: Definitions) -> Frame:
 
 @dataclass
 class _Types:
-    """What the walk asks about types. Each answer is worked out once, as types nest and may come many times."""
+    """Properties of types. Each is computed once, since types nest and may occur many times."""
 
     rules: WireRules
     definitions: Definitions
@@ -65,7 +65,7 @@ class _Types:
     def has_fixed_size(self, type_: FieldType) -> bool:
         match type_:
             case ArrayType(element, length):
-                # No strings take no bytes.
+                # An array of no strings takes no bytes.
                 return length == 0 or self.has_fixed_size(element)
             case MessageType(name):
                 if name not in self._fixed:
@@ -75,7 +75,7 @@ class _Types:
         return isinstance(type_, PrimitiveType)
 
     def behind(self, element: ElementType, position: Position, member: Field) -> Position:
-        """The position behind an element of `member` that begins at `position`."""
+        """The position after an element of `member` that begins at `position`."""
         key = element, position
         if key not in self._ends:
             walk = _Walk(self, position, has_nodes=False)
@@ -84,9 +84,9 @@ class _Types:
         return self._ends[key]
 
     def steady(self, element: ElementType, position: Position, member: Field) -> Position:
-        """Where any element of an array begins whose first one begins at `position`: the smallest set that holds all.
+        """The smallest set of positions that holds the start of every array element if the first begins at `position`.
 
-        An element starts where the array does, or where the element before it ends.
+        An element starts where the array does, or where the previous element ends.
         """
         while (known := position.joined(self.behind(element, position, member))) != position:
             position = known
@@ -95,7 +95,7 @@ class _Types:
 
 @dataclass
 class _Leaf:
-    """A `FrameField` in the making."""
+    """A `FrameField` under construction."""
 
     type: WireType
     first: int
@@ -103,7 +103,7 @@ class _Leaf:
     runs: list[Run] = field(default_factory=list)
 
     def add(self, run: Run) -> None:
-        """Join the run to the last one where they touch."""
+        """Add a run, merged with the last one if they are adjacent."""
         last = self.runs[-1] if self.runs else None
         if last and last.offset + last.count * self.type.size == run.offset:
             self.runs[-1] = Run(last.offset, last.count + run.count)
@@ -113,10 +113,10 @@ class _Leaf:
 
 @dataclass
 class _Walk:
-    """One walk through a message or the element of a loop: what is known of the position, and the nodes so far.
+    """One walk through a message or a loop's element: the current position and the nodes so far.
 
-    `size` and `leaves` are those of the `Fixed` that is not closed yet, `passed` counts the elements of a leaf. Without
-    `has_nodes` only the position is worked out.
+    `size` and `leaves` belong to the `Fixed` that is still open; `passed` counts the elements of each leaf. Without
+    `has_nodes`, only the position is computed.
     """
 
     types: _Types
@@ -134,7 +134,7 @@ class _Walk:
             self.member(member, path)
 
     def finish(self) -> tuple[Node, ...]:
-        """The nodes, in the order of the wire."""
+        """The nodes in wire order."""
         if self.size or self.leaves:
             fields = (
                 FrameField(path, leaf.type, tuple(leaf.runs), leaf.first, leaf.default)
@@ -161,7 +161,7 @@ class _Walk:
                 self.element(element, (*path, Step(member.name)), 1, member)
 
     def element(self, element: ElementType, path: Path, count: int, member: Field) -> None:
-        """`count` elements side by side; a string only comes alone."""
+        """Add `count` adjacent elements; a string is always alone."""
         match element:
             case PrimitiveType(name) if name in self.types.rules.scalars:
                 self.values(self.types.rules.scalars[name], path, count, member.default)
@@ -186,7 +186,7 @@ class _Walk:
         self.position = self.position.advanced(size)
 
     def align(self, size: int) -> None:
-        """Go where a value of `size` bytes may start."""
+        """Move to the next legal start of a value of `size` bytes."""
         alignment = self.types.rules.alignment(size)
         padding = self.position.padding(alignment)
         if padding is None:
@@ -200,7 +200,7 @@ class _Walk:
         self.nodes.append(node)
 
     def values(self, type_: WireType, path: Path, count: int, default: DefaultValue | None) -> None:
-        """`count` values of a leaf side by side."""
+        """Add `count` adjacent values of a leaf."""
         if count:
             self.align(type_.size)
         leaf = self.leaves.setdefault(path, _Leaf(type_, self.passed[path], default))
@@ -212,7 +212,7 @@ class _Walk:
     def data(self, kind: DataKind, element: WireType, path: Path, bound: int | None, member: Field) -> None:
         rules = self.types.rules
         terminator = rules.string_terminator if kind is DataKind.STRING else 0
-        # The default of an array of strings is its loop's.
+        # The default of an array of strings belongs to its loop.
         default = None if _is_array_of_texts(member.type) else member.default
         self.align(COUNT_BYTES)
         behind_count = self.position.advanced(COUNT_BYTES)

@@ -1,7 +1,7 @@
-"""How long a payload gets: an expression over the counts of its variable parts, which hardware can compute.
+"""Computes the length of a payload: an expression over the counts of its variable parts, suited to hardware.
 
-An expression is a list of terms that are worked off from the first byte on: add bytes, pad to an alignment, repeat.
-So the padding of CDR, which depends on all that came before, needs no formula of its own.
+An expression is a list of terms, evaluated from the first byte on: add bytes, pad to an alignment, repeat. CDR's
+padding depends on all previous bytes, so this order makes a separate formula unnecessary.
 """
 
 from __future__ import annotations
@@ -13,30 +13,30 @@ from typing import Any
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, Loop, Node, Pad
 from fusesoc_firm.frame.values import MessageValue, part_of, units_of
 
-# Growth by one and the same body depends on the position modulo this at most.
+# Growth by a fixed body depends on the position modulo at most this number.
 _PERIOD = 8
 
 
 @dataclass(frozen=True)
 class Bytes:
-    """`count` bytes more."""
+    """Advance by `count` bytes."""
 
     count: int
 
 
 @dataclass(frozen=True)
 class Align:
-    """Up to a multiple of `alignment`, counted from behind the prefix."""
+    """Pad to a multiple of `alignment`, counted from the end of the prefix."""
 
     alignment: int
 
 
 @dataclass(frozen=True)
 class Repeat:
-    """`body`, once for each element of `part`.
+    """Repeat `body` for each element of `part`.
 
-    `stride` is what each element but the first takes, wherever it lies: only the first one's padding depends on the
-    position. It is None where the elements differ, since they hold counts of their own.
+    `stride` is the size of each element after the first, at any position: only the padding of the first element depends
+    on the position. It is None if the elements differ because they contain counts of their own.
     """
 
     part: Data | Loop
@@ -45,20 +45,20 @@ class Repeat:
 
 
 Term = Bytes | Align | Repeat
-# The elements of a part within a value, as many as there are; None if their number has no limit.
+# The elements of a part within a value; None if their number is unlimited.
 _Elements = Callable[[Data | Loop, Any], Sequence[Any] | None]
 
 
 @dataclass(frozen=True)
 class Length:
-    """The length of a payload, without the bytes that may trail: `prefix` bytes and `terms`."""
+    """The length of a payload without trailing bytes: `prefix` bytes and `terms`."""
 
     prefix: int
     terms: tuple[Term, ...]
 
     @property
     def is_computed(self) -> bool:
-        """Whether the counts of the message's own parts suffice: no element of a loop has a count in it."""
+        """Whether the counts of the message's own parts suffice, since no loop's element contains a count."""
         return all(term.stride is not None for term in self.terms if isinstance(term, Repeat))
 
     @property
@@ -70,7 +70,7 @@ class Length:
 
     @property
     def maximum(self) -> int | None:
-        """The bytes of a message whose variable parts are at their bounds; None if one has none."""
+        """The bytes of a message whose variable parts are at their bounds; None if a part is unbounded."""
         longest = _Walk(_longest).behind(self.terms, 0)
         return None if longest is None else self.prefix + longest
 
@@ -88,13 +88,13 @@ def length_of(frame: Frame) -> Length:
 
 
 def sent_length_of(frame: Frame) -> Length:
-    """The expression of what a publisher sends: of a part that is not used its default, or nothing."""
+    """The length of a payload as a publisher sends it: unused parts have their defaults or are empty."""
     prefix = len(frame.prefix)
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes, is_sent=True)]))
 
 
 def _terms(nodes: Sequence[Node], *, is_sent: bool = False) -> tuple[Term, ...]:
-    """The terms of nodes; with `is_sent`, parts that are not used are constants."""
+    """The terms of nodes; with `is_sent`, unused parts are constants."""
     terms: list[Term] = []
     for node in nodes:
         match node:
@@ -114,12 +114,12 @@ def _terms(nodes: Sequence[Node], *, is_sent: bool = False) -> tuple[Term, ...]:
 
 
 def _gap(node: Data) -> Term:
-    """What lies between the count and the elements, if there are any."""
+    """The gap between the count and the elements, if there are any."""
     return Align(node.alignment) if node.padding is None else Bytes(node.padding)
 
 
 def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
-    """The terms of a part that always has the same value; None is that of an element without one."""
+    """The terms of a part with a constant value; None is an element without a value."""
     if isinstance(node, Data):
         size = node.element.size
         count = len(value or ()) if node.kind is DataKind.ARRAY else len(units_of(node, value or "")) // size
@@ -139,7 +139,7 @@ def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
 
 
 def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """The same with neighbouring bytes added up."""
+    """The terms with adjacent bytes added up."""
     joined: list[Term] = []
     for term in terms:
         last = joined[-1] if joined else None
@@ -151,10 +151,10 @@ def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:
 
 
 def _stride(body: tuple[Term, ...]) -> int | None:
-    """What every element but the first takes.
+    """The size of every element after the first.
 
-    Behind its widest padding an element is in step with the largest alignment of them all, and so ends where the
-    next one is padded as each one after it.
+    After its widest padding, an element is aligned to the largest of its alignments. It therefore ends at a position
+    from which all following elements are padded alike.
     """
     if any(isinstance(term, Repeat) for term in body):
         return None
@@ -168,13 +168,13 @@ def _stride(body: tuple[Term, ...]) -> int | None:
 
 @dataclass
 class _Walk:
-    """Works off terms. `_grown` is what a part without a value adds, by the place of its term and the residue."""
+    """Evaluates terms. `_grown` caches the growth of a part without a value, by its term and the residue."""
 
     elements_of: _Elements
     _grown: dict[tuple[int, int], int | None] = field(default_factory=dict)
 
     def behind(self, terms: Sequence[Term], position: int, value: Any = None) -> int | None:
-        """The position behind `terms`; None if there is no limit to it."""
+        """The position after `terms`; None if it is unlimited."""
         for term in terms:
             match term:
                 case Bytes(count):
@@ -198,7 +198,7 @@ class _Walk:
             first = self.behind(term.body, position)
             return None if first is None else first + (len(elements) - 1) * term.stride
         if isinstance(elements, range):
-            # Parts lie within parts, so each would be walked many times for every walk of the one around it.
+            # Parts nest, so without this cache each would be walked many times for every walk of its parent.
             key = id(term), position % _PERIOD
             if key not in self._grown:
                 self._grown[key] = self._growth_alike(term, key[1], len(elements))
@@ -211,7 +211,7 @@ class _Walk:
         return position
 
     def _growth_alike(self, term: Repeat, start: int, count: int) -> int | None:
-        """`count` elements without a value: growth comes again when a residue does, so not all are walked."""
+        """Add `count` elements without a value: growth repeats when a residue does, so a few steps suffice."""
         passed: dict[int, tuple[int, int]] = {}
         position, done = start, 0
         while done < count:
@@ -232,7 +232,7 @@ class _Walk:
 
 @dataclass(frozen=True)
 class _Scope:
-    """A message, or an element of a loop, and how many names lead to it."""
+    """A message or a loop's element, and the number of names above it."""
 
     value: Any
     depth: int

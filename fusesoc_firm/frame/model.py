@@ -1,12 +1,12 @@
-"""The Frame model: the second stage, a message as bytes on the wire.
+"""The Frame model, the second stage: a message as bytes on the wire.
 
 A frame is `id` (1 byte) | `length` (uint32, little-endian) | payload. The payload is a tree of nodes in wire order;
-docs/explanation/frames.md shows it by example:
+docs/explanation/frames.md shows an example:
 
-* `Fixed`: bytes whose arrangement is known here, padding included.
-* `Pad`: padding that depends on the position, which only the run knows.
+* `Fixed`: bytes with a known arrangement, including padding.
+* `Pad`: padding that depends on the position, which is known only at run time.
 * `Data`: a string, or a variable array of numbers.
-* `Loop`: an array whose elements are messages or strings; its body are nodes again.
+* `Loop`: an array whose elements are messages or strings; its body consists of nodes, too.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ COUNT_BYTES = 4
 
 @dataclass(frozen=True)
 class Step:
-    """One name on the way from a message to a field; `count` is None unless an array of fixed size lies here.
+    """One name on the path from a message to a field; `count` is None unless it is an array of fixed size.
 
-    The elements of a `Loop` are no such array: a path within it counts what one of them holds.
+    A `Loop` does not set `count`: a path within a loop describes one of its elements.
     """
 
     name: str
@@ -43,7 +43,7 @@ Path = tuple[Step, ...]
 
 @dataclass(frozen=True)
 class Run:
-    """Elements of a field that lie without a gap from `offset` on; it counts from the start of the `Fixed`."""
+    """Adjacent elements of a field; `offset` counts from the start of the `Fixed`."""
 
     offset: int
     count: int
@@ -51,11 +51,11 @@ class Run:
 
 @dataclass(frozen=True)
 class FrameField:
-    """A leaf of the message: every element of it has the same wire type.
+    """A leaf of the message: all its elements have the same wire type.
 
-    `path` leads from the message to the leaf; a fixed array anywhere on it multiplies the elements, which are
-    numbered in wire order. `runs` tell where they lie. Where a `Pad` parts the elements, each `Fixed` has a field of
-    this path for those it holds, the first of them being number `first`.
+    `path` leads from the message to the leaf. Each fixed array on it multiplies the elements, which are numbered in
+    wire order. `runs` gives their positions. If a `Pad` separates the elements, each `Fixed` has a field with this path
+    for its own elements, and `first` is the number of the first of them.
     """
 
     path: Path
@@ -72,29 +72,29 @@ class FrameField:
 
     @property
     def is_array(self) -> bool:
-        """Whether a fixed array, be it of one element, lies anywhere on the path."""
+        """Whether the path includes a fixed array, even of one element."""
         return any(step.count is not None for step in self.path)
 
     @property
     def count(self) -> int:
-        """Elements in all; 1 for a scalar."""
+        """The total number of elements; 1 for a scalar."""
         return prod(step.count for step in self.path if step.count is not None)
 
     @property
     def held(self) -> int:
-        """Elements that lie here: all of them unless a `Pad` parts them."""
+        """The number of elements in this node: all of them unless a `Pad` separates them."""
         return sum(run.count for run in self.runs)
 
     @property
     def offsets(self) -> Iterator[int]:
-        """The offset of the first byte of each element that lies here, in their order."""
+        """Yield the offset of the first byte of each element in this node, in order."""
         for run in self.runs:
             yield from range(run.offset, run.offset + run.count * self.type.size, self.type.size)
 
 
 @dataclass(frozen=True)
 class Fixed:
-    """`size` bytes that hold `fields` and between them padding; the payload's first one begins with the prefix."""
+    """`size` bytes of `fields` with padding between them; the first of a payload begins with the prefix."""
 
     size: int
     fields: tuple[FrameField, ...]
@@ -102,13 +102,13 @@ class Fixed:
 
 @dataclass(frozen=True)
 class Pad:
-    """0 to `alignment` - 1 bytes, up to a multiple of `alignment` from behind the prefix."""
+    """Padding of 0 to `alignment` - 1 bytes to a multiple of `alignment`, counted from the end of the prefix."""
 
     alignment: int
 
 
 class DataKind(Enum):
-    """What the elements of a `Data` make up."""
+    """The kind of value that the elements of a `Data` form."""
 
     ARRAY = "array"
     STRING = "string"
@@ -119,9 +119,9 @@ class DataKind(Enum):
 class Data:
     """A count (uint32), then that many elements: numbers, or the bytes or UTF-16 units of a text.
 
-    The count includes `terminator` bytes of zero behind the text, `bound` does not. Between count and elements, if
-    there is any, lie `padding` bytes; None is padding to `alignment` that depends on the position, as a `Pad` does.
-    `ros_type` is the field's type as the definition has it.
+    The count includes the `terminator` zero bytes after the text; `bound` does not. If there are elements, `padding`
+    bytes precede them; None means padding to `alignment` that depends on the position, as for a `Pad`. `ros_type` is
+    the field's type as written in the definition.
     """
 
     path: Path
@@ -144,10 +144,10 @@ class Data:
 
 @dataclass(frozen=True)
 class Loop:
-    """An array of messages or strings: `body`, once an element.
+    """An array of messages or strings: `body`, repeated for each element.
 
-    `count` is that of a fixed array, which the wire does not name; where it is None, a count (uint32) of at most
-    `bound` comes first. Paths in the body begin with the loop's own.
+    `count` is the size of a fixed array, which is not sent. If it is None, a count (uint32) of at most `bound` comes
+    first. Paths in the body begin with the loop's own path.
     """
 
     path: Path
@@ -173,8 +173,8 @@ NameTree = dict[str, "NameTree"]
 class Frame:
     """The layout of a message.
 
-    `prefix` are the constant bytes in front of the first field, `checked_prefix` how many of them a
-    receiver compares, `trailing_bytes` how many bytes behind the last field a sender may append.
+    `prefix` holds the constant bytes before the first field, of which a receiver compares the first `checked_prefix`. A
+    sender may append up to `trailing_bytes` bytes after the last field.
     """
 
     message: MessageName
@@ -186,7 +186,7 @@ class Frame:
 
     @property
     def is_fixed_size(self) -> bool:
-        """Whether all of it is one `Fixed`: its offsets are those in the payload."""
+        """Whether the whole payload is one `Fixed`, so that its offsets are those in the payload."""
         return all(isinstance(node, Fixed) for node in self.nodes)
 
     @property
@@ -196,17 +196,17 @@ class Frame:
 
     @property
     def payload_bytes(self) -> int:
-        """Bytes of the payload of a message of fixed size."""
+        """The number of bytes in the payload of a message of fixed size."""
         return sum(node.size for node in self._fixed_nodes())
 
     @property
     def frame_bytes(self) -> int:
-        """Bytes of the whole frame of a message of fixed size, id and length included."""
+        """The number of bytes in the frame of a message of fixed size, including id and length."""
         return ID_BYTES + LENGTH_BYTES + self.payload_bytes
 
     @cached_property
     def names(self) -> NameTree:
-        """The name of every field, with the names below it; a field without any value is left out."""
+        """The name of every field, with the names below it; a field without values is omitted."""
         tree: NameTree = {}
         for node in all_nodes(self.nodes):
             for part in node.fields if isinstance(node, Fixed) else () if isinstance(node, Pad) else (node,):
@@ -228,7 +228,7 @@ def names_of(path: Path) -> tuple[str, ...]:
 
 
 def all_nodes(nodes: tuple[Node, ...]) -> Iterator[Node]:
-    """Every node in wire order, a loop in front of its body."""
+    """Yield every node in wire order, a loop before its body."""
     for node in nodes:
         yield node
         if isinstance(node, Loop):

@@ -1,4 +1,4 @@
-"""Which fields of a message are used: the rest keeps its place on the wire, but needs neither port nor register."""
+"""Selects the used fields of a message; unused fields stay on the wire, but need neither port nor register."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from fusesoc_firm.frame.model import Fixed, Frame, Loop, NameTree, Node, Pad, al
 from fusesoc_firm.frame.values import dotted
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, nearest
 
-# Dotted paths, each with the place where the user wrote it.
+# Dotted paths, each with its place in the user's file.
 Paths = Mapping[str, SourceRef | None]
-# The names on the way to a leaf.
+# The names on the path to a leaf.
 Names = tuple[str, ...]
 
 
 def select(frame: Frame, include: Paths | None = None, exclude: Paths | None = None) -> Frame:
-    """The frame with its fields marked as used or not.
+    """The frame with its fields marked as used or unused.
 
-    A path (`header.stamp`, `poses.position`) means the field and all below it. Where `include` names none, all fields
-    are used; `exclude` then takes some away. A loop is used if anything in it is. Raises `InputError` for a path that
-    leads to no value, with the nearest one that does.
+    A path (`header.stamp`, `poses.position`) selects the field and all fields below it. Without `include`, all fields
+    are used; `exclude` then removes some. A loop is used if any part of it is. Raises `InputError`, with the nearest
+    valid path, for a path that leads to no value.
     """
     include, exclude = include or {}, exclude or {}
     known = {dotted(names) for names in _all_names(frame.names, ())}
@@ -34,23 +34,23 @@ def select(frame: Frame, include: Paths | None = None, exclude: Paths | None = N
 
 
 def names_in_use(frame: Frame) -> frozenset[Names]:
-    """The names of every leaf that is used."""
+    """The names of every used leaf."""
     return frozenset(names for node in all_nodes(frame.nodes) for names, is_used in _leaves(node) if is_used)
 
 
 def with_names_in_use(frame: Frame, names: Collection[Names]) -> Frame:
-    """The frame with just the leaves of these names used."""
+    """The frame in which exactly the leaves with these names are used."""
     return replace(frame, nodes=_Marking(lambda leaf: leaf in names).marked(frame.nodes))
 
 
 def used_part(message: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
-    """What a message holds of the fields that are used."""
+    """The part of a message that consists of used fields."""
     found: dict[str, Any] = _part(message, names_in_use(frame))
     return found
 
 
 def _part(value: Any, leaves: Collection[Names]) -> Any:
-    """What lies on the way to the leaves; the elements of an array are parted alike."""
+    """The part of a value that leads to the leaves; all elements of an array are treated alike."""
     if () in leaves:
         return value
     if not isinstance(value, Mapping):
@@ -68,7 +68,7 @@ def _is_chosen(names: Names, include: Collection[str], exclude: Collection[str])
 
 @dataclass(frozen=True)
 class _Marking:
-    """Marks every leaf for which `has` holds, and what is around it."""
+    """Marks every leaf for which `has` holds, and the nodes around it."""
 
     has: Callable[[Names], bool]
 
@@ -85,7 +85,7 @@ class _Marking:
             case Loop():
                 body = self.marked(node.body)
                 inner = [is_used for part in body for is_used in _uses(part)]
-                # The elements of an array of empty messages hold nothing: only their number can be used.
+                # An array of empty messages has no leaves: only its count can be used.
                 return replace(node, body=body, is_used=any(inner) if inner else self.has(node.names))
         return replace(node, is_used=self.has(node.names))
 
@@ -98,7 +98,7 @@ def _uses(node: Node) -> Iterator[bool]:
 
 
 def _leaves(node: Node) -> Iterator[tuple[Names, bool]]:
-    """The names of what a node holds itself; an array of empty messages is a leaf."""
+    """The names of a node's own leaves; an array of empty messages is a leaf."""
     if isinstance(node, Fixed):
         yield from ((leaf.names, leaf.is_used) for leaf in node.fields)
     elif not isinstance(node, Pad) and not (

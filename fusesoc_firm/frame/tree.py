@@ -1,4 +1,4 @@
-"""A message as a tree for people: every field with its type, its bits and where it lies in the payload."""
+"""Shows a message as a tree: every field with its type, its bits and its position in the payload."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from fusesoc_firm.message.model import ArrayType, Definitions, MessageDefinition
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the tree; `bits` and `offset` (bytes from the payload's start) are None where they are not fixed.
+    """A line of the tree; `bits` and `offset` (bytes from the payload's start) are None if they vary.
 
-    Below an array that is no fixed part of the payload, `bits` are those of one element.
+    Below an array that is not a fixed part of the payload, `bits` counts one element.
     """
 
     depth: int
@@ -24,7 +24,7 @@ class Row:
 
 
 def rows(name: MessageName, definitions: Definitions, frame: Frame) -> Iterator[Row]:
-    """The rows of a message, outer ones first."""
+    """Yield the rows of a message, outer ones first."""
     is_fixed = frame.is_fixed_size
     title = f"{frame.ros.title}"
     yield Row(0, str(name), title, 8 * frame.payload_bytes if is_fixed else None, 0 if is_fixed else None)
@@ -32,7 +32,7 @@ def rows(name: MessageName, definitions: Definitions, frame: Frame) -> Iterator[
 
 
 def text(found: Iterator[Row]) -> str:
-    """The rows in columns."""
+    """Format the rows in columns."""
     table = [("field", "type", "bits", "offset")]
     for row in found:
         bits, offset = (("" if value is None else str(value)) for value in (row.bits, row.offset))
@@ -46,7 +46,7 @@ def text(found: Iterator[Row]) -> str:
 
 @dataclass(frozen=True)
 class _Leaf:
-    """What is known of a leaf; `bits` is None for a variable part."""
+    """The properties of a leaf; `bits` is None for a variable part."""
 
     names: tuple[str, ...]
     bits: int | None
@@ -54,7 +54,7 @@ class _Leaf:
 
 
 def _leaves(frame: Frame) -> list[_Leaf]:
-    """Only what lies in front of all that varies has an offset."""
+    """The leaves; only those before the first variable part have an offset."""
     leaves = []
     first = frame.nodes[0] if frame.nodes else None
     for node in all_nodes(frame.nodes):

@@ -1,6 +1,6 @@
-"""Message values: nested dictionaries and lists, how the paths of a Frame lead through them, and texts as units.
+"""Message values as nested dictionaries and lists: access by the paths of a Frame, and conversion of texts to units.
 
-A text is a `str`. Bytes that are no UTF-8, and UTF-16 units that are no pair, are kept as lone surrogates.
+A text is a `str`. Bytes that are not UTF-8, and unpaired UTF-16 units, are kept as lone surrogates.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ class CodecError(ValueError):
 
 
 class SignallingNan(float):
-    """A signalling NaN of a float32, which conversion to a double, Python's float, would make a quiet one.
+    """A signalling NaN of a float32; conversion to a double, Python's float, would make it quiet.
 
-    It is shown, and calculated with, as any NaN; `bits` are those on the wire.
+    It prints and calculates like any NaN; `bits` are those on the wire.
     """
 
     bits: int
 
     def __new__(cls, bits: int) -> SignallingNan:
-        """The NaN of these 32 bits."""
+        """Create the NaN with these 32 bits."""
         made = super().__new__(cls, "nan")
         made.bits = bits
         return made
 
     def __getnewargs__(self) -> tuple[int]:
-        """How a copy is made."""
+        """The arguments of `__new__` for a copy."""
         return (self.bits,)
 
 
 def packed(code: str, values: Sequence[Any]) -> bytes:
-    """Numbers side by side as they are sent; `code` is that of `struct`, whose errors it raises."""
+    """The numbers as bytes in sequence; `code` is that of `struct`. Raises `struct`'s errors."""
     data = struct.pack(f"<{len(values)}{code}", *values)
     if code != "f" or SignallingNan not in {*map(type, values)}:
         return data
@@ -54,7 +54,7 @@ def packed(code: str, values: Sequence[Any]) -> bytes:
 
 
 def unpacked(code: str, data: bytes) -> Sequence[Any]:
-    """The numbers that were sent as `data`: `packed` gives the same bytes for them."""
+    """The numbers in `data`, so that `packed` returns the same bytes."""
     numbers = struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data)
     if code != "f" or struct.pack(f"<{len(numbers)}f", *numbers) == data:
         return numbers
@@ -63,22 +63,22 @@ def unpacked(code: str, data: bytes) -> Sequence[Any]:
 
 
 def _is_signalling(word: int) -> bool:
-    """Whether the bits of a float32 are all ones in the exponent, and in the fraction not zero with a zero on top."""
+    """Whether a float32's exponent bits are all ones, and its fraction is not zero but begins with a zero."""
     return word & 0x7FC00000 == 0x7F800000 and word & 0x003FFFFF != 0
 
 
 def shown(value: object) -> str:
-    """The value for an error's text: a long one is cut."""
+    """The value for an error's text; long values are shortened."""
     return _repr.repr(value)
 
 
 def dotted(names: tuple[str, ...]) -> str:
-    """The names as people write a path."""
+    """The names as a dotted path."""
     return ".".join(names)
 
 
 def part_of(value: Any, part: Data | Loop, depth: int) -> Any:
-    """What `value` has for `part`, or its default; the first `depth` names of the path lead to `value` itself."""
+    """The part of `value` for `part`, or its default; `depth` is the number of names above `value`."""
     for step in part.path[depth:]:
         value = _member(value, step.name)
         if value is _MISSING:
@@ -87,19 +87,19 @@ def part_of(value: Any, part: Data | Loop, depth: int) -> Any:
 
 
 def leaf_of(value: Any, leaf: FrameField, depth: int) -> list[Any]:
-    """Every element that `value` has for `leaf`, in wire order."""
+    """Every element of `leaf` in `value`, in wire order."""
     return list(_elements(value, leaf.path[depth:], leaf))
 
 
 def put(message: dict[str, Any], path: Path, value: Any) -> None:
-    """Put a value where `path`, without arrays on it, leads to."""
+    """Store a value at `path`, which contains no arrays."""
     for step in path[:-1]:
         message = message.setdefault(step.name, {})
     message[path[-1].name] = value
 
 
 def put_leaf(message: dict[str, Any], path: Path, elements: Iterator[Any]) -> None:
-    """Put all elements of a leaf, in wire order, where `path` leads to."""
+    """Store all elements of a leaf, given in wire order, at `path`."""
     step, rest = path[0], path[1:]
     if not rest:
         message[step.name] = next(elements) if step.count is None else [next(elements) for _ in range(step.count)]
@@ -111,13 +111,13 @@ def put_leaf(message: dict[str, Any], path: Path, elements: Iterator[Any]) -> No
 
 
 def reject_unknown(frame: Frame, message: MessageValue) -> None:
-    """Raise `CodecError` for a name that the message has not, unless nothing lies below it."""
+    """Raise `CodecError` for an unknown name, unless it has no values below it."""
     for names in _unknown(message, frame.names, ()):
         raise CodecError(f"{frame.message} has no field '{dotted(names)}'")
 
 
 def units_of(data: Data, text: object) -> BytesLike:
-    """The text as sent, without count and terminator. Raises `CodecError` if it is no text."""
+    """The text as sent, without count and terminator. Raises `CodecError` if it is not a text."""
     if not isinstance(text, str):
         raise CodecError(f"'{dotted(data.names)}' takes a {data.kind.value}, not {shown(text)}")
     try:
@@ -143,13 +143,13 @@ def text_of(data: Data, units: bytes) -> str:
 
 
 def check_bound(part: Data | Loop, count: int) -> None:
-    """Raise `CodecError` if `count` is more than the definition allows."""
+    """Raise `CodecError` if `count` exceeds the bound of the definition."""
     if part.bound is not None and count > part.bound:
         raise CodecError(f"'{dotted(part.names)}' holds at most {part.bound}, not {count}")
 
 
 def _member(value: Any, name: str) -> Any:
-    """A message that is missing is one without any member: it may consist of defaults."""
+    """The member `name`. A missing message has no members, since it may consist of defaults."""
     if value is _MISSING or not isinstance(value, Mapping):
         return _MISSING
     return value.get(name, _MISSING)
@@ -190,7 +190,7 @@ def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
 
 
 def _unknown(value: Any, known: NameTree, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """The names of what lies outside `known`; a leaf's own value is not looked into."""
+    """The names that are not in `known`; the values of leaves are not examined."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
             here = (*names, str(name))
@@ -204,7 +204,7 @@ def _unknown(value: Any, known: NameTree, names: tuple[str, ...]) -> Iterator[tu
 
 
 def _leaves(value: Any, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """The names of all that holds a value: an empty message and an array of no elements do not."""
+    """The names of all values; empty messages and arrays without elements have none."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
             yield from _leaves(inner, (*names, str(name)))

@@ -1,11 +1,11 @@
-"""Recorded bags, read message by message.
+"""Reads recorded bags, message by message.
 
     with open_bag(path) as bag:
         for recorded in bag.messages(topics):
             ...
 
-ROS 1, and ROS 2 as sqlite3 or MCAP, compressed or not. Nothing is held in memory but the index, and payloads are what
-was recorded: nothing is decoded and encoded again. `definitions_in` gives what a bag says of its messages.
+The formats are ROS 1, and ROS 2 as sqlite3 or MCAP, with or without compression. Only the index is held in memory.
+Payloads are returned as recorded, without decoding. `definitions_in` returns the definitions that a bag contains.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ BAGS = "a bag is a .bag of ROS 1, or a folder, .mcap or .db3 of ROS 2"
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _METADATA = "metadata.yaml"
 _ROS1_MAGIC = b"#ROSBAG"
-# What is wrong with a bag in rosbags' words, and what mends it.
+# What rosbags reports of a damaged bag, and the remedy.
 _REMEDIES = {
     "not indexed": "it was not closed: rosbag reindex {path}",
     "index looks damaged": "it is cut off: rosbag reindex {path}",
@@ -49,7 +49,7 @@ _REMEDIES = {
 
 
 class Form(Enum):
-    """How a bag lies on a disk, by the word that commands call it."""
+    """The format of a bag, by its name in commands."""
 
     ROS1 = "ros1"
     SQLITE3 = "sqlite3"
@@ -57,14 +57,15 @@ class Form(Enum):
 
     @property
     def ros(self) -> Middleware:
-        """Whose messages it holds."""
+        """The middleware of the messages."""
         return ROS1 if self is Form.ROS1 else ROS2
 
 
 class Stream(NamedTuple):
-    """The messages of a topic that are of one type, with what their writer took for that type.
+    """The messages of one topic and one type, with the signature and definition that the bag gives for the type.
 
-    Both its signature and its definition, a text as `message/joint.py` has it, are empty where the bag does not say.
+    Signature and definition are empty if the bag does not contain them. The definition is a joint text (see
+    `message/joint.py`).
     """
 
     topic: str
@@ -74,7 +75,7 @@ class Stream(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """A message as it was recorded: `number` counts those of its topic from 0, `stamp` is in ns."""
+    """A recorded message: `number` counts the messages of its topic from 0, `stamp` is in ns."""
 
     stream: Stream
     number: int
@@ -84,7 +85,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag: its form, each stream with the number of its messages, and when it begins (ns)."""
+    """An open bag: its format, the number of messages of each stream, and its start time (ns)."""
 
     path: Path
     form: Form
@@ -93,15 +94,15 @@ class Bag:
     _readers: Sequence[Reader] = field(repr=False)
 
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
-        """The messages of some topics by time, up to those before `stop` (ns).
+        """Yield the messages of `topics` in order of time, up to but not including `stop` (ns).
 
-        Raises `InputError` where the bag is damaged.
+        Raises `InputError` if the bag is damaged.
         """
         numbers: dict[str, int] = {}
         for reader in self._readers:
             connections = [item for item in reader.connections if item.topic in topics]
             if not connections:
-                continue  # to a reader none are all
+                continue  # rosbags reads all topics if the list is empty
             found = reader.messages(connections, stop=stop)
             while True:
                 with _readable(self.path):
@@ -115,28 +116,28 @@ class Bag:
 
 @dataclass(frozen=True)
 class BagDefinitions:
-    """What a bag says of messages: whose they are, and the texts of each by which the bag defines it."""
+    """The definitions in a bag: the middleware, and the distinct texts for each message."""
 
     ros: Middleware
     texts: Mapping[MessageName, tuple[str, ...]]
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path looks like a bag by its name or, as a folder, by what it holds."""
+    """Whether a path is a bag, judged by its name or, for a folder, by its contents."""
     if path.is_dir():
         return (path / _METADATA).is_file() or any(file.suffix in _SUFFIXES[1:] for file in path.iterdir())
     return path.suffix in _SUFFIXES and path.is_file()
 
 
 def bag_files(path: Path) -> list[Path]:
-    """The files of a bag, which may be a folder (ROS 2), or the file itself."""
+    """The files of a bag: those in its folder (ROS 2), or the file itself."""
     return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
 def definitions_in(path: Path) -> BagDefinitions:
-    """The definitions of messages in a bag, which is not read beyond its index. Raises `InputError`.
+    """The definitions of messages in a bag, of which only the index is read. Raises `InputError`.
 
-    A type without a definition in ROS's own language is left out.
+    Types without a definition in ROS's own language are omitted.
     """
     files = bag_files(path)
     with in_part(files):
@@ -144,14 +145,14 @@ def definitions_in(path: Path) -> BagDefinitions:
 
 
 def _state(file: Path) -> tuple[str, int, int]:
-    """What tells a state of a file from others."""
+    """A tuple that changes when the file changes."""
     status = file.stat()
     return str(file.absolute()), status.st_size, status.st_mtime_ns
 
 
 @lru_cache(maxsize=4)
 def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> BagDefinitions:
-    """As `definitions_in`, of a bag whose files are in these states: every library of a process asks for them."""
+    """Cached `definitions_in`: every library of a process needs the definitions; `_states` invalidates the cache."""
     texts: dict[MessageName, dict[str, None]] = {}
     with open_bag(path) as bag:
         for stream in bag.streams:
@@ -164,7 +165,7 @@ def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> Ba
 
 @contextmanager
 def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
-    """A bag to be read within the context. Raises `InputError`, with the `hint` where it is no bag at all."""
+    """Open a bag for reading within the context. Raises `InputError`, with `hint` if the path is not a bag."""
     with ExitStack() as stack:
         with _readable(path, hint):
             _check_journals(path)
@@ -181,7 +182,7 @@ def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
 
 def _readers(path: Path) -> list[Reader]:
     if path.is_dir() and not (path / _METADATA).exists():
-        # Who records ends the folder with this file; what is there can be read without it.
+        # A recorder writes the metadata file last. Without it, the finished part of the bag is still readable.
         files = sorted((file for file in path.iterdir() if file.suffix in _SUFFIXES[1:]), key=_natural)
         if not files:
             raise FileNotFoundError("there is no metadata.yaml in it, no .db3 and no .mcap")
@@ -190,7 +191,7 @@ def _readers(path: Path) -> list[Reader]:
 
 
 def _check_journals(path: Path) -> None:
-    """Raise `ValueError` where SQLite has not put all messages into the file yet, as rosbags would miss them."""
+    """Raise `ValueError` if SQLite has not written all messages to the file yet: rosbags would miss them."""
     for file in path.glob("*.db3") if path.is_dir() else [path]:
         journal = file.with_name(f"{file.name}-wal")
         if journal.exists() and journal.stat().st_size:
@@ -205,7 +206,7 @@ def _is_ros1(path: Path) -> bool:
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """The key by which `bag_10` comes behind `bag_9`."""
+    """A sort key that orders `bag_10` after `bag_9`."""
     return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
 
 
@@ -226,10 +227,10 @@ def _stream(connection: Connection) -> Stream:
 
 @contextmanager
 def _readable(path: Path, hint: str = "") -> Iterator[None]:
-    """Within it, whatever a damaged file makes rosbags raise becomes an `InputError`."""
+    """Convert any exception that a damaged file causes in rosbags to `InputError`."""
     try:
         yield
-    except Exception as error:  # noqa: BLE001 - rosbags and what it uses raise anything
+    except Exception as error:  # noqa: BLE001 - rosbags and its dependencies raise anything
         said = str(error) or type(error).__name__
         remedies = (text.format(path=path) for words, text in _REMEDIES.items() if words in said)
         fail(f"{path} is not a bag that can be read: {said}", hint=next(remedies, hint))

@@ -1,7 +1,7 @@
-"""How large a message may be. It is checked on the definitions, before any work on what they mean begins.
+"""Limits the size of messages, checked on the definitions before any further work.
 
-Each message within another multiplies what a few lines of text can mean. Real messages stay far below: the largest of
-5,900 that were counted have 17 levels, 1,982 fields and 6,049 bytes.
+Nesting multiplies: a few lines of text can define a huge message. Real messages stay far below the limits: the largest
+of 5,900 that were counted have 17 levels, 1,982 fields and 6,049 bytes.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ MOST_CONSTANTS = 4096
 MOST_NODES = 16384
 MOST_BYTES = 65536
 MOST_FILE_BYTES = 2**18
-"""Bytes of a `.msg`, `.srv` or `.action` file."""
+"""The size limit in bytes of a `.msg`, `.srv` or `.action` file."""
 
 _COUNT_BYTES = 4
 
 
 @dataclass(frozen=True)
 class Extent:
-    """What a message unfolds to.
+    """The size of a message with all nested messages expanded.
 
-    `levels` are 1 where no message lies within. `fields` are those of all messages within, too; an array counts once.
-    `nodes` are the same with every element of an array of fixed size, unless it is one of numbers. `bytes` are those
-    on the wire where each string is empty and each variable array has one element, without padding.
+    `levels` is 1 for a message without nested messages. `fields` includes those of nested messages; an array counts
+    once. `nodes` also counts each element of a fixed array, unless the elements are numbers. `bytes` is the size on the
+    wire with empty strings and one element in each variable array, without padding.
     """
 
     levels: int = 0
@@ -48,7 +48,7 @@ class Extent:
     bytes: int = 0
 
     def joined(self, other: Extent) -> Extent:
-        """Both, side by side."""
+        """The extent of both, side by side."""
         return Extent(
             max(self.levels, other.levels),
             self.fields + other.fields,
@@ -57,7 +57,7 @@ class Extent:
         )
 
 
-# The bounds, each with its words.
+# The limits, each with its name in messages.
 _BOUNDS = {
     "levels": (MOST_LEVELS, "levels of messages within messages"),
     "fields": (MOST_FIELDS, "fields, with those of all messages within"),
@@ -67,10 +67,10 @@ _BOUNDS = {
 
 
 def check_extents(definitions: Definitions, known: MutableMapping[MessageName, Extent]) -> None:
-    """Raise `InputError` for the first message that is too large, at the field that makes it so.
+    """Raise `InputError` for the first message that is too large, at the field that exceeds the limit.
 
-    `definitions` have each message behind those that it holds. `known` are messages that were checked before; these
-    are added.
+    `definitions` lists each message after its nested messages. `known` holds the extents of messages checked earlier;
+    the new extents are added to it.
     """
     for name, definition in definitions.items():
         if name not in known:
@@ -94,7 +94,7 @@ def _extent(definition: MessageDefinition, known: Mapping[MessageName, Extent]) 
 
 
 def _of_type(type_: FieldType, rules: WireRules, known: Mapping[MessageName, Extent]) -> Extent:
-    """What a field of a type adds."""
+    """The extent that a field of this type adds."""
     match type_:
         case PrimitiveType(name) if name in rules.scalars:
             return Extent(0, 1, 1, rules.scalars[name].size)

@@ -1,7 +1,7 @@
-"""What the two generations of ROS allow in a `.msg` file: one table each, so that the parser never tells them apart.
+"""The rules of `.msg` files in ROS 1 and ROS 2: one table each, so that the parser needs no special cases.
 
 ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few places where FIRM
-takes more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
+accepts more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.naming import LONGEST_TEXT
 
-LARGEST_SIZE = 2**32 - 1  # the wire counts elements and characters in a uint32
+LARGEST_SIZE = 2**32 - 1  # counts of elements and characters are uint32 on the wire
 
 
 @dataclass(frozen=True)
@@ -29,20 +29,20 @@ class NameRule:
         return len(name) <= LONGEST_TEXT and self.pattern.fullmatch(name) is not None
 
     def fault(self, name: str, title: str) -> str:
-        """What is wrong with a name that is not accepted."""
+        """The fault of a name that is not accepted."""
         if len(name) > LONGEST_TEXT:
             return f"a {self.kind} has at most {LONGEST_TEXT} characters, not {len(name)}"
         return f"'{name}' is not a legal {self.kind} in {title}" if name else f"the {self.kind} is missing"
 
     @property
     def hint(self) -> str:
-        """What would be legal."""
+        """A description of the legal names."""
         return f"a {self.kind} has {self.description}"
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """The rules of one version. `integer_ranges` hold the smallest and the largest value, both legal."""
+    """The rules of one version. `integer_ranges` holds the smallest and largest legal values."""
 
     title: str
     package_name: NameRule
@@ -50,33 +50,33 @@ class Dialect:
     field_name: NameRule
     constant_name: NameRule
     integer_ranges: Mapping[str, tuple[int, int]]
-    # Primitives that have no constants: ROS 1's `time` and `duration`.
+    # Primitives that cannot be constants: ROS 1's `time` and `duration`.
     opaque_primitives: frozenset[str]
     strings: frozenset[str]
-    # Words that stand for a message, and whether they still do so in front of `[`.
+    # Words that abbreviate a message type, and whether they may precede `[`.
     shorthands: Mapping[str, MessageName]
     has_array_shorthands: bool
     booleans: Mapping[str, bool]
-    # `<=` behind a string or in the brackets of an array, default values, `0x10`, quotes round strings: all ROS 2's.
+    # Only in ROS 2: `<=` after a string or in an array's brackets, default values, `0x10`, quoted strings.
     has_bounds: bool
     has_defaults: bool
     has_integer_prefixes: bool
     has_quoted_strings: bool
-    # ROS 1's string constant takes the rest of the line, `#` included.
+    # A string constant of ROS 1 takes the rest of the line, including `#`.
     has_comments_behind_strings: bool
     smallest_array: int
-    # What stands between the name of a service and `Request`; and whether `pkg/msg/Type` is a type.
+    # The text between a service's name and `Request`; and whether `pkg/msg/Type` is a type.
     joint: str
     has_long_types: bool
 
     @property
     def primitives(self) -> frozenset[str]:
-        """The words of every type that is neither a string nor a message."""
+        """The names of all types except strings and messages."""
         return frozenset({"bool", "float32", "float64"}) | frozenset(self.integer_ranges) | self.opaque_primitives
 
     @property
     def builtin_types(self) -> frozenset[str]:
-        """The words of every type that is not a message."""
+        """The names of all types except messages."""
         return self.primitives | self.strings
 
 

@@ -1,6 +1,6 @@
-"""Where `.msg`, `.srv` and `.action` files lie.
+"""Finds `.msg`, `.srv` and `.action` files.
 
-In a package, a workspace of packages, a flat folder of packages, or an installed ROS.
+It searches packages, workspaces of packages, flat folders of packages, and installed ROS distributions.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from fusesoc_firm.message.bounds import MOST_FILE_BYTES
 from fusesoc_firm.message.model import InterfaceKind, MessageName
 from fusesoc_firm.text.files import read_regular
 
-# What catkin, colcon and ament leave out; colcon puts one into `build`, `install` and `log` itself.
+# catkin, colcon and ament skip folders with these markers; colcon creates one in `build`, `install` and `log`.
 _IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "COLCON_IGNORE", "AMENT_IGNORE"})
 
-# The usual names of a file's folder; ROS has them as suffixes, too.
+# The usual folder names of the files; ROS also uses them as suffixes.
 _KINDS = tuple(InterfaceKind)
 _ROS_SUFFIXES = {kind.value: kind for kind in InterfaceKind}
 
@@ -25,13 +25,13 @@ InterfaceFiles = dict[InterfaceKind, dict[MessageName, list[Path]]]
 
 
 def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_SUFFIXES) -> InterfaceFiles:
-    """Every file below a folder by kind and by the name that it defines; several where a name is given more than once.
+    """All files below a folder, by kind and name; a name with several files has all of them.
 
-    The kind is that of the file's suffix.
+    The suffix of a file determines its kind.
 
     A file belongs to the package of the nearest `package.xml` above it. Without one, it belongs to the folder above
-    `msg/`, `srv/` or `action/` or, in a flat layout, to the folder that it lies in. Folders that hide (`.git`) or carry
-    an ignore marker of a build tool are left out.
+    `msg/`, `srv/` or `action/` or, in a flat layout, to its own folder. Hidden folders (`.git`) and folders with a
+    build tool's ignore marker are skipped.
     """
     found: InterfaceFiles = {kind: {} for kind in _KINDS}
     packages: dict[Path, str] = {}
@@ -44,12 +44,12 @@ def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_S
 
 
 def ros1_folders(environment: Mapping[str, str]) -> list[Path]:
-    """The folders that a sourced ROS 1 names, in its own order of precedence; missing ones are skipped, as ROS does."""
+    """The folders of a sourced ROS 1 in its order of precedence; missing ones are skipped, as in ROS."""
     return [path for path in _entries(environment.get("ROS_PACKAGE_PATH", "")) if path.is_dir()]
 
 
 def ros2_folders(environment: Mapping[str, str]) -> list[Path]:
-    """Those of a sourced ROS 2."""
+    """The folders of a sourced ROS 2 in its order of precedence; missing ones are skipped."""
     prefixes = _entries(environment.get("AMENT_PREFIX_PATH", ""))
     return [share for prefix in prefixes if (share := prefix / "share").is_dir()]
 
@@ -59,7 +59,7 @@ def _entries(variable: str) -> list[Path]:
 
 
 def _walk(folder: Path, suffixes: Collection[str]) -> Iterator[Path]:
-    """The files in a fixed order. Links are followed, as workspaces are made of them, but not in circles."""
+    """Yield the files in a fixed order. Links are followed, since workspaces contain them, but cycles are not."""
     seen: set[str] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
         real = os.path.realpath(parent)
@@ -73,9 +73,9 @@ def _walk(folder: Path, suffixes: Collection[str]) -> Iterator[Path]:
 
 def _package_name(parent: Path, folder: Path) -> str:
     """The package of the files in `parent`; the search for `package.xml` ends at the folder that the user named."""
-    # A user may name the `msg` folder itself; its package is then still the folder above.
+    # If the user names the `msg` folder itself, the package is still the folder above.
     top = folder.resolve().parent if folder.resolve().name in _KINDS else folder.resolve()
-    # Links stay (a linked package is named by where it is linked), but `..` goes, or `top` would not be met.
+    # Links are kept (a linked package is named after its link), but `..` is resolved, or the walk would miss `top`.
     start = Path(os.path.abspath(parent))  # noqa: PTH100
     for candidate in (start, *start.parents):
         if name := _declared_name(candidate / "package.xml"):
@@ -86,9 +86,9 @@ def _package_name(parent: Path, folder: Path) -> str:
 
 
 def _declared_name(manifest: Path) -> str:
-    """The `<name>` in a `package.xml`; empty if there is none, as in rosbuild's `manifest.xml` days."""
+    """The `<name>` in a `package.xml`; empty if it is missing, as in rosbuild's `manifest.xml`."""
     try:
         return (ET.fromstring(read_regular(manifest, MOST_FILE_BYTES)).findtext("name") or "").strip()
-    # ElementTree has a ValueError or a LookupError for encodings.
+    # ElementTree raises ValueError or LookupError for bad encodings.
     except (OSError, ET.ParseError, ValueError, LookupError):
         return ""

@@ -1,6 +1,6 @@
-"""A message and all within it as one text, as bags and ROS 1's connections hold what a topic means, and back.
+"""Converts a message with its nested messages to one text, as in bags and ROS 1 connections, and back.
 
-The definitions are parted by lines of 80 `=`; all but the first begin with `MSG: ` and their name.
+Lines of 80 `=` separate the definitions; each except the first begins with `MSG: ` and its name.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ _PARTING = re.compile(rf"^{_LINE}\s*\n\s*MSG:\s*(\S+)\s*?\n", re.MULTILINE)
 
 
 def joint_text(name: MessageName, definitions: Definitions) -> str:
-    """The text of a message and, behind it, of all others of `definitions`."""
+    """The joint text: the message first, then all others in `definitions`."""
     others = [definition for other, definition in definitions.items() if other != name]
     parts = [to_text(definitions[name]), *(f"MSG: {item.name}\n{to_text(item)}" for item in reversed(others))]
     return f"{_LINE}\n".join(parts)
 
 
 def separate_texts(name: MessageName, text: str) -> dict[MessageName, str]:
-    """The text of each message in such a text, which defines the message `name`. Raises `InputError` for a bad name."""
+    """The text of each message in a joint text of the message `name`. Raises `InputError` for a bad name."""
     first, *others = _PARTING.split(text)
     pairs = zip(others[::2], others[1::2], strict=True)
     return {name: first} | {parse_name(word): part for word, part in pairs}
 
 
 def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | None:
-    """The signature of a message that is defined by such a text; None if that is faulty, or not all is there."""
+    """The signature of a message defined by a joint text; None if the text is faulty or incomplete."""
     faults = Diagnostics()
     parse = ros.parse
     try:
@@ -50,7 +50,7 @@ def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | No
 
 
 def _inner_first(definitions: Definitions) -> Iterable[MessageName]:
-    """The names, each behind those that its message holds. Raises `CycleError`."""
+    """The names, each after those of its nested messages. Raises `CycleError`."""
     within = {
         name: [nested for field in definition.fields if (nested := nested_message(field.type))]
         for name, definition in definitions.items()

@@ -1,7 +1,7 @@
-"""Where definitions come from: the user's folders first, then a sourced ROS, then the distributions that rosbags ships.
+"""Finds definitions: in the user's folders first, then in a sourced ROS, then in the distributions of rosbags.
 
-A library reads and parses a definition when it is asked for, once. It reads no environment variable by itself, so
-the same arguments and files give the same definitions.
+A library reads and parses each definition once, when it is requested. It reads no environment variable itself, so the
+same arguments and files give the same definitions.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from fusesoc_firm.store.reads import Input, Part
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.text.files import read_regular
 
-# Where users name further places.
+# Where users name additional places.
 _FURTHER = "; further places: 'paths' of the specification or core, --path"
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
 
 @dataclass(frozen=True)
 class _Source:
-    """The files that define a message (more than one must be equal), and the service or action they are of, if any.
+    """The files that define a message (several must be equal), and their service or action, if any.
 
-    If it is a bag that does, `texts` are its definitions; more than one must mean the same.
+    If the source is a bag, `texts` holds its definitions; several must be equivalent.
     """
 
     paths: tuple[Path, ...]
@@ -44,13 +44,13 @@ class _Source:
 
 
 class MessageLibrary:
-    """All messages that one middleware can name, those of services and actions included.
+    """All messages that one middleware knows, including those of services and actions.
 
-    `paths` are folders and bags in order of precedence. `environment` is a mapping like `os.environ`; None leaves an
-    installed ROS aside. `store` names the distribution behind all others (`noetic`, `jazzy`, ...). A message is taken
-    from the first place that has it; in one place a `.msg` file goes before what a `.srv` or `.action` file implies.
-    Raises `InputError` for a folder that is missing or holds no file that any middleware knows, and for a bag without
-    definitions.
+    `paths` are folders and bags in order of precedence. `environment` is a mapping like `os.environ`; None ignores an
+    installed ROS. `store` names the distribution of last precedence (`noetic`, `jazzy`, ...). A message is taken from
+    the first place that has it; within a place, a `.msg` file takes precedence over messages derived from a `.srv` or
+    `.action` file. Raises `InputError` for a folder that is missing or holds no file of any middleware, and for a bag
+    without definitions.
     """
 
     def __init__(
@@ -66,32 +66,32 @@ class MessageLibrary:
         self._sources: dict[MessageName, _Source] = {}
         self._interfaces: dict[Interface, Path] = {}
         self._messages: set[MessageName] = set()
-        # A definition or None, with the faults of its text: a faulty file is reported on every request.
+        # The definition or None, and the faults of its text: a faulty file is reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
         self._extents: dict[MessageName, Extent] = {}
         self._put_before(dict.fromkeys(paths), self.ros.folders(environment) if environment is not None else [])
 
     def before(self, paths: Mapping[Path, SourceRef | None]) -> MessageLibrary:
-        """The same library with further folders and bags, each with its place, which go before all others.
+        """A copy with additional folders and bags, each with its source reference, that precede all others.
 
-        Raises `InputError` as the constructor does.
+        Raises `InputError` like the constructor.
         """
         if not paths:
             return self
         other = copy.copy(self)
-        other._put_before(paths)  # noqa: SLF001 - it is of this class
+        other._put_before(paths)  # noqa: SLF001 - the same class
         return other
 
     def names(self) -> list[MessageName]:
-        """Every message there is, sorted."""
+        """All known messages, sorted."""
         return sorted(self._store.names | self._sources.keys())
 
     def interfaces(self) -> dict[Interface, Path]:
-        """Every service and action there is, sorted by its full name, and its file."""
+        """All known services and actions, sorted by full name, and their files."""
         return dict(sorted(self._interfaces.items(), key=lambda item: str(item[0])))
 
     def interface(self, name: MessageName, kind: InterfaceKind | None = None) -> Interface | None:
-        """The service or action of this name, if there is one; without a `kind`, a message goes before both."""
+        """The service or action of this name, or None; without `kind`, a message takes precedence over both."""
         if kind is None and self._is_message(name):
             return None
         kinds = (InterfaceKind.SERVICE, InterfaceKind.ACTION) if kind is None else (kind,)
@@ -99,7 +99,7 @@ class MessageLibrary:
         return next((interface for interface in named if interface in self._interfaces), None)
 
     def get(self, name: MessageName, source: SourceRef | None = None) -> MessageDefinition:
-        """The definition of a message that `source` asks for; raises `InputError` with all faults of its file."""
+        """The definition of a message requested at `source`; raises `InputError` with all faults of its file."""
         diagnostics = Diagnostics()
         definition = self.find(name, diagnostics, source)
         diagnostics.raise_if_any()
@@ -109,7 +109,7 @@ class MessageLibrary:
     def find(
         self, name: MessageName, diagnostics: Diagnostics, source: SourceRef | None = None
     ) -> MessageDefinition | None:
-        """As `get`, but notes the faults and goes on: with the right part of a faulty definition, or None."""
+        """Like `get`, but adds faults to `diagnostics` and returns the valid part of a faulty definition, or None."""
         if not self._is_message(name):
             diagnostics.error(f"unknown message '{name}'", source, self._hint(name))
             return None
@@ -121,17 +121,17 @@ class MessageLibrary:
         return definition
 
     def closure(self, name: MessageName, source: SourceRef | None = None) -> dict[MessageName, MessageDefinition]:
-        """The message and all messages within it, each behind those that it holds itself.
+        """The message and all nested messages, each after those that it contains.
 
         Raises `InputError` with every fault in every file, every unknown message and every cycle, and for a message
-        beyond the bounds of `bounds`.
+        that exceeds the limits in `bounds`.
         """
         return self.joint_closure((name,), source)
 
     def joint_closure(
         self, names: Iterable[MessageName], source: SourceRef | None = None
     ) -> dict[MessageName, MessageDefinition]:
-        """As `closure`, of several messages, such as those of a service."""
+        """Like `closure`, for several messages, such as those of a service."""
         diagnostics = Diagnostics()
         closure: dict[MessageName, MessageDefinition] = {}
         for name in names:
@@ -141,19 +141,19 @@ class MessageLibrary:
         return closure
 
     def origin(self, name: MessageName) -> str:
-        """The file of a known message, or the distribution that has it, for people to read."""
+        """The file of a known message, or the distribution that contains it, for people to read."""
         return str(self._sources[name].paths[0]) if name in self._sources else self._store.title
 
     def content(self, name: MessageName) -> bytes:
-        """What defines a known message, as it stands: a file's bytes, or the text that a bag or distribution has."""
+        """The unchanged source of a known message: the file's bytes, or the text in a bag or distribution."""
         if source := self._sources.get(name):
             return source.texts[0].encode() if source.texts else read_regular(source.paths[0], MOST_FILE_BYTES)
         return self._store.text(name).encode()
 
     def files(self, names: Iterable[MessageName]) -> list[Input]:
-        """The files that these messages are read from, in the order of names; messages of a distribution have none.
+        """The files of these messages, in the order of names; messages of a distribution have none.
 
-        Of a bag it is the part that defines the message.
+        For a bag, only the part that defines the message counts.
         """
         known = [(name, self._sources[name]) for name in sorted(set(names)) if name in self._sources]
         found = [_part(name, source) if source.texts else source.paths[0] for name, source in known]
@@ -161,18 +161,18 @@ class MessageLibrary:
 
     @cached_property
     def _has_events(self) -> bool:
-        # Only if a service asks: whoever speaks the other ROS does without the time that a distribution takes to load.
+        # Only for services: loading the distribution takes time, which messages of ROS 1 need not spend.
         return self.ros is ROS2 and (EVENT_INFO in self._messages or EVENT_INFO in self._store.names)
 
     def _is_message(self, name: MessageName) -> bool:
         return name in self._sources or name in self._store.names
 
     def _put_before(self, paths: Mapping[Path, SourceRef | None], installed: Sequence[Path] = ()) -> None:
-        """Take in what folders and bags hold; the user's `paths` go before `installed` ones, both before all else."""
+        """Add folders and bags: the user's `paths` before `installed` ones, both before existing places."""
         faults = Diagnostics()
         places = [*paths, *installed]
         found = {place: interface_files(place, self.ros.suffixes) for place in places}
-        # New ones, since a copy of this library may have these.
+        # New dictionaries: a copy of this library may share the old ones.
         self._sources, self._interfaces, self._parsed = dict(self._sources), dict(self._interfaces), {}
         self._extents = {}
         self._messages = self._messages | {name for files in found.values() for name in files[InterfaceKind.MESSAGE]}
@@ -184,8 +184,8 @@ class MessageLibrary:
         self._places = [*places, *self._places]
 
     def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> dict[MessageName, _Source]:
-        """What a bag defines; a path that is none must give another library something."""
-        # Imported for bags alone, as rosbags' readers take a while.
+        """The definitions in a bag; if `path` is not a bag, it must serve the library of another middleware."""
+        # Imported only for bags: rosbags' readers are slow to import.
         from fusesoc_firm.message.bag_reader import definitions_in, is_bag
 
         if not is_bag(path):
@@ -203,7 +203,7 @@ class MessageLibrary:
         return {name: _Source((path,), None, texts) for name, texts in bag.texts.items()} if bag.ros == self.ros else {}
 
     def _add(self, files: InterfaceFiles) -> None:
-        """Take in what a folder holds; it goes before what is there."""
+        """Add the files of a folder before existing ones."""
         for kind in (InterfaceKind.ACTION, InterfaceKind.SERVICE):
             for name, paths in files[kind].items():
                 interface = Interface(name, kind, self.ros, self._has_events)
@@ -212,7 +212,7 @@ class MessageLibrary:
         self._sources |= {name: _Source(tuple(paths)) for name, paths in files[InterfaceKind.MESSAGE].items()}
 
     def _parse(self, name: MessageName) -> None:
-        """Read what defines a message into `_parsed`, together with the other messages of the same file."""
+        """Parse the definition of a message into `_parsed`, with all other messages of the same file."""
         faults = Diagnostics()
         source = self._sources.get(name)
         interface = source.interface if source else None
@@ -230,12 +230,12 @@ class MessageLibrary:
             else:
                 found = {name: self.ros.parse(text, name, self.ros, file, faults)}
         for each in interface.messages if interface else (name,):
-            # One of a service's messages may come from a `.msg` file, which goes before the service.
+            # One of a service's messages may have its own `.msg` file, which takes precedence.
             if self._sources.get(each) is source:
                 self._parsed[each] = (found.get(each), faults)
 
     def _check_equal(self, name: MessageName, source: _Source, file: str, faults: Diagnostics) -> None:
-        """Note it if a bag's definitions of a message differ in what they mean."""
+        """Report a fault if a bag's definitions of a message are not equivalent."""
         parsed = (self.ros.parse(text, name, self.ros, file, Diagnostics()) for text in source.texts)
         if len({to_text(definition) for definition in parsed}) > 1:
             faults.error(f"'{name}' is defined in several ways", SourceRef(file, 1, 1), "name the folder of one")
@@ -248,7 +248,7 @@ class MessageLibrary:
         closure: dict[MessageName, MessageDefinition],
         diagnostics: Diagnostics,
     ) -> None:
-        """Add `name`, which the messages `above` hold, one within the other, and all that it holds."""
+        """Add `name` and its nested messages to `closure`; `above` are the messages around it, outermost first."""
         if name in above:
             cycle = " -> ".join(str(step) for step in (*above[above.index(name) :], name))
             diagnostics.error(f"message '{name}' contains itself", source, cycle)
@@ -276,7 +276,7 @@ class MessageLibrary:
         return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}{_FURTHER}"
 
     def _nearest(self, name: MessageName) -> str:
-        """The likeliest meaning: the same type of another package, a primitive misspelt, or a similar name."""
+        """The likeliest meaning: the same type in another package, a misspelt primitive, or a similar name."""
         same_type = [known for known in self.names() if known.name == name.name]
         if same_type:
             return str(same_type[0])
@@ -287,7 +287,7 @@ class MessageLibrary:
 
 
 class Libraries(Mapping[Middleware, MessageLibrary]):
-    """A library of each middleware, made when it is first asked for, which raises `InputError` as its constructor."""
+    """The library of each middleware, created on first access, which raises `InputError` like its constructor."""
 
     def __init__(self, makers: Mapping[Middleware, Callable[[], MessageLibrary]]) -> None:
         self._makers = makers
@@ -304,14 +304,14 @@ class Libraries(Mapping[Middleware, MessageLibrary]):
         return iter(self._makers)
 
     def __len__(self) -> int:
-        """How many middlewares there are."""
+        """The number of middlewares."""
         return len(self._makers)
 
 
 def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None) -> Libraries:
-    """A library of each middleware, for those who speak several.
+    """The libraries of all middlewares.
 
-    `store` is a distribution of one of them; the other keeps its default. Raises `InputError` for an unknown one.
+    `store` is a distribution of one of them; the others keep their defaults. Raises `InputError` for an unknown one.
     """
     known = {ros: ros.distributions() for ros in middlewares()}
     if store is not None and not any(store in names for names in known.values()):
@@ -325,7 +325,7 @@ def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, stor
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
-    """The text of the first file; it is a fault if one cannot be read, or another one differs, or is not UTF-8."""
+    """The text of the files; adds a fault if one cannot be read, differs from the first, or is not UTF-8."""
     contents = [_content(path, faults) for path in paths]
     if faults.found:
         return ""
@@ -341,7 +341,7 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
 
 
 def _content(path: Path, faults: Diagnostics) -> bytes:
-    """The bytes of a file; nothing, with the fault noted, if it cannot be read."""
+    """The bytes of a file; if it cannot be read, adds a fault and returns no bytes."""
     try:
         return read_regular(path, MOST_FILE_BYTES)
     except OSError as error:
@@ -359,7 +359,7 @@ def _part(name: MessageName, source: _Source) -> Part:
 
 
 def _check_folder(path: Path, source: SourceRef | None, faults: Diagnostics) -> None:
-    """Note it if one of the user's folders would give nothing to any library."""
+    """Add a fault if none of the libraries can use the folder."""
     suffixes = known_suffixes()
     if any(interface_files(path, suffixes).values()):
         return

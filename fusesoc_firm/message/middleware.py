@@ -1,7 +1,7 @@
-"""What a middleware is to all other rooms: where its messages come from, and how they lie on the wire.
+"""The interface of a middleware: the sources of its messages, and their serialisation rules.
 
 A middleware is a module with one `Middleware` value, and the line in `message/__init__.py` that registers it.
-docs/how-to/add-a-middleware.md shows how a third one is added.
+docs/how-to/add-a-middleware.md explains how to add one.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 class Store(Protocol):
-    """Definitions that are there without a file of the user; `title` says whose they are."""
+    """Definitions that need no file of the user; `title` names the store."""
 
     title: str
 
     @property
     def names(self) -> frozenset[MessageName]:
-        """All messages of the store."""
+        """The names of all messages in the store."""
 
     def text(self, name: MessageName) -> str:
         """The definition of one of `names`."""
 
     def file(self, name: MessageName) -> str:
-        """What stands for a file's name in errors."""
+        """A substitute for the file's name in errors."""
 
 
 class Parse(Protocol):
-    """Reads a definition; every fault goes to `diagnostics`, what is right to the result."""
+    """Parses a definition; faults are added to `diagnostics`, and valid parts are returned."""
 
     def __call__(
         self, text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics
     ) -> MessageDefinition:
-        """The definition of message `name` in the text of `file`."""
+        """Return the definition of message `name` in the text of `file`."""
 
 
 class Signature(Protocol):
-    """Tells by one word whether two ends of a topic mean the same message."""
+    """Computes a word that is equal on both ends of a topic if they use the same message."""
 
     def __call__(
         self,
@@ -51,18 +51,18 @@ class Signature(Protocol):
         definitions: Definitions,
         kind: InterfaceKind = InterfaceKind.MESSAGE,
     ) -> str:
-        """The signature of a message, or of a service or action; `definitions` hold all within it."""
+        """Return the signature of a message, service or action; `definitions` contains all nested messages."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Middleware:
-    """All that is asked about a middleware: there is one value of each, which is compared by identity.
+    """All properties of a middleware. Each has one value, which is compared by identity.
 
-    `title` is its name in comments and messages, `number` the one that options and reports have, `words` are what the
-    files of users call it. `suffixes` are those of the files that define its messages, without the dot, and `folders`
-    the places where an environment has such files. `store` gives the definitions of one of `distributions`, of a
-    default for None; it raises `InputError` for any other. `builtin_types` are the types that are no message, for
-    hints. `aliases` are former names of messages, each with the present one: both are the same message.
+    `title` is its name in comments and messages, `number` its number in options and reports, and `words` are its names
+    in users' files. `suffixes` are those of the files that define its messages, without the dot. `folders` returns the
+    places of these files in an environment. `store` returns the definitions of one of `distributions`, or of the
+    default for None; it raises `InputError` for any other name. `builtin_types` lists, for hints, the types that are
+    not messages. `aliases` maps former names of messages to present ones: both are the same message.
     """
 
     number: int
@@ -84,22 +84,22 @@ class Middleware:
         return self.title
 
     def __hash__(self) -> int:
-        """The same in every process, and so the order of sets."""
+        """The same in every process, so that the order of sets is, too."""
         return self.number
 
     def __reduce__(self) -> tuple[Callable[[int], Middleware], tuple[int]]:
-        """Another process has its own value."""
+        """Unpickle to the value of the receiving process."""
         return middleware_of, (self.number,)
 
 
 _registered: dict[int, Middleware] = {}
 
 MIDDLEWARES: dict[str, Middleware] = {}
-"""By the words of the files of users."""
+"""The middlewares by their names in users' files."""
 
 
 def register(middleware: Middleware) -> None:
-    """Make a middleware known to everybody; ValueError if its number is taken."""
+    """Register a middleware. Raises ValueError if its number is taken."""
     if middleware.number in _registered:
         raise ValueError(f"{middleware.number} is {_registered[middleware.number].title}")
     _registered[middleware.number] = middleware
@@ -107,15 +107,15 @@ def register(middleware: Middleware) -> None:
 
 
 def middleware_of(number: int) -> Middleware:
-    """The middleware of a number; KeyError for one that is not registered."""
+    """The middleware with this number. Raises KeyError if it is not registered."""
     return _registered[number]
 
 
 def middlewares() -> list[Middleware]:
-    """All of them, in the order of their numbers."""
+    """All registered middlewares, in the order of their numbers."""
     return [_registered[number] for number in sorted(_registered)]
 
 
 def known_suffixes() -> dict[str, InterfaceKind]:
-    """The suffixes of the files that define messages, of whichever middleware."""
+    """The suffixes of the files that define messages, for all middlewares."""
     return {suffix: kind for middleware in _registered.values() for suffix, kind in middleware.suffixes.items()}

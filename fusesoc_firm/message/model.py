@@ -1,7 +1,7 @@
-"""The Message model: the first stage, a definition as its author wrote it.
+"""The message model, the first stage: a definition as its author wrote it.
 
-Nothing here knows how a message lies on the wire (`frame`) or in hardware (`converter`). All values are
-frozen, so a definition can be a dictionary key and can be shared.
+Wire layout (`frame`) and hardware (`converter`) are unknown here. All values are frozen, so a definition can be a
+dictionary key and can be shared.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class InterfaceKind(StrEnum):
-    """What a file defines, in ROS's own word: the file's suffix, its folder, and the middle of ROS 2's full names."""
+    """The kind of interface: the file's suffix, its folder, and the middle part of ROS 2's full names."""
 
     MESSAGE = "msg"
     SERVICE = "srv"
@@ -27,7 +27,7 @@ class InterfaceKind(StrEnum):
 
 @dataclass(frozen=True, order=True)
 class MessageName:
-    """`geometry_msgs/Quaternion`; the ROS 2 spelling `geometry_msgs/msg/Quaternion` reads as the same name."""
+    """A name such as `geometry_msgs/Quaternion`; ROS 2's spelling `geometry_msgs/msg/Quaternion` is the same name."""
 
     package: str
     name: str
@@ -38,7 +38,7 @@ class MessageName:
 
 @dataclass(frozen=True)
 class PrimitiveType:
-    """A number, `bool`, or ROS 1's `time` and `duration`, by the name ROS gives it (`byte` and `char` included)."""
+    """A number, `bool`, or ROS 1's `time` or `duration`, by its ROS name (including `byte` and `char`)."""
 
     name: str
 
@@ -48,7 +48,7 @@ class PrimitiveType:
 
 @dataclass(frozen=True)
 class StringType:
-    """`string` or, if `is_wide`, `wstring`; `bound` counts characters and is None where there is none."""
+    """`string` or, if `is_wide`, `wstring`; `bound` limits the number of characters and may be None."""
 
     is_wide: bool = False
     bound: int | None = None
@@ -97,7 +97,7 @@ FieldType = ElementType | ArrayType | SequenceType
 
 
 def nested_message(kind: FieldType) -> MessageName | None:
-    """The message that a field of this type holds, once or as an array."""
+    """The message that a field of this type contains, directly or as array elements."""
     element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
     return element.name if isinstance(element, MessageType) else None
 
@@ -108,7 +108,7 @@ DefaultValue = Scalar | tuple[Scalar, ...]
 
 @dataclass(frozen=True)
 class Field:
-    """A field; `default` is None where the definition gives none (only ROS 2 can)."""
+    """A field; `default` is None if the definition has none (only ROS 2 has defaults)."""
 
     name: str
     type: FieldType
@@ -118,9 +118,9 @@ class Field:
 
 @dataclass(frozen=True)
 class Constant:
-    """A named value of the definition; it is never sent.
+    """A named value of the definition, which is never sent.
 
-    `text` is the value as its author wrote it, without the blanks around it: ROS 1's MD5 sum tells `1` from `+1`.
+    `text` is the value as its author wrote it, without surrounding blanks: ROS 1's MD5 sum distinguishes `1` from `+1`.
     """
 
     name: str
@@ -132,10 +132,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class MessageDefinition:
-    """A `.msg` file, or a message that ROS derives from a `.srv` or `.action` file, as `kind` says.
-
-    `fields` are in wire order.
-    """
+    """A `.msg` file, or a message that ROS derives from a `.srv` or `.action` file, depending on `kind`."""
 
     name: MessageName
     ros: Middleware
@@ -146,4 +143,4 @@ class MessageDefinition:
 
 
 Definitions = Mapping[MessageName, MessageDefinition]
-"""A message and all within it, by their names."""
+"""A message and all nested messages, by name."""

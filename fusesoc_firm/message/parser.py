@@ -1,4 +1,4 @@
-r"""`.msg` text to Message: our own parser, because errors need line and column and rosbags' parser loses defaults.
+r"""Parses `.msg` text. rosbags' parser loses defaults and gives no line and column for errors.
 
     line        = [ declaration ] [ "#" comment ]
     declaration = type name [ default ]             a field; defaults: ROS 2
@@ -7,8 +7,8 @@ r"""`.msg` text to Message: our own parser, because errors need line and column 
     element     = primitive | string [ "<=" size ] | [ package "/" [ "msg/" ] ] message
     default     = scalar | "[" [ scalar { "," scalar } ] "]"
 
-What is legal in which version stands in `dialect`. A line with "=" behind its first word is a constant, in both.
-Each line is read on its own, so one faulty line hides nothing in the next.
+`dialect` lists the differences between the versions. In both, a line with "=" after its first word is a constant. Each
+line is parsed on its own, so a faulty line does not hide faults in the next.
 """
 
 from __future__ import annotations
@@ -44,15 +44,12 @@ _TYPE = re.compile(r"([^\[\]]+)(?:\[([^\[\]]*)\])?")
 
 
 def parse_name(text: str) -> MessageName:
-    """`pkg/Type`, `pkg/msg/Type` or, for messages of services and actions, `pkg/srv/Type_Request` to a name.
-
-    Raises `InputError` for anything else.
-    """
+    """Parse `pkg/Type`, `pkg/msg/Type` or, for messages of services and actions, `pkg/srv/Type_Request`."""
     return parse_full_name(text)[1]
 
 
 def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
-    """As `parse_name`, with the kind that the text names, if any."""
+    """Like `parse_name`, but also return the kind that the text names, if any."""
     match = _NAME.fullmatch(text.strip())
     if match is None:
         fail(f"'{text}' is not a message name", hint="write 'package/Type', like 'geometry_msgs/Quaternion'")
@@ -61,7 +58,7 @@ def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
 
 
 def dialect_of(ros: Middleware) -> Dialect:
-    """The rules of a version's `.msg` files."""
+    """The rules of a middleware's `.msg` files."""
     assert ros.dialect is not None, f"{ros.title} has no .msg files"
     return ros.dialect
 
@@ -69,14 +66,14 @@ def dialect_of(ros: Middleware) -> Dialect:
 def parse_message(
     text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics
 ) -> MessageDefinition:
-    """The definition in the text of a `.msg` file; every fault goes to `diagnostics`, what is right to the result."""
+    """Parse the text of a `.msg` file; faults are added to `diagnostics`, and valid parts are returned."""
     return _parse_lines(read_lines(text, file), name, ros, file, diagnostics)
 
 
 def parse_sections(
     text: str, names: Sequence[MessageName], ros: Middleware, file: str, diagnostics: Diagnostics
 ) -> list[MessageDefinition]:
-    """The definitions in a `.srv` or `.action` file, whose sections are parted by `---`: one for each of `names`."""
+    """Parse a `.srv` or `.action` file into one definition for each of `names`; `---` separates the sections."""
     sections: list[list[Piece]] = [[]]
     for line in read_lines(text, file):
         if not line.text.startswith(_SEPARATOR):
@@ -93,12 +90,12 @@ def parse_sections(
 
 
 def service_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of a service's request and response, as the version calls them."""
+    """The names of a service's request and response in this middleware."""
     return _derived_names(name, ros, ("Request", "Response"))
 
 
 def action_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of an action's goal, result and feedback, as the version calls them."""
+    """The names of an action's goal, result and feedback in this middleware."""
     return _derived_names(name, ros, ("Goal", "Result", "Feedback"))
 
 
@@ -120,7 +117,7 @@ def _parse_lines(
 
 
 class _Reader:
-    """Reads the lines of one message, notes every fault, and keeps the declarations that have none."""
+    """Parses the lines of one message, reports every fault, and keeps the valid declarations."""
 
     def __init__(self, name: MessageName, dialect: Dialect, diagnostics: Diagnostics) -> None:
         self.fields: list[Field] = []
@@ -131,7 +128,7 @@ class _Reader:
         self._first_line: dict[str, int] = {}
 
     def read(self, line: Piece) -> None:
-        """Take in one line."""
+        """Parse one line."""
         code, _ = line.partition("#")
         if not code.text:
             return
@@ -194,7 +191,7 @@ class _Reader:
 
     def _check_name(self, name: Piece, rule: NameRule) -> bool:
         if not rule.accepts(name.text):
-            # A default such as `s "a=b"` ends up here: the reference takes the line for a constant, too.
+            # A default such as `s "a=b"` gets here: the reference parser, too, takes the line for a constant.
             is_default = len(name.text.split()) > 1
             hint = "a line with '=' is a constant, even if the '=' is in quotes" if is_default else rule.hint
             self._diagnostics.error(rule.fault(name.text, self._dialect.title), name.source, hint)
@@ -228,7 +225,7 @@ class _Reader:
         return ArrayType(element, length) if element and length is not None else None
 
     def _bound(self, piece: Piece) -> int | None:
-        """The number behind `<=`, with which `piece` starts."""
+        """The number after the `<=` at the start of `piece`."""
         if not self._dialect.has_bounds:
             self._diagnostics.error(f"{self._dialect.title} has no bounds like '{piece.text}'", piece.source)
             return None
@@ -236,7 +233,7 @@ class _Reader:
 
     def _size(self, piece: Piece, smallest: int) -> int | None:
         digits = piece.text.lstrip("0") or "0"
-        # Python refuses to read a number of thousands of digits, so their count is looked at first.
+        # Python refuses to convert numbers with thousands of digits, so the length is checked first.
         is_short = piece.text.isascii() and piece.text.isdigit() and len(digits) <= len(str(LARGEST_SIZE))
         if is_short and smallest <= int(digits) <= LARGEST_SIZE:
             return int(digits)

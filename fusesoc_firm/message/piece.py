@@ -1,4 +1,4 @@
-"""Text that knows its place: every part the parser cuts out of a line can be pointed at in an error."""
+"""Text with its position, so that an error can point at any part of a line."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from fusesoc_firm.text.diagnostics import SourceRef
 
 _BYTE_ORDER_MARK = "\ufeff"
-# Not str.splitlines(): a form feed or U+2028 in a comment ends no line in any editor.
+# Not str.splitlines(): editors do not end a line at a form feed or U+2028.
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _BLANKS = re.compile(r"\s+")
 
 
 @dataclass(frozen=True)
 class Piece:
-    """The characters `start` to `end` (exclusive, from 0) of the line `line_text`, which is number `line` of `file`."""
+    """The characters `start` to `end` (exclusive, from 0) of `line_text`, which is line `line` of `file`."""
 
     file: str
     line: int
@@ -31,7 +31,7 @@ class Piece:
 
     @property
     def source(self) -> SourceRef:
-        """The place, for an error or for the model."""
+        """The source reference, for an error or for the model."""
         return SourceRef(self.file, self.line, self.start + 1, self.line_text, max(1, self.end - self.start))
 
     def part(self, start: int, end: int | None = None) -> Piece:
@@ -40,12 +40,12 @@ class Piece:
         return Piece(self.file, self.line, self.line_text, self.start + start, stop)
 
     def strip(self) -> Piece:
-        """The piece without the blanks at its ends."""
+        """The piece without leading and trailing blanks."""
         start = len(self.text) - len(self.text.lstrip())
         return self.part(start, max(start, len(self.text.rstrip())))
 
     def partition(self, separator: str) -> tuple[Piece, Piece]:
-        """What stands before and behind the first `separator`, stripped; without one, everything stands before it."""
+        """The parts before and after the first `separator`, stripped; without a separator, the second part is empty."""
         before, found, _ = self.text.partition(separator)
         return self.part(0, len(before)).strip(), self.part(len(before) + len(found)).strip()
 
@@ -56,6 +56,6 @@ class Piece:
 
 
 def read_lines(text: str, file: str) -> Iterator[Piece]:
-    """The lines of a text without line ends and byte order mark, numbered from 1."""
+    """Split a text into lines, numbered from 1, without line ends and byte order mark."""
     for number, line in enumerate(_LINE_END.split(text.removeprefix(_BYTE_ORDER_MARK)), start=1):
         yield Piece(file, number, line, 0, len(line))

@@ -1,4 +1,4 @@
-"""Message to `.msg` text: one canonical, aligned spelling, which the parser reads back as the same message."""
+"""Prints a message as `.msg` text in one canonical, aligned form, which the parser reads back as the same message."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import Constant, DefaultValue, Definitions, MessageDefinition, MessageName, Scalar
 
-# What parts a message's text from those of the messages within it, in ROS' bags and connection headers.
+# The line between a message and its nested messages in ROS's bags and connection headers.
 _SEPARATOR = "=" * 80
 
 
 def to_text(definition: MessageDefinition, signature: str = "") -> str:
     """The definition as `.msg` text: constants, then fields in wire order.
 
-    A comment names the message, its version and, if given, its signature.
+    A comment gives the message's name, its version and, if given, its signature.
 
-    Every value that the parser can deliver is written so that it reads back (ROS 2 has no way to write a `#`).
+    The parser reads every printed value back unchanged (ROS 2 cannot express a `#`).
     """
     ros = definition.ros
     constants = [(str(c.type), c.name, f"= {_constant(c, ros)}") for c in definition.constants]
@@ -28,7 +28,7 @@ def to_text(definition: MessageDefinition, signature: str = "") -> str:
 
 
 def closure_text(name: MessageName, definitions: Definitions) -> str:
-    """The texts of a message and of all others in `definitions`, as ROS' bags and connection headers join them."""
+    """The texts of a message and all others in `definitions`, joined as in ROS's bags and connection headers."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{to_text(definitions[other])}" for other in definitions if other != name]
     return "".join([to_text(definitions[name]), *others])
 
@@ -39,7 +39,7 @@ def _aligned(rows: Sequence[tuple[str, str, str]]) -> list[str]:
 
 
 def _constant(constant: Constant, ros: Middleware) -> str:
-    # ROS 1's MD5 sum is one of the value's text, and must be the same for the printed message.
+    # ROS 1's MD5 sum depends on the value's text, and must not change when a message is printed.
     return constant.text if ros is ROS1 else _scalar(constant.value)
 
 
@@ -52,7 +52,7 @@ def _default(value: DefaultValue | None) -> str:
 
 
 def _element(value: Scalar) -> str:
-    # Within an array `\"` never closes a string, so one that ends in `\` stands without quotes.
+    # Within an array, `\"` never closes a string, so a string that ends in `\` is printed without quotes.
     return value if isinstance(value, str) and value.endswith("\\") else _scalar(value)
 
 

@@ -1,4 +1,4 @@
-"""ROS 1: a serialisation that is little-endian, without alignment and prefix (dissertation, section 3.3)."""
+"""ROS 1: its serialisation is little-endian, without alignment and prefix (dissertation, section 3.3)."""
 
 from functools import partial
 from types import MappingProxyType
@@ -31,7 +31,7 @@ _RULES = WireRules(
 MIDDLEWARE = Middleware(
     number=1,
     title=dialect.ROS1.title,
-    # ROS was once all there was.
+    # ROS 1 was simply called ROS before ROS 2.
     words=("ROS", "ROS1"),
     rules=_RULES,
     parse=parser.parse_message,

@@ -1,8 +1,8 @@
-"""ROS 2: a serialisation that is XCDR version 1 as DDS-XTYPES 1.3, section 7.4, defines it, little-endian.
+"""ROS 2: its serialisation is little-endian XCDR version 1, as defined in DDS-XTYPES 1.3, section 7.4.
 
-The header's first two bytes name the encoding and are checked; the other two are options that a receiver
-ignores. Writers round a payload up to a multiple of four, so up to three bytes may trail. Nothing is padded
-between the count of an empty sequence and what follows.
+The header's first two bytes name the encoding and are checked; the other two are options, which receivers ignore.
+Writers pad a payload to a multiple of four, so up to three trailing bytes may follow. There is no padding between the
+count of an empty sequence and the following value.
 """
 
 from functools import partial

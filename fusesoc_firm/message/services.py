@@ -1,7 +1,7 @@
-"""The messages of services and actions: the sections of their files, and what ROS wraps around these.
+"""The messages of services and actions: the sections of their files, and the messages that ROS derives from these.
 
-The wrapping messages of ROS 1 are those of actionlib_msgs' genaction.py, the ones of ROS 2 those of rosidl_parser's
-`Service` and `Action`.
+The derived messages follow actionlib_msgs' genaction.py for ROS 1, and rosidl_parser's `Service` and `Action` for ROS
+2.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, Message
 from fusesoc_firm.message.parser import action_names, parse_message, parse_sections, service_names
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# ROS 2 has events of services, and hashes, since the distribution (Iron) that brought this message.
+# ROS 2 has service events and hashes since Iron, the distribution that introduced this message.
 EVENT_INFO = MessageName("service_msgs", "ServiceEventInfo")
 
-# Suffix of a wrapping message and its text; `{0}` is the name of the service or action.
+# The suffix of a derived message and its text; `{0}` is the name of the service or action.
 _Wrappers = Mapping[str, str]
 
 _ROS1_ACTION: _Wrappers = {
@@ -49,7 +49,7 @@ _ROS2_ACTION_EVENTS: _Wrappers = {
 
 @dataclass(frozen=True)
 class Interface:
-    """A service or an action. `has_events` adds the events of services in ROS 2, which hold an `EVENT_INFO`."""
+    """A service or an action. `has_events` adds ROS 2's service events, which contain an `EVENT_INFO`."""
 
     name: MessageName
     kind: InterfaceKind
@@ -57,27 +57,27 @@ class Interface:
     has_events: bool
 
     def __str__(self) -> str:
-        """Its full name, such as `std_srvs/srv/SetBool`."""
+        """The full name, such as `std_srvs/srv/SetBool`."""
         return f"{self.name.package}/{self.kind}/{self.name.name}"
 
     @property
     def messages(self) -> tuple[MessageName, ...]:
-        """The names of its messages, those that its file defines first."""
+        """The names of its messages; those that its file defines come first."""
         return self._sections + tuple(self._suffixed(suffix) for suffix in self._wrappers)
 
     @property
     def exchanged(self) -> tuple[MessageName, ...]:
-        """Those that the two ends exchange: all but the events, which ROS 2 itself publishes about a service."""
+        """The messages that the two ends exchange: all except the events, which ROS 2 itself publishes."""
         events = {self._suffixed(suffix) for suffix in (*_ROS2_SERVICE_EVENT, *_ROS2_ACTION_EVENTS)}
         return tuple(name for name in self.messages if self.ros is ROS1 or name not in events)
 
     @property
     def has_signature(self) -> bool:
-        """Whether its version of ROS gives it one: ROS 2 knows no hashes before events."""
+        """Whether its version of ROS defines a signature: ROS 2 has no hashes before events."""
         return self.ros is ROS1 or self.has_events
 
     def parse(self, text: str, file: str, diagnostics: Diagnostics) -> dict[MessageName, MessageDefinition]:
-        """Its messages, by the text of its file; every fault goes to `diagnostics`, what is right to the result."""
+        """Parse the text of its file into messages; faults are added to `diagnostics`, and valid parts are returned."""
         sections = parse_sections(text, self._sections, self.ros, file, diagnostics)
         wrappers = [self._wrapper(suffix, wrapper, file) for suffix, wrapper in self._wrappers.items()]
         return {message.name: replace(message, kind=self.kind) for message in (*sections, *wrappers)}
@@ -99,8 +99,8 @@ class Interface:
         return MessageName(self.name.package, self.name.name + suffix)
 
     def _wrapper(self, suffix: str, text: str, file: str) -> MessageDefinition:
-        """A wrapping message; since no line of the file says its fields, they all point to the file's beginning."""
-        # The only fault there can be is the name's, which the sections report.
+        """A derived message; its fields are not in the file, so all refer to the start of the file."""
+        # The only possible fault is in the name, and the sections report it.
         ignored = Diagnostics()
         definition = parse_message(text.format(self.name.name), self._suffixed(suffix), self.ros, file, ignored)
         fields = tuple(replace(field, source=definition.source) for field in definition.fields)

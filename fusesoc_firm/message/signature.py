@@ -1,9 +1,9 @@
-"""Signatures, by which two ends of a topic tell that they mean the same message: ROS 1's MD5 sum, ROS 2's RIHS01 hash.
+"""Computes signatures, which two ends of a topic compare: ROS 1's MD5 sum and ROS 2's RIHS01 hash.
 
-The MD5 sum is that of genmsg 0.6.0 (`compute_md5_text`): of the constants with their values as written, then of the
-fields, where a nested message stands as its own sum. The hash is that of REP-2011 and REP-2016 (`RIHS01`): SHA-256 of
-the JSON of a type description, which lists the fields of the type and of all types within it, without their constants
-and default values.
+The MD5 sum follows genmsg 0.6.0 (`compute_md5_text`). It covers the constants, with their values as written, then the
+fields; a nested message is replaced by its own sum. The hash follows REP-2011 and REP-2016 (`RIHS01`): SHA-256 of the
+JSON of a type description, which lists the fields of the type and of all nested types, without constants and default
+values.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fusesoc_firm.message.model import (
     nested_message,
 )
 
-# type_description_interfaces/FieldType. `char` is rosidl_adapter's: it makes an IDL's uint8 of it, never a char.
+# Source: type_description_interfaces/FieldType. rosidl_adapter converts `char` to an IDL uint8, never to char.
 _TYPE_IDS = {
     "int8": 2,
     "uint8": 3,
@@ -44,23 +44,24 @@ _TYPE_IDS = {
     "byte": 16,
 }
 _NESTED, _STRING, _WIDE_STRING, _BOUNDED_STRING, _BOUNDED_WIDE_STRING = 1, 17, 18, 21, 22
-# What an array adds to the type of its elements.
+# The offsets that arrays add to the type ids of their elements.
 _ARRAY, _BOUNDED_SEQUENCE, _UNBOUNDED_SEQUENCE = 48, 96, 144
 
-# An IDL has no empty struct, so rosidl_adapter gives it this field.
+# An IDL struct cannot be empty, so rosidl_adapter adds this field.
 _ONLY_MEMBER = ("structure_needs_at_least_one_member", PrimitiveType("uint8"))
 
 
 def signature(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The signature that the definitions' middleware has: `md5` and `rihs01` are those of ROS."""
+    """The signature in the definitions' middleware; for ROS, see `md5` and `rihs01`."""
     return next(iter(definitions.values())).ros.signature(name, definitions, kind)
 
 
 def md5(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
     """The MD5 sum of a message, service or action of ROS 1: 32 hexadecimal digits.
 
-    `definitions` hold the message, or the messages of the service or action, and all within them (else KeyError). An
-    action has no sum of its own; its `...Action` message, which holds the other six, stands for it.
+    `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
+    KeyError). An action has no sum of its own; the sum of its `...Action` message, which contains the other six,
+    replaces it.
     """
 
     @cache
@@ -71,14 +72,14 @@ def md5(name: MessageName, definitions: Definitions, kind: InterfaceKind = Inter
         definition = definitions[message]
         lines = [f"{constant.type} {constant.name}={constant.text}" for constant in definition.constants]
         for field in definition.fields:
-            # A nested message's sum stands without the brackets of an array.
+            # The sum of a nested message omits an array's brackets.
             nested = nested_message(field.type)
             lines.append(f"{sum_of(nested) if nested else field.type} {field.name}")
         return "\n".join(lines)
 
     suffixes = {
         InterfaceKind.MESSAGE: ("",),
-        InterfaceKind.SERVICE: ("Request", "Response"),  # one behind the other, without a line end between them
+        InterfaceKind.SERVICE: ("Request", "Response"),  # concatenated without a line end
         InterfaceKind.ACTION: ("Action",),
     }
     return _md5_of("".join(text_of(_suffixed(name, suffix)) for suffix in suffixes[kind]))
@@ -91,7 +92,8 @@ def _md5_of(text: str) -> str:
 def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
     """The hash of a message, service or action of ROS 2: `RIHS01_` and 64 hexadecimal digits.
 
-    `definitions` hold the message, or the messages of the service or action, and all within them (else KeyError).
+    `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
+    KeyError).
     """
     describer = _Describer(definitions)
     match kind:
@@ -106,12 +108,12 @@ def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = In
         "type_description": described[top],
         "referenced_type_descriptions": [described[other] for other in sorted(described) if other != top],
     }
-    # The order of keys and the blanks behind ',' and ':' belong to the standard; they are json's own.
+    # The standard fixes the order of keys and the blanks after ',' and ':'; json's defaults match.
     return f"RIHS01_{hashlib.sha256(json.dumps(description).encode()).hexdigest()}"
 
 
 class _Describer:
-    """Describes a type and all types within it; every method gives the full name of what it described."""
+    """Describes a type and its nested types; each method returns the full name of the described type."""
 
     def __init__(self, definitions: Definitions) -> None:
         self.descriptions: dict[str, dict[str, Any]] = {}
@@ -126,7 +128,7 @@ class _Describer:
         return full_name
 
     def service(self, name: MessageName, kind: InterfaceKind) -> str:
-        """A service, or (by `kind`) one of the two that an action is made of."""
+        """Describe a service or, depending on `kind`, one of the two services of an action."""
         members = {
             "request_message": self.message(_suffixed(name, "_Request")),
             "response_message": self.message(_suffixed(name, "_Response")),
@@ -175,7 +177,7 @@ def _described_field(
 
 
 def _array_of(kind: FieldType) -> tuple[PrimitiveType | StringType | MessageType, int, int]:
-    """The element of a type, what an array adds to the element's type id, and the array's size or bound."""
+    """The element of a type, the offset that an array adds to the element's type id, and the array's size or bound."""
     if isinstance(kind, ArrayType):
         return kind.element, _ARRAY, kind.length
     if isinstance(kind, SequenceType):

@@ -1,4 +1,4 @@
-"""The definitions that rosbags ships: those of every ROS distribution, so that common messages need no ROS."""
+"""The definitions in rosbags: those of every ROS distribution, so that common messages do not require ROS."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.text.diagnostics import fail, nearest
 
-# The newest distributions with long-term support that FIRM's round trips are tested against.
+# The newest distributions with long-term support that the round-trip tests use.
 _DEFAULTS = {1: "noetic", 2: "jazzy"}
 _TRANSFORMS = "geometry_msgs/TransformStamped[] transforms\n"
-# What rosbags' tables lack of a version: messages of tf2 and tf, which every robot's bags hold.
+# Messages of tf2 and tf, which most bags contain but rosbags' tables do not.
 _ADDED = {
     1: {
         MessageName("tf2_msgs", "TFMessage"): _TRANSFORMS,
         MessageName("tf", "tfMessage"): _TRANSFORMS,
     }
 }
-# rosbags parts a message's own text from those of its nested types by this line.
+# rosbags separates a message's own text from its nested types with this line.
 _NEXT_DEFINITION = "=" * 80
 
 
@@ -38,12 +38,12 @@ def _prefix(version: int) -> str:
 class DistributionStore:
     """The definitions of one distribution.
 
-    Its texts come from rosbags' tables: names, types, bounds and constants are the distribution's, but comments and
-    default values are lost, and ROS 1's `Header` is written in full. What the tables lack (`_ADDED`) is here, too.
+    The texts come from rosbags' tables. Names, types, bounds and constants match the distribution, but comments and
+    default values are lost, and ROS 1's `Header` is expanded. `_ADDED` supplies messages missing from the tables.
     """
 
     def __init__(self, version: int, distribution: str | None = None) -> None:
-        """`distribution` is one of `distributions`; None takes the default. Raises `InputError` for another."""
+        """`distribution` is one of `distributions`; None selects the default. Raises `InputError` for any other."""
         chosen = _DEFAULTS[version] if distribution is None else distribution
         if chosen not in distributions(version):
             fail(f"'{chosen}' is not a distribution of ROS {version}", hint=nearest(chosen, distributions(version)))
@@ -57,7 +57,7 @@ class DistributionStore:
 
     @cached_property
     def names(self) -> frozenset[MessageName]:
-        """All messages of the distribution."""
+        """The names of all messages in the distribution."""
         names = {parse_name(name) for name in self._typestore.fielddefs} | self._added.keys()
         # rosbags keeps ROS 1's primitives `time` and `duration` as messages of ROS 2.
         return frozenset(name for name in names if self._version == 2 or name.package != "builtin_interfaces")
@@ -74,5 +74,5 @@ class DistributionStore:
         return text.partition(_NEXT_DEFINITION)[0]
 
     def file(self, name: MessageName) -> str:
-        """What stands for a file's name in errors."""
+        """A substitute for the file's name in errors."""
         return f"<{self.title}>/{name}"

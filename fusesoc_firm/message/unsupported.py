@@ -1,7 +1,7 @@
-"""What other definition languages have and `.msg` has not: named as such, with what says the same in a `.msg`.
+"""Features of other definition languages that `.msg` lacks, each with its name and the equivalent in `.msg`.
 
-docs/explanation/frames.md gives each a place in a Frame. Nothing here is legal in either version of ROS: a form is one
-that both reference parsers refuse, and a word is looked at only where no message can have that name, or none has.
+docs/explanation/frames.md gives each a place in a Frame. None of them is legal in ROS 1 or ROS 2: both reference
+parsers refuse each form, and a word is looked up only if no message can have, or has, that name.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from fusesoc_firm.message.piece import Piece
 
 @dataclass(frozen=True)
 class Feature:
-    """A feature, how people write it at the beginning of a line and its words alone."""
+    """A feature, its usual form at the start of a line, and its keywords."""
 
     name: str
     form: re.Pattern[str]
@@ -23,7 +23,7 @@ class Feature:
 
     @property
     def fault(self) -> str:
-        """What to tell."""
+        """The message for the user."""
         return f"{self.name} are not supported by .msg"
 
 
@@ -31,7 +31,7 @@ def _feature(name: str, words: str, forms: tuple[str, ...], hint: str) -> Featur
     return Feature(name, re.compile("|".join(f"(?:{form})" for form in forms)), frozenset(words.split()), hint)
 
 
-# A keyword with two words or a block behind it; with one word it is a field's type.
+# A keyword followed by two words or a block; followed by one word, it is a field's type.
 _DECLARATION = r"{}(?=\s+\S+\s+\S|\s*\{{|\s+\w+\s*\{{)"
 
 FEATURES = (
@@ -87,7 +87,7 @@ FEATURES = (
 
 
 def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
-    """The feature that a line without its comment asks for, and the part that does."""
+    """The feature that a line (without its comment) uses, and the part of the line that uses it."""
     for feature in FEATURES:
         if match := feature.form.match(code.text):
             return feature, code.part(0, match.end())
@@ -95,5 +95,5 @@ def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
 
 
 def unsupported_word(type_name: str) -> Feature | None:
-    """The feature that somebody means who takes this word for a type."""
+    """The unsupported feature that this type name suggests, or None."""
     return next((feature for feature in FEATURES if type_name.lower() in feature.words), None)

@@ -1,4 +1,4 @@
-"""The values of constants and defaults: text to Python, checked against the range of their type."""
+"""Parses the values of constants and defaults, and checks them against the range of their type."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from fusesoc_firm.message.piece import Piece
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 _QUOTES = ('"', "'")
-# An element of an array is quoted, with `\"` for the quote itself, or takes all up to the comma. Possessive, or the
-# quote of `\"` could also close.
+# An array element is either quoted, with `\"` for a quote, or extends to the comma. The match is possessive, since
+# otherwise the quote of `\"` could also close the string.
 _ELEMENT = re.compile(r"""\s*("(?:\\"|[^"])*+"|'(?:\\'|[^'])*+'|[^\s,"'](?:[^,]*[^\s,])?)\s*(?:,|$)""")
 
 
 def read_value(
     piece: Piece, kind: PrimitiveType | StringType, dialect: Dialect, diagnostics: Diagnostics
 ) -> Scalar | None:
-    """The value of a constant, of a default or of one of its elements; None if a fault was noted."""
+    """The value of a constant, a default or an element of a default; None if a fault was reported."""
     try:
         return _scalar(piece.text, kind, dialect)
     except ValueError as fault:
@@ -38,7 +38,7 @@ def read_value(
 
 
 def read_default(piece: Piece, kind: FieldType, dialect: Dialect, diagnostics: Diagnostics) -> DefaultValue | None:
-    """A field's default value; None if a fault was noted."""
+    """The default value of a field; None if a fault was reported."""
     element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
     if isinstance(element, MessageType):
         diagnostics.error(f"a field of type {kind} has no default value", piece.source, "only primitive types have one")
@@ -70,7 +70,7 @@ def _array(
 
 
 def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
-    """The elements between the brackets; None if a fault was noted."""
+    """The elements between the brackets; None if a fault was reported."""
     elements: list[Piece] = []
     position = 0
     while inner.text.strip():
@@ -94,7 +94,7 @@ def _count_fault(kind: ArrayType | SequenceType, count: int) -> str:
 
 
 def _scalar(text: str, kind: PrimitiveType | StringType, dialect: Dialect) -> Scalar:
-    """The value of `text`, or a ValueError that says what is legal."""
+    """The value of `text`. Raises ValueError, which names the legal values."""
     if isinstance(kind, StringType):
         return _string(text, kind, dialect)
     if kind.name == "bool":
@@ -125,7 +125,7 @@ def _integer(text: str, kind: PrimitiveType, dialect: Dialect) -> int:
 
 def _whole_number(text: str, dialect: Dialect) -> int:
     try:
-        return int(text)  # first, since `010` is ten to both references
+        return int(text)  # decimal first: both references read `010` as ten
     except ValueError:
         if not dialect.has_integer_prefixes:
             raise
@@ -152,7 +152,7 @@ def _string(text: str, kind: StringType, dialect: Dialect) -> str:
 
 
 def _unquoted(text: str) -> str:
-    """Without the quotes round it; a text that is not in quotes on both sides stays, quotes and all."""
+    """Remove the surrounding quotes; a text that is not quoted at both ends is returned unchanged."""
     for quote in _QUOTES:
         if text.startswith(quote) and text.endswith(quote):
             inner = text[1:-1]

@@ -1,6 +1,6 @@
-"""What a middleware decides about the wire: types, alignment and the bytes around a message.
+"""The serialisation rules of a middleware: types, alignment and the bytes around a message.
 
-One `WireRules` value says it all; the layout and the codec ask nothing else.
+One `WireRules` value contains them all; the layout and the codec need nothing else.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 @dataclass(frozen=True)
 class WireType:
-    """How an element of a field is sent: its size in bytes and the `struct` code of its value."""
+    """The serialised form of a field's element: its size in bytes and the `struct` code of its value."""
 
     name: str
     size: int
@@ -19,7 +19,7 @@ class WireType:
 
     @property
     def bits(self) -> int:
-        """Bits of an element at a converter's port: a bool is one bit there although it is a byte on the wire."""
+        """The bits of an element at a converter's port: a bool has one bit there although it is a byte on the wire."""
         return 1 if self.name == "bool" else 8 * self.size
 
 
@@ -42,7 +42,7 @@ INTEGER_AND_FLOAT = MappingProxyType(
     }
 )
 
-# Texts are UTF-8 and UTF-16; a unit of the latter takes four bytes in ROS 2, as `wchar_t` does on Linux.
+# Texts are UTF-8 or UTF-16; a UTF-16 unit takes four bytes in ROS 2, like `wchar_t` on Linux.
 CHARACTER = WireType("character", 1, "B")
 WIDE_CHARACTER = WireType("wide character", 4, "I")
 
@@ -51,10 +51,10 @@ WIDE_CHARACTER = WireType("wide character", 4, "I")
 class WireRules:
     """The layout rules of one serialisation.
 
-    `scalars` gives the wire type of every primitive of one value; `compounds` the named parts of a primitive
-    that is sent as several values (ROS 1's `time`). `max_alignment` is 1 where nothing is aligned; offsets for
-    alignment count from behind `prefix`. `empty_bytes` is what a message without fields is sent as,
-    `string_terminator` how many zeros close a string and are part of its count (a wstring has none).
+    `scalars` maps each primitive with one value to its wire type; `compounds` lists the named parts of a primitive that
+    is sent as several values (ROS 1's `time`). `max_alignment` is 1 if nothing is aligned; alignment offsets count from
+    the end of `prefix`. `empty_bytes` is the serialised form of a message without fields. `string_terminator` is the
+    number of zeros that end a string and are part of its count (a wstring has none).
     """
 
     scalars: MappingProxyType[str, WireType]
@@ -67,5 +67,5 @@ class WireRules:
     trailing_bytes: int
 
     def alignment(self, size: int) -> int:
-        """What the offset of a value of `size` bytes is a multiple of."""
+        """The alignment in bytes of a value of `size` bytes."""
         return min(size, self.max_alignment)

@@ -1,12 +1,12 @@
-"""The door for FuseSoC: answers its call of a generator.
+"""Answers FuseSoC's call of a generator.
 
-FuseSoC starts a generator in an empty folder with one argument, a YAML file that holds the new core's name, the
-requesting core's folder and the parameters. It loads every `.core` that it finds in the folder afterwards, so that file
-is written last. What the generator prints is shown to the user as it is.
+FuseSoC starts a generator in an empty folder with one argument, a YAML file with the new core's name, the requesting
+core's folder and the parameters. Afterwards it loads every `.core` in the folder, so that file is written last. FuseSoC
+shows the generator's output to the user unchanged.
 
-A call is derived once (`Generator.load`): its inputs give the store's key, and the core is made of the same value if
-the store does not have it. Whatever the answer follows from is noted in the state that it had before it was used. If
-one of these facts has changed at the end, something was edited meanwhile, and nothing is kept.
+A call is derived once (`Generator.load`): its inputs give the store's key and, after a miss, the core is generated from
+the same value. Every fact that determines the result is recorded in its state before use. If one of these facts has
+changed at the end, an input was edited meanwhile, and nothing is stored.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from fusesoc_firm.store.store import Entry, Files, Key, default_store, request_d
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, fail
 from fusesoc_firm.tools.programs import explanation, missing
 
-# FuseSoC does so at the start of every run of a target.
+# FuseSoC removes it at the start of every run of a target.
 _REMOVED = """the folder that this generator was started in was removed: the same target is being run twice at once
       = 'firm build' does this without harm"""
 
 
 class _NotStoredError(Exception):
-    """The store does not have what was asked for."""
+    """The requested core is not in the store."""
 
 
 @dataclass
 class Basis:
-    """What an answer follows from: `reads` of whatever gives its key, and `further` facts, our own code at first.
+    """The basis of a result: `reads` of everything that determines its key, and `further` facts, first our own code.
 
-    Each is in the state that it had before it was used. `run` is the run of FuseSoC.
+    Each is in its state before use. `run` is the run of FuseSoC.
     """
 
     run: str
@@ -54,16 +54,16 @@ class Basis:
     reads: Reads = field(default_factory=Reads)
 
     def facts(self) -> list[Fact]:
-        """All of it."""
+        """All facts of the basis."""
         return [*self.further, *self.reads.facts()]
 
     def holds(self) -> bool:
-        """Whether nothing of it has changed since it was used."""
+        """Whether no fact has changed since its use."""
         return hold(self.facts(), self.run)
 
 
 def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GENERATORS) -> int:
-    """Run the generator `command` on the file that FuseSoC names; the exit status is 1 for faults, 130 for Ctrl-C."""
+    """Run the generator `command` on FuseSoC's file; the exit status is 1 for faults and 130 for Ctrl-C."""
     try:
         if len(argv) != 1:
             fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
@@ -83,9 +83,9 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
 
 
 def answer_from_store(command: str, path: Path) -> bool:
-    """Answer a call in FuseSoC's own process; False, and nothing is written, if its core must be made, or is faulty.
+    """Answer a hit in FuseSoC's own process; return False, and write nothing, for a miss or a faulty call.
 
-    Whoever makes it then says what is wrong.
+    The generator then reports the faults.
     """
     run = run_of(os.getpid())
     try:
@@ -97,12 +97,12 @@ def answer_from_store(command: str, path: Path) -> bool:
 
 
 def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only_looked_up: bool = False) -> None:
-    """Write the core that FuseSoC's file asks for into the current folder, and report it; note it to be recalled.
+    """Write the core for FuseSoC's file to the current folder, report it, and store a note for recall.
 
-    Raises `InputError`, and `_NotStoredError` if it must be made where it is only looked up.
+    Raises `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
     """
     start = time.monotonic()
-    # The code first, as its modules are imported from here on.
+    # The code comes first, since its modules are imported from here on.
     basis = Basis(run)
     basis.further += facts("folder", _searched())
     request = read_request(command, path, generator, run, basis.further)
@@ -112,13 +112,13 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
     is_locked = _check_locked(loaded)
     key, entry = obtain(loaded, generator, basis, is_only_looked_up=is_only_looked_up)
     marks = find_requesting_core(request.files_root, request.name).name if command == MESSAGES else ""
-    # What is locked is compared on every run, and what is missing is reported. This comes before the core is written,
-    # which may lie in a folder that was searched.
+    # Locked calls are checked on every run, and missing programs are reported. This must precede writing the core,
+    # since the current folder may be in a searched folder.
     if not (absent or is_locked) and basis.holds():
         note = {"key": key.digest, "facts": basis.facts(), "name": request.name, "core": request.vlnv, "marks": marks}
         default_store().note(call_digest(command, path.read_bytes()), note)
     _write(entry.files, request, marks, run)
-    # It can be generated and not be run.
+    # The core can be generated although it cannot be run.
     if absent:
         print(f"{command}: {explanation(absent)}", flush=True)
     origin = "from store" if entry.is_from_store else "generated"
@@ -128,7 +128,7 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
 def read_request(
     command: str, path: Path, generator: Generator, run: str | None = None, further: list[Fact] | None = None
 ) -> Request:
-    """The request in FuseSoC's file, with messages of cores as they were made in a run, or in any.
+    """The request in FuseSoC's file, with the folders of message cores generated in `run`, or in any run if None.
 
     Facts about these are added to `further`. Raises `InputError`.
     """
@@ -143,7 +143,7 @@ def read_request(
 
 
 def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
-    """What a request leads to. Raises `InputError`."""
+    """Derive the data of a request. Raises `InputError`."""
     with noted(basis.reads):
         return generator.load(request)
 
@@ -151,9 +151,9 @@ def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
 def obtain(
     loaded: LoadedRequest, generator: Generator, basis: Basis, *, is_only_looked_up: bool = False
 ) -> tuple[Key, Entry]:
-    """The core that a request asks for, with its key, from the store if it has it.
+    """The core for a request, from the store if possible, and its key.
 
-    Raises `InputError`, and `_NotStoredError` if it must be made where it is only looked up.
+    Raises `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
     """
 
     def build() -> Files:
@@ -176,7 +176,7 @@ def _key(loaded: LoadedRequest, generator: Generator, basis: Basis) -> Key:
     asked = {
         "command": request.command,
         "vlnv": request.vlnv,
-        # What is locked is so beside what is made.
+        # A lock file does not change the generated core.
         "parameters": {name: value for name, value in request.parameters.items() if name != "locked"},
         "tools": tools,
     }
@@ -189,15 +189,15 @@ def _key(loaded: LoadedRequest, generator: Generator, basis: Basis) -> Key:
 
 
 def _searched() -> list[str]:
-    """The folders of the environment with message definitions."""
+    """The environment's folders with message definitions."""
     entries = [entry for name in SEARCHED for entry in os.environ.get(name, "").split(os.pathsep) if entry]
     return [folder for entry in entries for folder in (entry, str(Path(entry, "share")))]
 
 
 def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: str | None) -> tuple[Path, ...]:
-    """The folders, below `generated`, of the messages of cores, made in a run, or in any.
+    """The folders below `generated` with the messages of cores, generated in `run`, or in any run if None.
 
-    Raises `InputError` for a core that has none, as it has if the requesting core does not depend on it.
+    Raises `InputError` for a core without such a folder, as when the requesting core does not depend on it.
     """
     faults = Diagnostics()
     found: list[Path] = []
@@ -212,7 +212,7 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
 
 
 def _check_locked(loaded: LoadedRequest) -> bool:
-    """Tell whether a request is held to a lock file. Raises `InputError` with what differs from one."""
+    """Check a request against its lock files, and return whether it has any. Raises `InputError` for differences."""
     request = loaded.request
     places: list[Path] = []
     if name := request.parameters.get("locked"):
@@ -229,7 +229,7 @@ def _check_locked(loaded: LoadedRequest) -> bool:
 
 
 def _check_declared(of_build: Reads, of_key: Reads) -> None:
-    """Raise `InputError` if something was read that the key does not cover: an edit of it would never be noticed."""
+    """Raise `InputError` if a file was read that the key does not cover: its edits would go unnoticed."""
     faults = Diagnostics()
     known = {os.path.realpath(file) for file in of_key.files}
     parts = {os.path.realpath(file) for file in of_key.parts}
@@ -241,7 +241,7 @@ def _check_declared(of_build: Reads, of_key: Reads) -> None:
 
 
 def _write(files: Files, request: Request, marks: str, run: str) -> None:
-    """Write a core into the current folder. Raises `InputError`."""
+    """Write a core to the current folder. Raises `InputError`."""
     try:
         found = write_core(files, request.vlnv, marks, run)
     except OSError as error:
@@ -258,7 +258,7 @@ def _write(files: Files, request: Request, marks: str, run: str) -> None:
 
 
 def _is_here() -> bool:
-    """Whether the current folder has not been removed."""
+    """Whether the current folder still exists."""
     try:
         return bool(Path.cwd())
     except FileNotFoundError:
@@ -266,7 +266,7 @@ def _is_here() -> bool:
 
 
 def _name(path: Path, request: Request) -> str:
-    """An input's name in the key: the same for copies of a project in different folders."""
+    """An input's name in the key, which is the same for all copies of a project."""
     folders = [folder for found in request.message_folders.found.values() for folder in found]
     for root in (request.files_root, *folders):
         if path.is_relative_to(root):
@@ -277,7 +277,7 @@ def _name(path: Path, request: Request) -> str:
 
 
 def _named_content(item: Input, request: Request) -> tuple[str, bytes | None]:
-    """An input's name in the key, and what counts of it."""
+    """An input's name in the key, and the content that the key covers."""
     if isinstance(item, Path):
         return _name(item, request), item.read_bytes() if item.is_file() else None
     return f"{_name(item.path, request)}:{item.name}", item.content

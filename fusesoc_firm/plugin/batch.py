@@ -1,9 +1,9 @@
-"""Makes what many generator calls will ask for, into the store, before FuseSoC makes them one after another.
+"""Generates the cores of many calls in advance and in parallel, since FuseSoC generates them one after another.
 
     python -m fusesoc_firm.plugin.batch GENERATOR < calls.json
 
-Such a process does the calls of one generator, so it imports what they take once. What cannot be made is left alone:
-FuseSoC's own call makes it, or says what is wrong.
+Such a process handles the calls of one generator, so it imports that generator's modules only once. Calls that fail are
+skipped: FuseSoC's own call then generates the core or reports the faults.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from fusesoc_firm.request.request import GeneratorCall, Request
 from fusesoc_firm.store.facts import facts
 from fusesoc_firm.text.diagnostics import InputError, SourceRef, fail
 
-# So many are worth a process of their own.
+# The least number of calls that justifies a process.
 _LEAST = 4
-# The parameter that names cores with messages.
+# The parameter that lists message cores.
 _OF_CORES = "messages"
 
 
 def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None]:
-    """Make them in at most `jobs` processes at once; a step for each call that was made, found or left alone.
+    """Process the calls in at most `jobs` processes; yield once for each call that was generated, found or skipped.
 
-    Whenever it is left, none of them runs on. Meanwhile this process imports what it takes to find such calls in the
-    store, so that its copies need not.
+    On exit, all processes are ended. Meanwhile this process imports the modules needed to find such calls in the store,
+    so that its copies need not.
     """
     ours = _ours(calls)
     for generator in dict.fromkeys(call.generator for call in ours):
@@ -72,7 +72,7 @@ def _run(generator: str, shares: list[list[GeneratorCall]], first: GeneratorCall
 
 
 def _ours(calls: Iterable[GeneratorCall]) -> list[GeneratorCall]:
-    """Those that can be answered before FuseSoC runs; only then is it known where the messages of other cores are."""
+    """Our calls, except those with message cores: FuseSoC's run determines the folders of their messages."""
     return [
         call
         for call in calls
@@ -89,10 +89,10 @@ def _request(call: GeneratorCall) -> Request:
 
 
 def main() -> None:
-    """Make the calls on standard input; a byte on standard output for each."""
+    """Process the calls on standard input; write a byte to standard output for each."""
     (name,) = sys.argv[1:]
     generator = GENERATORS[name]
-    # The modules of the first call serve all others, so what is made is not kept if one of them was edited since.
+    # All calls use the modules of the first, so results are not stored if a module was edited since.
     code = facts("code", [""])
     for item in json.load(sys.stdin):
         with suppress(InputError):
@@ -102,7 +102,7 @@ def main() -> None:
 
 
 def _load(call: GeneratorCall) -> None:
-    """Import what it takes to find such a call in the store, which copies of this process then have."""
+    """Import the modules that look such a call up in the store, for copies of this process."""
     with suppress(InputError):
         GENERATORS[call.generator].load(_request(call))
 

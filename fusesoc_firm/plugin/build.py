@@ -1,4 +1,4 @@
-"""Many builds at once, with what our generators make for them made beforehand: what `firm build` does."""
+"""Runs many builds at once, after generating their cores in advance: the work of `firm build`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LAUNCHER = "EDALIZE_LAUNCHER"
 
 @dataclass(frozen=True)
 class How:
-    """How to build: in which places, how far, how many at once (0 for one a core), and on which cluster, if on one."""
+    """How to build: the folders, the last step, the number of parallel builds (0: one per core), any cluster."""
 
     is_clean: bool = False
     is_setup_only: bool = False
@@ -39,9 +39,9 @@ class How:
 def build(
     plan: Plan, how: How, tell: Callable[[str], None], progress: Callable[[str], None]
 ) -> Generator[Outcome, None, None]:
-    """Each build's outcome, as they come. Whenever it is left, nothing that it started runs on.
+    """Yield each build's outcome as it finishes. On exit, all processes that it started are ended.
 
-    `tell` hears of builds that wait, `progress` of what is generated. Raises `InputError`, also for what differs from
+    `tell` is called for builds that wait, `progress` during generation. Raises `InputError`, also for differences from
     the lock file of a core.
     """
     os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
@@ -56,7 +56,7 @@ def build(
         return
     jobs = how.jobs or len(os.sched_getaffinity(0))
     plan.fetch()
-    # What is locked is checked by each call.
+    # Each call with a lock file checks it.
     if not how.is_locked and _generators_run_here():
         calls = plan.generator_calls()
         with closing(prepare(calls, jobs)) as steps:
@@ -68,13 +68,13 @@ def build(
 
 
 def _generators_run_here() -> bool:
-    """Whether the Python that runs this is the one that generators are to run in."""
+    """Whether generators run in the same Python as this process."""
     chosen = os.environ.get("FUSESOC_FIRM_PYTHON")
     return not chosen or Path(chosen).absolute() == Path(sys.executable).absolute()
 
 
 def _answer(line: Sequence[str]) -> bool:
-    """Answer a call of one of our generators, of which this is the command line, from the store."""
+    """Answer a call from the store if the command line starts one of our generators."""
     *_, script, path = line
     commands = {library_root() / "generators" / f"{name}_generator.py": name for name in GENERATORS}
     name = next((name for known, name in commands.items() if known.resolve() == Path(script).resolve()), None)

@@ -1,6 +1,6 @@
-"""The table of generators: the parameters of each, and what it calls.
+"""The table of generators: the parameters of each, and the functions that it calls.
 
-A generator imports its stages when it is called, as these imports take longer than most of what they do.
+A generator imports its stages when it is called, since these imports take longer than most of its work.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from fusesoc_firm.text.naming import PREFIX_RULE, is_prefix
 from fusesoc_firm.tools.programs import simulation_programs
 from fusesoc_firm.tools.simulators import SIMULATORS, default_simulator
 
-# The generator of cores that carry messages.
+# The generator of message cores.
 MESSAGES = "firm_messages"
-# The largest that `math_real.uniform` takes, which draws the stalls.
+# The largest seed of `math_real.uniform`, which draws the stalls.
 _LARGEST_SEED = 2147483562
 
 
 @dataclass(frozen=True)
 class Generator:
-    """A generator: its parameters, and what it makes of a request.
+    """A generator: its parameters, and the function that derives a request.
 
-    `load` derives all that a request leads to, and raises `InputError` for what its user did wrong. `programs` are
-    those without which the core cannot be run. `tools` are the versions of programs that make part of it.
+    `load` derives all data of a request, and raises `InputError` for the user's faults. `programs` are required to run
+    the core. `tools` are the versions of programs that generate part of it.
     """
 
     parameters: tuple[Parameter, ...]

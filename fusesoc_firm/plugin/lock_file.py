@@ -1,8 +1,8 @@
-"""The lock file of a system: which message definitions, cores and tools it uses, so that another build uses the same.
+"""The lock file of a system: the message definitions, cores and tools that it uses, so that other builds use the same.
 
-What a core itself consists of is its author's to change and is not locked; all that it takes from elsewhere is. `firm`
-holds a core to its lock as a whole (`check_lock`), a generator its own request (`check_request`): that sees neither the
-cores beside it nor the programs of a target.
+A core's own files are its author's to change and are not locked; everything from elsewhere is. `firm` checks a core as
+a whole against its lock (`check_lock`); a generator checks its own request (`check_request`), since it sees neither the
+other cores nor the programs of a target.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from fusesoc_firm.text.yaml_text import LARGE, yaml_data, yaml_dump
 from fusesoc_firm.tools.programs import facts_of, installed_programs, packages
 
 Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
-"""By kind (`messages`, `cores`, `tools`) and name: facts by name."""
+"""Facts by kind (`messages`, `cores`, `tools`), by name of the item, and by name of the fact."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
 _HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
@@ -36,16 +36,17 @@ _WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
 
 
 def lock_path(core: ProjectCore) -> Path:
-    """Where the lock file of a core is: beside its description."""
+    """The path of a core's lock file, next to its `.core` file."""
     return core.files[0].with_suffix(".lock")
 
 
 def lock_of(
     core: ProjectCore, depends: Iterable[ProjectCore], generated: Mapping[str, Sequence[LoadedRequest]]
 ) -> Lock:
-    """What a core uses now: itself, and the cores that it `depends` on, with what each has `generated` by its name.
+    """The definitions, cores and tools that a core uses now: its own, and those of the cores that it `depends` on.
 
-    A message that two of them take from different places is listed for each.
+    `generated` holds the derived requests of each core by its name. A message that two cores take from different places
+    is listed for each.
     """
     depends = list(depends)
     messages: dict[str, dict[str, str]] = {}
@@ -62,13 +63,13 @@ def lock_of(
 
 
 def lock_text(lock: Lock) -> str:
-    """The lock file."""
+    """The text of the lock file."""
     data = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
     return _HEAD + yaml_dump(data)
 
 
 def read_lock(path: Path) -> Lock:
-    """A lock file. Raises `InputError` if it cannot be read or is none."""
+    """Read a lock file. Raises `InputError` if it is unreadable or invalid."""
     try:
         data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
         return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
@@ -79,9 +80,9 @@ def read_lock(path: Path) -> Lock:
 
 
 def check_lock(locked: Lock, used: Lock) -> None:
-    """Raise `InputError` with everything in which what is used differs from what is locked.
+    """Raise `InputError` with every difference between what is used and what is locked.
 
-    A program that is installed and not locked is no difference: what was locked did without it.
+    An installed program that is not locked is not a difference: the locked build did not need it.
     """
     faults = Diagnostics()
     for difference in _differences(locked, used):
@@ -90,7 +91,7 @@ def check_lock(locked: Lock, used: Lock) -> None:
 
 
 def check_request(path: Path, loaded: LoadedRequest) -> None:
-    """Raise `InputError` with what a request uses that differs from a lock file: messages and packages."""
+    """Raise `InputError` if the messages and packages of a request differ from a lock file."""
     locked = read_lock(path)
     faults = Diagnostics()
     for label, now in _messages(loaded).items():
@@ -115,7 +116,7 @@ def _differences(locked: Lock, used: Lock) -> Iterator[str]:
 
 
 def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mapping[str, str]) -> Iterator[str]:
-    """In what a thing that is used differs from what is locked."""
+    """The differences between a used item and its locked state."""
     if was is None:
         yield f"{word} {name} is used, but not locked"
         return
@@ -125,7 +126,7 @@ def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mappin
 
 
 def _messages(loaded: LoadedRequest) -> dict[str, dict[str, str]]:
-    """The facts of each message that a request leads to."""
+    """The facts of each message that a request uses."""
     return {
         f"{name} ({library.ros.title})": _message(name, library, loaded.request.files_root.resolve())
         for library, definitions in loaded.definitions()
@@ -139,7 +140,7 @@ def _of_request(label: str, loaded: LoadedRequest) -> str:
 
 def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[str, str]:
     origin = library.origin(name)
-    # Told from the core's folder, it is the same in every copy of the project.
+    # A path relative to the core's folder is the same in every copy of the project.
     if Path(origin).is_absolute() and Path(origin).resolve().is_relative_to(folder):
         origin = os.path.relpath(Path(origin).resolve(), folder)
     return {
@@ -150,7 +151,7 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
 
 
 def _digest_of_core(core: ProjectCore, generated: Sequence[LoadedRequest]) -> str:
-    """The digest of a core's files, and of what is generated for it is made of, by their names from its description."""
+    """The digest of a core's files and of the inputs of its generated cores, named relative to its `.core` file."""
     folder = core.files[0].parent
     made_of = [item for loaded in generated for item in loaded.inputs]
     return _digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
@@ -161,7 +162,7 @@ def _digest_of(found: Mapping[str, str | None]) -> str:
 
 
 def _named(item: Input, folder: Path) -> str:
-    """An input's name, told from a folder."""
+    """An input's name relative to a folder."""
     if isinstance(item, Path):
         return os.path.relpath(item.resolve(), folder)
     return f"{os.path.relpath(item.path.resolve(), folder)}:{item.name}"
@@ -176,7 +177,7 @@ def _digest(item: Input) -> str | None:
 def _tools() -> dict[str, dict[str, str]]:
     tools = packages(_PACKAGES)
     for program, path in installed_programs():
-        # A program of the same version is the same program, on another machine too.
+        # A program of the same version counts as the same program on other machines, too.
         if facts := {name: fact for name, fact in facts_of(program, path).items() if name != "sha256"}:
             tools[program] = facts
     return dict(sorted(tools.items()))

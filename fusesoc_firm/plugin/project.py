@@ -1,4 +1,4 @@
-"""A project's cores and their calls of our generators: what an edit touches, what a core uses, where messages are."""
+"""A project's cores and their calls of our generators: the effects of an edit, a core's lock, and message folders."""
 
 from __future__ import annotations
 
@@ -26,26 +26,26 @@ from fusesoc_firm.text.outputs import shown, write
 
 
 def graph(core: str, target: str) -> str:
-    """What a target of a core depends on, in Graphviz's language. Raises `InputError`."""
+    """The dependencies of a core's target, in Graphviz's language. Raises `InputError`."""
 
     def sources(call: GeneratorCall) -> list[str]:
         request = _request(call)
-        # Told from here, files of one name in two cores are two.
+        # Paths relative to the current folder distinguish files of the same name in two cores.
         return [] if request is None else [*map(shown, _input_files(request))]
 
     return core_graph(core, target, sources)
 
 
 def affected_since(revision: str) -> dict[str, str]:
-    """The cores that the edits since a revision touch, each with the reason. Raises `InputError`."""
+    """The cores that the edits since a revision affect, each with the reason. Raises `InputError`."""
     changed = dict.fromkeys(path.resolve() for path in changed_files(revision, Path.cwd()))
     return affected(project_cores(), _touched(changed))
 
 
 def check_locked(core: str) -> Path:
-    """Raise `InputError` with everything in which a core, by its name, differs from its lock file, which is returned.
+    """Compare a core, given by its name, with its lock file, and return the file's path.
 
-    Where that file is missing, there is nothing to hold the core to, which is a fault, too.
+    Raises `InputError` with every difference, or if the lock file is missing.
     """
     found, depends = dependencies(core)
     path = lock_path(found)
@@ -55,7 +55,7 @@ def check_locked(core: str) -> Path:
 
 
 def write_lock(core: str) -> Path:
-    """Write the lock file of a core, by its name. Raises `InputError`."""
+    """Write the lock file of a core, given by its name. Raises `InputError`."""
     found, depends = dependencies(core)
     path = lock_path(found)
     write(path, lock_text(_used(found, depends)))
@@ -63,7 +63,7 @@ def write_lock(core: str) -> Path:
 
 
 def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
-    """The folders of cores that carry messages, where these lie: there is no run that copies them."""
+    """The folders of message cores in their original places, since no run has copied them."""
     found: list[Path] = []
     cores = {name: core for core in project_cores() for name in core.names}
     for name, source in named.items():
@@ -76,28 +76,28 @@ def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
 
 
 def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
-    """What a core uses now."""
+    """The definitions, cores and tools that a core uses now."""
     calls = {core.vlnv: [*_requests(core)]}
     for item in depends:
-        # Of another one only part may be used here. Where that cannot be made, FuseSoC's run says so.
+        # Only part of a dependency may be used here. If another part cannot be generated, FuseSoC's run reports it.
         with suppress(InputError):
             calls[item.vlnv] = [*_requests(item)]
     return lock_of(core, depends, calls)
 
 
 def _requests(core: ProjectCore) -> Iterator[LoadedRequest]:
-    """What a core has generated, and what that leads to."""
+    """Yield the derived requests of a core's generator calls."""
     for call in core.calls:
         if call.generator != MESSAGES and (request := _request(call)):
             yield GENERATORS[request.command].load(request)
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
-    """What tells by which of the changed files a core itself is touched."""
+    """A function that names the changed file by which a core itself is touched."""
 
     def touched(core: ProjectCore) -> str | None:
         found = _first(changed, core.files)
-        # What is behind a generated core takes longer to tell.
+        # The inputs of a generated core take longer to find.
         for call in core.calls if changed and not found else ():
             found = found or _first(changed, _files_behind(call, changed))
         return shown(found) if found else None
@@ -110,28 +110,28 @@ def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
 
 
 def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
-    """All that a generated core is made of, our own files too."""
+    """All inputs of a generated core, including our own files."""
     try:
         request = _request(call)
         if request is None:
             return set()
         files = set(_input_files(request))
     except InputError:
-        # It cannot be made: whatever changed beside it, or in our own files, may be why.
+        # The core cannot be generated: any change next to it, or in our own files, may be the cause.
         roots = (Path(call.files_root).resolve(), PACKAGE)
         return {path for path in changed if any(path.is_relative_to(root) for root in roots)}
     return files | {PACKAGE / name for name in names()}
 
 
 def _request(call: GeneratorCall) -> Request | None:
-    """The request that FuseSoC would make; None for a generator that is not ours."""
+    """The request that FuseSoC would make; None for other generators."""
     if call.generator not in GENERATORS:
         return None
     return make_request(call, GENERATORS[call.generator].parameters, message_folders)
 
 
 def _input_files(request: Request) -> list[Path]:
-    """The files that a request depends on, be it in part."""
+    """The files that a request depends on, even in part."""
     inputs = GENERATORS[request.command].load(request).inputs
     found = (item if isinstance(item, Path) else item.path for item in inputs)
     return [*dict.fromkeys(path.resolve() for path in found)]

@@ -1,16 +1,16 @@
-"""Answers a generator call as it was answered before, if nothing is different that decided the answer.
+"""Repeats the result of an earlier generator call if no fact that determined it has changed.
 
-The store's key says what decides a result. But to make it, a specification is read and a system derived from it, which
-takes longer than all else where nothing has changed. So a call that was answered leaves a note in the store: the key,
-and the facts that it follows from (`store.facts`). Of one kind of facts only a run of FuseSoC can tell:
+The store's key covers everything that determines a result. But to compute it, a specification must be read and a system
+derived, which takes longer than everything else if nothing has changed. So an answered call leaves a note in the store:
+the key, and the facts that determine it (`store.facts`). One kind of fact depends on the run of FuseSoC:
 
-    messages    a core whose messages are used: the folders that this run made of it
+    messages    a message core in use: the folders that this run generated for it
 
-A call, as FuseSoC writes it, with the versions of Python and of the packages that we import, names the note. If each
-fact has the state it had, the key would be the same, so the entry is the answer. If one has not, or anything is out of
-the ordinary, nothing is answered here, and the key is made. So this module only ever saves time.
+The note is named by the digest of the call, as FuseSoC writes it, with the versions of Python and of the packages that
+we import. If each fact has its recorded state, the key would be the same, so the entry is the result. If one has
+changed, or anything is unusual, this module does nothing, and the key is computed. So it affects only the time.
 
-It runs before anything else of this package, and imports next to nothing.
+It runs before all other modules of this package, and imports almost nothing.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ from fusesoc_firm.store.own_code import IMPORTED, PACKAGE
 from fusesoc_firm.text.files import read_file
 
 SEARCHED = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
-"""Variables with folders where message definitions are searched."""
+"""The environment variables that list folders with message definitions."""
 LOCKED = "FUSESOC_FIRM_LOCKED"
-"""Names the lock file that every call must comply with."""
+"""The environment variable that names the lock file with which every call must comply."""
 
 
 def answer(command: str, arguments: Sequence[str], run: str = "") -> bool:
-    """Write the core that a call asks for; False, and nothing is written, if the call was not answered before.
+    """Write the core for a call; return False, and write nothing, unless the call is a hit.
 
-    Unless a `run` is given, it is that of the process that started this one. After a failed write, the caller rewrites
-    the whole core and reports the error.
+    Without a `run`, the run of the parent process is used. After a failed write, the caller rewrites the whole core and
+    reports the error.
     """
     start = time.monotonic()
     call = read_file(arguments[0]) if len(arguments) == 1 else None
@@ -73,37 +73,37 @@ def answer(command: str, arguments: Sequence[str], run: str = "") -> bool:
 
 
 def call_digest(command: str, call: bytes) -> str:
-    """What names the note of a call: the file that FuseSoC wrote for it, and the Python that answers."""
+    """The name of a call's note: the digest of FuseSoC's file for the call and of the Python that answers."""
     searched = [os.environ.get(name) for name in SEARCHED]
     python = [sys.version, os.uname().machine, _c_library(), _packages(), str(PACKAGE)]
     return digest_of([command, digest(call), searched, python])
 
 
 def messages_fact(generated: str, core: str, run: str) -> facts.Fact:
-    """The folders below `generated` with the messages of a core."""
+    """A fact: the folders below `generated` with the messages of a core."""
     name = json.dumps([generated, core])
     return "messages", name, state("messages", name, run)
 
 
 def hold(noted: Iterable[facts.Fact], run: str) -> bool:
-    """Whether facts are still as they were noted."""
+    """Whether all facts are in their recorded states."""
     return all(state(kind, name, run) == was for kind, name, was in noted)
 
 
 def state(kind: str, name: str, run: str) -> str | None:
-    """The present state of a fact; None if what it is of is not there, or is no such thing."""
+    """The present state of a fact; None if the object is missing or of another kind."""
     try:
         if kind == "messages":
             generated, core = json.loads(name)
             return json.dumps(message_folders(generated, core, run))
         return facts.state(kind, name)
     except (OSError, ValueError, TypeError, RecursionError):
-        # A note of others may hold anything, and a file of ours may be replaced just now.
+        # A note from others may contain anything, and one of our files may be changing at this moment.
         return None
 
 
 def _packages() -> list[list[object]]:
-    """Every installed version of what we import, where Python looks for it."""
+    """Every installed version of the packages that we import, in each place of Python's path."""
     found: list[list[object]] = []
     for folder in sys.path:
         try:

@@ -1,13 +1,13 @@
-"""One run of FuseSoC: writes a generated core, and what the calls of the run leave for each other beside it.
+"""One run of FuseSoC: writes a generated core, and the data that the run's calls leave for each other.
 
-Each generator call is a process of its own. FuseSoC makes the calls of a run one after another, in folders side by side
-below `generator_cache`, where those of earlier runs may still lie. So what a call leaves there names its run.
-
+Each generator call is a process of its own. FuseSoC makes the calls of a run one after another, in adjacent folders
+below `generator_cache`, which may still contain folders of earlier runs. So the data that a call leaves there names its
+run.
 * The messages of a core: their generator marks its folder, and the generators of other cores find it.
-* The design units of a core: a tool keeps one unit of each name, and the later one silently replaces the earlier. So
-  each call compares its units with those of the calls before it. Other targets generate elsewhere.
+* The design units of a core: a tool keeps one unit of each name, and a later one silently replaces an earlier one. So
+  each call compares its units with those of previous calls. Other targets generate elsewhere.
 
-An answer from the store waits for this module, so it imports only what that takes.
+A hit waits for this module, so it imports as little as possible.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from contextlib import suppress
 
 from fusesoc_firm.text.files import read_file, write_if_changed
 
-# The folder in which FuseSoC has a folder for each call; what lies side by side elsewhere is no design.
+# The folder in which FuseSoC creates a folder for each call; adjacent folders elsewhere are not one design.
 _GENERATED = "generator_cache"
-# What keeps FuseSoC from searching a folder for cores.
+# A file that keeps FuseSoC from searching a folder for cores.
 _IGNORE = "FUSESOC_IGNORE"
 _MESSAGES, _UNITS = "firm_messages.run", "firm_units.run"
 _VHDL = re.compile(rb"^[ \t]*(?:entity|package)[ \t]+(\w+)[ \t\r\n]+is\b", re.MULTILINE | re.IGNORECASE)
@@ -31,22 +31,21 @@ _PATTERNS = {".vhd": _VHDL, ".vhdl": _VHDL, ".v": _VERILOG, ".sv": _VERILOG}
 
 
 Clash = tuple[str, str]
-"""A unit, and another core of the run, by its full name, that defines it in another way."""
+"""A unit, and the full name of another core of the run that defines it differently."""
 
 
 def run_of(fusesoc: int) -> str:
-    """The run that this process of FuseSoC is, in a word that no other run on this machine has."""
-    # When it was started, behind the name in parentheses, which may hold blanks.
+    """An id of this FuseSoC process's run that is unique on this machine."""
+    # The start time follows the name in parentheses, which may contain blanks.
     status = (read_file(f"/proc/{fusesoc}/stat") or b"").decode(errors="replace")
     return f"{fusesoc} {''.join(status.rpartition(')')[2].split()[19:20])}"
 
 
 def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str) -> Clash | None:
-    """Write a generated core, by its full name, into the current folder; the last file is its `.core`.
+    """Write a generated core, by its full name, to the current folder; the last file is its `.core`.
 
-    `messages_of` is the core whose messages these are; "" for none. If another core of the run defines a unit in
-    another way, that is returned and nothing is written. Raises `OSError` with the absolute path that cannot be
-    written.
+    `messages_of` is the core whose messages these are, or "". If another core of the run defines a unit differently,
+    that clash is returned and nothing is written. Raises `OSError` with the absolute path that cannot be written.
     """
     folder = os.getcwd()
     units = _units_of(files)
@@ -65,7 +64,7 @@ def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str
 
 
 def message_folders(generated: str, core: str, run: str | None) -> list[str]:
-    """The folders in `generated` with the messages of a core (`vendor:library:name`), sorted; None is any run."""
+    """The folders in `generated` with the messages of a core (`vendor:library:name`), sorted; None means any run."""
     found = []
     for folder in _folders(generated):
         marked, _, of_run = _read(folder, _MESSAGES).partition("\n")
@@ -75,7 +74,7 @@ def message_folders(generated: str, core: str, run: str | None) -> list[str]:
 
 
 def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
-    """Every design unit in generated files, as VHDL sees its name, with the digest of its file."""
+    """The design units in generated files by their VHDL names, each with the digest of its file."""
     found: dict[str, str] = {}
     for name, content in files.items():
         if pattern := _PATTERNS.get(os.path.splitext(name)[1].lower()):
@@ -85,7 +84,7 @@ def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
-    """The first unit that differs from one of the same name and run in the folders beside `folder`."""
+    """The first unit that differs from one of the same name and run in the folders next to `folder`."""
     for core, others in _others(folder, run):
         for unit, digest in others.items():
             if units.get(unit, digest) != digest:
@@ -94,7 +93,7 @@ def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
 
 
 def _others(folder: str, run: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """Core and units of every call of the run but that of `folder`, in the order of their folders' names."""
+    """Yield core and units of all calls of the run except that of `folder`, in the order of the folders' names."""
     generated = os.path.dirname(folder)
     if os.path.basename(generated) != _GENERATED:
         return
@@ -120,11 +119,12 @@ def _read(folder: str, name: str) -> str:
 
 
 def _hide(generated: str) -> None:
-    """Keep what is generated from being found as cores of a library.
+    """Keep generated cores from being found as cores of a library.
 
-    FuseSoC takes every `.core` below a library's folder. If that is a project's own, its builds are there, too.
+    FuseSoC takes every `.core` below a library's folder. If a project's own folder is a library, it contains the
+    project's builds, too.
     """
-    # Without it, all else works.
+    # Everything else works without this file.
     with suppress(OSError), open(os.path.join(generated, _IGNORE), "ab"):
         pass
 

@@ -1,8 +1,8 @@
-"""Why a generated line is as it is: the lines of template, specification and messages that made it.
+"""Explains generated lines: the lines of the template, specification and messages that they come from.
 
-The template's line and the scope in its context are followed while it is rendered again. The lines of the
-specification and of messages are found by names: of the blocks on the line or, if there are none, of the innermost
-scope with some, and of the fields within these blocks' messages or, in a file about a message, within that one.
+Rendering a file again gives the template's line and the scope in its context. The lines of the specification and of
+messages are found by names. Blocks are those named on the line or, if there are none, in the innermost scope with some.
+Fields are those of these blocks' messages or, in a file about a message, of this message.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ Message = tuple[MessageName, Definitions]
 
 _WORD = re.compile(r"[A-Za-z]\w*")
 _STEP = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
-# What stands between a block's name and a field's in the name of a signal.
+# The part between a block's name and a field's in the name of a signal.
 _SIDE = re.compile(r"(?:in|out)\d*_")
 
 
 @dataclass(frozen=True)
 class Reason:
-    """A line of a generated file, and the places that made it."""
+    """A line of a generated file, and the places that it comes from."""
 
     line: TracedLine
     specification: tuple[SourceRef, ...]
@@ -45,7 +45,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Names:
-    """The places of what a line may name: blocks, and the fields and constants of each block's messages and of all."""
+    """The places of the names on a line: blocks, and the fields and constants of each block's messages and of all."""
 
     blocks: Mapping[str, SourceRef]
     fields: Mapping[str, Mapping[str, SourceRef]]
@@ -53,7 +53,7 @@ class Names:
 
 
 def why(path: Path) -> list[Reason]:
-    """Why each line of a generated file of a build is as it is. Raises `InputError`."""
+    """The origin of each line of a generated file in a build. Raises `InputError`."""
     call, name = call_file(path)
     command = _generator(call)
     request = read_request(command, call, GENERATORS[command])
@@ -67,7 +67,7 @@ def why(path: Path) -> list[Reason]:
 
 
 def _generator(path: Path) -> str:
-    """The generator that a call is for. FuseSoC's file does not say it, but the core that makes the call does."""
+    """The generator of a call. FuseSoC's file does not name it, but the requesting core does."""
     call = read_call(path)
     generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
     if generator not in GENERATORS:
@@ -79,7 +79,7 @@ def _generator(path: Path) -> str:
 
 
 def _names(request: Request) -> Names:
-    """What a line of a generated core may name."""
+    """The names that a line of a generated core may contain."""
     if request.command == "far":
         loaded = load_requested(request)
         return names_of(loaded.specification, loaded.messages())
@@ -89,9 +89,9 @@ def _names(request: Request) -> Names:
 def rendering_of(
     generate: Callable[[], GeneratedCore], name: str, text: str, inputs: Iterable[Input] = ()
 ) -> Rendering:
-    """What the file `name` of a generated core, which is made of `inputs`, is made of.
+    """The template and context of the file `name` in a generated core with these `inputs`.
 
-    Raises `InputError` if no template made it, or not this `text`.
+    Raises `InputError` if no template generated it, or not this `text`.
     """
     with recorded() as renderings:
         core = generate()
@@ -112,7 +112,7 @@ def rendering_of(
 
 
 def reasons(rendering: Rendering, names: Names) -> list[Reason]:
-    """Why each line is as it is."""
+    """The origin of each line."""
     lines = traced_lines(rendering)
     text = "\n".join(line.text for line in lines)
     # The file's own messages, for fields without a block before them.
@@ -124,7 +124,7 @@ def reasons(rendering: Rendering, names: Names) -> list[Reason]:
 
 
 def names_of(specification: Specification | None, messages: Iterable[Message]) -> Names:
-    """The names in a specification and in messages, each of them given with all definitions within it."""
+    """The names in a specification and in messages, each given with all nested definitions."""
     fields = {str(name): dict(_fields(name, definitions)) for name, definitions in messages}
     blocks: dict[str, SourceRef] = {}
     of_blocks: dict[str, dict[str, SourceRef]] = {}
@@ -141,7 +141,7 @@ def names_of(specification: Specification | None, messages: Iterable[Message]) -
 
 
 def _messages(name: str, specification: Specification | None) -> Iterator[str]:
-    """The messages of a block, as the specification names them."""
+    """The messages of a block, as named in the specification."""
     assert specification is not None
     types = {str(item.name): item for item in specification.accelerators}
     for block in specification.blocks:
@@ -154,7 +154,7 @@ def _messages(name: str, specification: Specification | None) -> Iterator[str]:
 def _fields(
     name: MessageName, definitions: Definitions, above: tuple[str, ...] = ()
 ) -> Iterator[tuple[str, SourceRef]]:
-    """What a port of each field is called, those within it too, and each constant, with its place."""
+    """Yield the port name of each field, including nested ones, and the name of each constant, with its place."""
     definition = definitions[name]
     for constant in definition.constants:
         yield constant.name.lower(), constant.source
@@ -182,7 +182,7 @@ def _reason(line: TracedLine, context: Mapping[str, object], names: Names, own: 
 
 
 def _scope_blocks(scope: str, context: Mapping[str, object], names: Names) -> list[SourceRef]:
-    """The places of the blocks that are named in the innermost scope with any; the whole file's is of none."""
+    """The places of the blocks named in the innermost scope that names any; the whole file's scope does not count."""
     data: object = context
     found: list[SourceRef] = []
     for key, number in _STEP.findall(scope):
@@ -203,22 +203,22 @@ def _words(text: str) -> list[str]:
 
 
 def _block(word: str, blocks: Iterable[str]) -> str | None:
-    """The block whose signal or instance a word is."""
+    """The block whose signal or instance this word names."""
     bare = word.removeprefix("u_")
     found = [block for block in blocks if bare == block or bare.startswith(f"{block}_")]
     return max(found, key=len, default=None)
 
 
 def _longest(word: str, fields: Mapping[str, SourceRef]) -> SourceRef | None:
-    """The place of the field that a word begins with: what follows may be `_length`, `_axis_tdata` and the like."""
+    """The place of the longest field that begins a word; `_length`, `_axis_tdata` and the like may follow."""
     found = [field for field in fields if word == field or word.startswith(f"{field}_")]
     return fields[max(found, key=len)] if found else None
 
 
 def call_file(path: Path) -> tuple[Path, str]:
-    """FuseSoC's call of the generator that made a file, and the file's name in the generated core.
+    """FuseSoC's call of the generator that generated a file, and the file's name in the generated core.
 
-    The file lies below `generator_cache`, or is its copy below `src`. Raises `InputError` if there is no such call.
+    The file is below `generator_cache`, or is its copy below `src`. Raises `InputError` if there is no such call.
     """
     path = path.absolute()
     places = [(folder, place) for folder in path.parents for place in (folder, *_caches(folder))]
@@ -233,7 +233,7 @@ def call_file(path: Path) -> tuple[Path, str]:
 
 
 def _caches(folder: Path) -> list[Path]:
-    """Where FuseSoC has the core of which `folder` is the copy."""
+    """The folders in FuseSoC's cache for the core that was copied to `folder`."""
     if folder.parent.name != "src":
         return []
     return sorted((folder.parent.parent / "generator_cache").glob(f"{folder.name}-*"))

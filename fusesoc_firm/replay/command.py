@@ -1,4 +1,4 @@
-"""`firm replay`: a bag through a system, with a progress bar, a line for whatever is refused, and a summary."""
+"""The command `firm replay`: sends a bag through a system, with a progress bar, error lines and a summary."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from fusesoc_firm.system.derived.model import Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 
-# Lines about messages that were refused; the rest is counted.
+# The most lines about rejected messages; further ones are only counted.
 _SHOWN = 100
 
 
 @dataclass(frozen=True)
 class Source:
-    """What is replayed: messages of a bag, at most `limit`.
+    """The part of a bag to replay: at most `limit` messages.
 
-    They begin `start` seconds behind its beginning, and are those of `duration` seconds.
+    It begins `start` seconds after the bag's beginning, and lasts `duration` seconds.
     """
 
     path: Path
@@ -44,7 +44,7 @@ class Source:
     duration: float | None = None
 
     def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
-        """The messages of some topics that are meant."""
+        """The selected messages of some topics."""
         first = bag.start + round(self.start * 10**9)
         stop = None if self.duration is None else first + round(self.duration * 10**9)
         return islice((item for item in bag.messages(topics, stop) if item.stamp >= first), self.limit)
@@ -52,7 +52,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Target:
-    """Where the answers go; the `form` is that which the name says, else that of the source, unless it is given."""
+    """The bag for the responses. Its format is `form`, or is implied by the name, or is that of the source."""
 
     path: Path
     form: Form | None = None
@@ -61,10 +61,10 @@ class Target:
 
 @dataclass(frozen=True)
 class Settings:
-    """How it is done: `names` are the topics of blocks that the specification calls otherwise.
+    """The settings of a replay: `names` renames topics of blocks.
 
-    The hardware is at rest after `quiet` cycles without a beat. With latency, a stamp is that of the cause and the time
-    that the hardware took.
+    The hardware is at rest after `quiet` cycles without a beat. With latency, a stamp is the cause's stamp plus the
+    hardware's latency.
     """
 
     names: Mapping[str, str]
@@ -79,9 +79,9 @@ def replay(
     settings: Settings,
     start_simulator: Callable[[], Simulator],
 ) -> None:
-    """Replay a bag and print what came of it; `start_simulator` is called when all else is right.
+    """Replay a bag and print a summary; `start_simulator` is called after all other checks.
 
-    Raises `InputError`, also if a message did not go through; what the others led to is recorded then.
+    Raises `InputError`, also if a message was rejected; the responses to the others are then recorded.
     """
     if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
         fail(f"{target.path} is what is to be replayed")
@@ -114,7 +114,7 @@ def replay(
 
 @dataclass
 class _Replay:
-    """A replay while it goes on: what was played of each stream, and what was sent of each block."""
+    """A replay in progress: the messages played of each stream, and those sent by each block."""
 
     bag: Bag
     routes: Mapping[Stream, Route]
@@ -129,7 +129,7 @@ class _Replay:
     is_over: bool = False
 
     def play(self, source: Source) -> None:
-        """Replay all messages; what ends it early is told, too."""
+        """Replay all messages; an early end is reported."""
         expected = sum(count for stream, count in self.bag.streams.items() if stream in self.routes)
         total = expected if source.limit is None else min(expected, source.limit)
         topics = {stream.topic for stream in self.routes}
@@ -148,7 +148,7 @@ class _Replay:
                 self._end()
 
     def _play(self, recorded: Recorded) -> None:
-        """Let a message in, record what comes of it, and report what is wrong with it."""
+        """Send a message to the system, record the responses, and report faults."""
         self.played[recorded.stream] += 1
         route, faults = self.routes[recorded.stream], self.run.faults
         if route.misfit:
@@ -168,7 +168,7 @@ class _Replay:
         faults.clear()
 
     def _end(self) -> None:
-        """End the simulation, which may have something to say."""
+        """End the simulation, and report its errors."""
         try:
             self.run.simulator.quit()
         except TransportError as error:
@@ -185,7 +185,7 @@ class _Replay:
             tqdm.write(f"error: {self.bag.path}: {fault}", file=sys.stderr)
 
     def print_summary(self, path: Path) -> None:
-        """What went in and came out, topic by topic."""
+        """Print the messages that went in and came out, topic by topic."""
         if self.errors > _SHOWN:
             print(f"and {self.errors - _SHOWN} errors more", file=sys.stderr)
         rows = [("in", *self._way(stream), str(self.played[stream])) for stream in self.routes]
@@ -207,7 +207,7 @@ class _Replay:
 
 
 def seconds(stamp: int) -> str:
-    """A time in ns as people read it, to the last digit."""
+    """A time in ns as readable seconds, with all digits."""
     return f"{stamp // 10**9}.{stamp % 10**9:09d}"
 
 
@@ -231,7 +231,7 @@ def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
 
 
 def _form(target: Target, like: Form) -> Form:
-    """The form of the bag to write."""
+    """The format of the bag to write."""
     said = form_of(target.path)
     if target.form and said and target.form is not said:
         fail(f"{target.path} is to be a bag as {target.form.value}, but ends like one as {said.value}")
@@ -239,7 +239,7 @@ def _form(target: Target, like: Form) -> Form:
 
 
 def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
-    """Raise `InputError` if the bag to write cannot hold what the system publishes."""
+    """Raise `InputError` if the bag to write cannot hold the messages that the system publishes."""
     faults = Diagnostics()
     for topic in topics:
         if topic.frame.ros != form.ros:
@@ -251,7 +251,7 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
 def _routes(
     bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
 ) -> dict[Stream, Route]:
-    """Who takes what. Raises `InputError` if nobody takes anything, or a topic that was asked for is not there."""
+    """The route of each stream. Raises `InputError` if there is no route, or a requested topic is missing."""
     faults = Diagnostics()
     topics = {absolute_name(stream.topic) for stream in bag.streams}
     for item in subscribers:

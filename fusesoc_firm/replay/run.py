@@ -1,7 +1,7 @@
-"""A system that is given one message after the other: its simulated hardware, and its software around that.
+"""A system that receives one message at a time: its simulated hardware with its software.
 
-Each message is let in when the hardware has come to rest after the one before. So it is known what a message led to,
-and the same messages give the same answers, in the same cycles.
+Each message is sent when the hardware has come to rest after the previous one. So the cause of each response is known,
+and the same messages give the same responses in the same cycles.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from fusesoc_firm.simulation.software_run import sent_elsewhere
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, End, Topic
 from fusesoc_firm.text.diagnostics import InputError
 
-# How long a frame may wait until it counts as stuck, and the system send on its own accord until the next message: so
-# many times the quiet of a system at rest, and so many cycles a byte of the frame.
+# A frame counts as stuck, and spontaneous sending as endless, after this many quiet periods plus this many cycles for
+# each byte of the frame.
 _QUIETS = 100
 _CYCLES_A_BYTE = 64
 
 
 @dataclass
 class Cause:
-    """A message that was let in: when it was recorded (ns), and the cycle in which the hardware began to take it."""
+    """A message that was sent to the system: its stamp (ns), and the cycle of its first beat into the hardware."""
 
     stamp: int
     first_cycle: int | None = None
@@ -38,7 +38,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Sent:
-    """A message that left the system, and the last one before that was on the way to it.
+    """A message that left the system, and its cause: the last earlier message whose route leads to it.
 
     `last_cycle` is that of its last beat; None if software sent it.
     """
@@ -49,21 +49,21 @@ class Sent:
     last_cycle: int | None
 
     def latency(self, clock_hz: Fraction) -> int:
-        """From the first beat of the cause to its own last one, ns; 0 where one of them did not pass the hardware."""
+        """The time in ns from the cause's first beat to the response's last; 0 if one of them bypassed the hardware."""
         if self.last_cycle is None or self.cause.first_cycle is None:
             return 0
         return round((self.last_cycle - self.cause.first_cycle) * 10**9 / clock_hz)
 
 
 class StuckError(Exception):
-    """The hardware does not take a frame, and so none that could be behind it."""
+    """The hardware does not accept a frame, and therefore no later frame, either."""
 
 
 @dataclass
 class SystemRun:
-    """A system whose hardware is at rest when it has been quiet, without a beat in any direction, for `quiet` cycles.
+    """A system in simulation. The hardware is at rest after `quiet` cycles without a beat in any direction.
 
-    `sent` and `faults` are those since they were emptied last.
+    `sent` and `faults` accumulate until the caller empties them.
     """
 
     system: DerivedSystem
@@ -86,12 +86,12 @@ class SystemRun:
 
     @cached_property
     def _software(self) -> Mapping[str, Topic]:
-        """Where software publishes."""
+        """The topics that software publishes, by block."""
         return {item.block: item for item in self.system.software.publishers}
 
     @cached_property
     def _entries(self) -> Mapping[str, End]:
-        """What software that is not here sends, by name."""
+        """The sources of messages from software elsewhere, by block."""
         return {topic.block: end for topic, end in sent_elsewhere(self.system).items()}
 
     @cached_property
@@ -106,9 +106,9 @@ class SystemRun:
         return found
 
     def take(self, topic: Topic, payload: bytes, stamp: int) -> None:
-        """Let a message in and wait until the hardware is at rest. Raises `StuckError` and `TransportError`.
+        """Send a message to the system and wait for the hardware to rest. Raises `StuckError` and `TransportError`.
 
-        What keeps the message from going through is a fault.
+        If the message is rejected, a fault is added.
         """
         try:
             message = decode(topic.frame, payload)
@@ -125,12 +125,12 @@ class SystemRun:
 
     @property
     def unfinished(self) -> str:
-        """What is wrong with the end of what the hardware sent; empty if all of it was whole."""
+        """The fault of an incomplete last frame from the hardware; empty if all frames were complete."""
         blocks = [self.system.publishers[number].block for number in self._joiner.unfinished]
         return f"the system has not sent the rest of a frame of {', '.join(blocks)}" if blocks else ""
 
     def _reached(self, block: str) -> set[str]:
-        """A block and all on the way from it."""
+        """A block and all blocks that its messages reach."""
         found: set[str] = set()
         new = {block}
         while new:
@@ -144,11 +144,11 @@ class SystemRun:
         self._postpone(len(payload))
 
     def _postpone(self, size: int) -> None:
-        """Something went on, with `size` bytes to come: from now on the patience is counted."""
+        """Extend the deadline after progress, with `size` bytes still to come."""
         self._deadline = max(self._deadline, self.simulator.cycle + _QUIETS * self.quiet + _CYCLES_A_BYTE * size)
 
     def _give(self, source: End, message: Message, cause: Cause) -> None:
-        """Let software have a message, and the hardware or publishers what it makes of it."""
+        """Give software a message, and send the results to the hardware or to publishers."""
         try:
             given = self.functions.take(source, message)
         except InputError as error:
@@ -209,12 +209,12 @@ class SystemRun:
 
 
 def published(system: DerivedSystem) -> list[Topic]:
-    """Whatever leaves a system: what hardware publishes but for its own software, and what software does."""
+    """The topics that leave a system: those of the hardware, except to its own software, and those of the software."""
     here = _software_here(system)
     converters = [item for item in system.publishers if not item.software or item.software.block not in here]
     return [*converters, *system.software.publishers]
 
 
 def _software_here(system: DerivedSystem) -> set[str]:
-    """The blocks whose functions are known."""
+    """The blocks whose functions are available here."""
     return {block.block for block in system.software.blocks if block.type.accelerator.sources}

@@ -1,6 +1,6 @@
-"""A `.core` file: what it says, and where. Whoever looks into one reads it here.
+"""Reads a `.core` file with the positions of its contents. All other modules read cores through this one.
 
-FuseSoC's own reading of it, with the cores that it depends on and for the flags of a target, is `building`'s.
+`building` uses FuseSoC's own reader, which includes dependencies and a target's flags.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class CoreFile:
 
     @cached_property
     def data(self) -> Mapping[str, Any]:
-        """What it says, with what YAML inherits; nothing where it is no mapping. Raises `InputError`."""
+        """The file's content with YAML's inheritance resolved; empty if it is not a mapping. Raises `InputError`."""
         try:
             data = data_of(self.text.root)
         except yaml.YAMLError as error:
@@ -34,18 +34,18 @@ class CoreFile:
         return data if isinstance(data, dict) else {}
 
     def section(self, name: str) -> dict[str, dict[str, Any]]:
-        """The items of a section by name, those that say nothing too. Raises `InputError`."""
+        """The items of a section by name, including empty ones. Raises `InputError`."""
         section = self.data.get(name)
         items = section.items() if isinstance(section, dict) else ()
         return {str(key): item if isinstance(item, dict) else {} for key, item in items}
 
     def parameters(self, instance: str) -> dict[str, Any]:
-        """Those that the core gives to a generator for an instance. Raises `InputError`."""
+        """The parameters that the core gives a generator for an instance. Raises `InputError`."""
         parameters = self.section("generate").get(instance, {}).get("parameters")
         return parameters if isinstance(parameters, dict) else {}
 
     def item(self, *keys: str) -> tuple[yaml.Node, yaml.Node] | None:
-        """The key and value nodes of an item of mappings within each other, as written; None where there is none."""
+        """The key and value nodes of an item in nested mappings, as written; None if it is missing."""
         node, found = self.text.root, None
         for key in keys:
             pairs = node.value if isinstance(node, yaml.MappingNode) else ()
@@ -60,13 +60,13 @@ class CoreFile:
 
 
 def read_core(path: Path) -> CoreFile:
-    """Read a `.core` file. Raises `InputError`, at the place of the fault, if it cannot be read or is no YAML."""
+    """Read a `.core` file. Raises `InputError`, at the place of the fault, if it is unreadable or not YAML."""
     return CoreFile(path, read_yaml(path, bounds=LARGE))
 
 
 @lru_cache(maxsize=8)
 def read_core_once(path: Path, _changed: int) -> CoreFile:
-    """The same for a process that makes many of a core's instances."""
+    """Cached `read_core`, for a process that generates many instances of one core."""
     return read_core(path)
 
 

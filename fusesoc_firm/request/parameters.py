@@ -1,6 +1,6 @@
-"""The parameters of the generators: which there are, and the check of those that a core gives.
+"""Defines the parameters of the generators, and checks those that a core gives.
 
-A fault is shown where its author wrote it, in the requesting `.core` file.
+A fault is reported at its place in the requesting `.core` file.
 """
 
 from __future__ import annotations
@@ -23,11 +23,10 @@ _TYPES: dict[str, tuple[type, str]] = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter: `type` and `meaning` are words of the generator's usage text, `bounds` its least and greatest value.
+    """A parameter: `type` and `meaning` appear in the generator's usage text, `bounds` are its limits, both legal.
 
-    A text that is no legal value of it breaks a `rule`: what is legal, and a test. One that is neither given nor
-    required has its `default`. It may say what others would (`replaces`): these are then
-    not required, and not allowed beside it.
+    `rule` describes the legal texts and tests a text. A parameter that is neither given nor required has its `default`.
+    It may replace others (`replaces`): these are then neither required nor allowed.
     """
 
     name: str
@@ -41,7 +40,7 @@ class Parameter:
     rule: tuple[str, Callable[[str], bool]] | None = None
 
     def usage(self) -> str:
-        """`name (type): text`, as the generator core lists it."""
+        """`name (type): text`, as in the generator core's usage text."""
         facts = []
         if self.choices:
             facts.append(" | ".join(map(str, self.choices)))
@@ -58,7 +57,7 @@ class Parameter:
 
 
 def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origin: RequestingCore) -> dict[str, Plain]:
-    """Every known parameter with the value given or its default. Raises `InputError` with all faults."""
+    """The value of every known parameter, given or default. Raises `InputError` with all faults."""
     table = {parameter.name: parameter for parameter in known}
     replacing = {name: parameter.name for parameter in table.values() for name in parameter.replaces}
     faults = Diagnostics()
@@ -80,9 +79,9 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
 
 
 def _fault(parameter: Parameter, value: object) -> str:
-    """What `value` must be and is not, or ""."""
+    """What `value` should be but is not, or ""."""
     expected, words = _TYPES[parameter.type]
-    # Exact types, since to Python a bool is an integer.
+    # Exact types, since in Python a bool is an integer.
     if type(value) is not expected or (isinstance(value, list) and not all(type(item) is str for item in value)):
         return words
     texts = value if isinstance(value, list) else [value] if isinstance(value, str) else []

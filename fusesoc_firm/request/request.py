@@ -1,6 +1,6 @@
-"""What passes between FuseSoC's generator call and the stages that answer it: a request in, a generated core out.
+"""The data between FuseSoC's generator call and the stages: a request goes in, a generated core comes out.
 
-It knows no stage, so `converter` and `system` can return what `plugin` writes.
+It is independent of the stages, so `converter` and `system` can return what `plugin` writes.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from fusesoc_firm.text.yaml_text import yaml_dump
 
 _LONGEST_FILE_NAME = 255
 Plain = str | int | bool | list[str] | None
-"""What a generator's parameter can be; None is one that was not given and has no default."""
+"""A value of a generator's parameter; None means not given and without default."""
 CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
-"""Finds the folders of the messages of cores, given by name and place. Raises `InputError` for an unknown one."""
+"""Finds the folders with the messages of cores, given by name and place. Raises `InputError` for an unknown core."""
 
 
 def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
-    """Where no core can be looked up."""
+    """Reject every core: none can be looked up."""
     for name, source in names.items():
         fail(f"core '{name}' cannot be looked up here", source, "name the folder of its messages")
     return ()
@@ -32,7 +32,7 @@ def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
 
 @dataclass(frozen=True)
 class GeneratorCall:
-    """A call of a generator as FuseSoC makes it: the new core's name, the requesting core's folder, parameters."""
+    """FuseSoC's call of a generator: the new core's name, the requesting core's folder, and parameters."""
 
     generator: str
     vlnv: str
@@ -41,7 +41,7 @@ class GeneratorCall:
 
 
 class MessageFolders:
-    """The folders of the cores whose messages are used; `find` is asked for each core once, and `found` has them."""
+    """The folders of the message cores in use; `find` is called once per core, and `found` caches the results."""
 
     def __init__(self, find: CoreFolders = no_core_folders) -> None:
         self.found: dict[str, Sequence[Path]] = {}
@@ -57,10 +57,10 @@ class MessageFolders:
 
 @dataclass(frozen=True)
 class Request:
-    """A generator call with checked parameters; `files_root` is the requesting core's folder, `vlnv` the new core's.
+    """A generator call with checked parameters, from the core in the folder `files_root`, for the new core `vlnv`.
 
-    `places` tells where the items of a list parameter are, as far as that is known; they are no part of the request.
-    `message_folders` finds those of the cores that it, or its specification, names as carriers of messages.
+    `places` holds the places of a list parameter's items, if known; they are not part of the request. `message_folders`
+    finds the folders of the message cores that the request or its specification lists.
     """
 
     command: str
@@ -76,7 +76,7 @@ class Request:
         return self.vlnv.split(":")[2]
 
     def listed(self, parameter: str) -> dict[str, SourceRef | None]:
-        """The items of a list parameter, each with its place; none where it is not given."""
+        """The items of a list parameter, each with its place; empty if the parameter is not given."""
         items = self.parameters.get(parameter) or []
         assert isinstance(items, list)
         places = self.places.get(parameter, ())
@@ -87,8 +87,8 @@ class Request:
 class GeneratedFile:
     """A file of a generated core.
 
-    `file_type` is FuseSoC's (`vhdlSource-93`, `user`, ...), `logical_name` the VHDL library, and `copyto` where in the
-    work folder the tool finds it; "" leaves them out. An include file is one that others name.
+    `file_type` is FuseSoC's (`vhdlSource-93`, `user`, ...), `logical_name` the VHDL library, and `copyto` the file's
+    place in the tool's work folder; "" omits them. An include file is read by other files.
     """
 
     content: str | bytes
@@ -109,10 +109,10 @@ class GeneratedCore:
 
 @dataclass(frozen=True)
 class LoadedRequest:
-    """A request, and what it leads to, derived once.
+    """A request with its inputs and derived data, computed once.
 
-    `inputs` are the files whose content the core depends on; a path of them need not exist. `generate` makes the core,
-    `definitions` gives the library of each message with all definitions within it. Both raise `InputError`.
+    `inputs` are the files on whose content the core depends; a path need not exist. `generate` creates the core;
+    `definitions` returns the library of each message with all nested definitions. Both raise `InputError`.
     """
 
     request: Request
@@ -122,7 +122,7 @@ class LoadedRequest:
 
 
 def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
-    """The files to write for FuseSoC, by path; the `.core` is last, since with it the others are taken to be there.
+    """The files to write for FuseSoC, by path. The `.core` is last: once it exists, the others must, too.
 
     Raises `InputError` for a name that is too long for a file.
     """
@@ -131,7 +131,7 @@ def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
 
 
 def _checked(path: str) -> str:
-    """`path`, unless it is longer than file systems have it: entities are called after names that are joined."""
+    """`path`, unless a part exceeds the limit of file systems: entity names are joined from several names."""
     for part in path.split("/"):
         if (size := len(part.encode())) > _LONGEST_FILE_NAME:
             fail(f"the file '{part[:40]}...' would have a name of {size} bytes; file systems take {_LONGEST_FILE_NAME}")
@@ -139,7 +139,7 @@ def _checked(path: str) -> str:
 
 
 def core_text(core: GeneratedCore, vlnv: str) -> str:
-    """The `.core` file, the same text for the same core."""
+    """The `.core` file, which is always the same text for the same core."""
     description = {
         "name": vlnv,
         "description": core.description,

@@ -1,7 +1,8 @@
-"""Where in a `.core` file a generator's parameters stand, so that a fault in one can be shown there.
+"""Finds the places of a generator's parameters in a `.core` file, to report faults there.
 
-FuseSoC passes on only the values, the core's folder and the new core's name, `<core>-<instance>`. So the core file is
-looked up again. Where it is not found, or a parameter comes from an inherited section or a target, there is no place.
+FuseSoC passes only the values, the core's folder and the new core's name, `<core>-<instance>`, so the core file is
+searched for again. If it is not found, or a parameter comes from an inherited section or a target, the place is
+unknown.
 """
 
 from __future__ import annotations
@@ -17,20 +18,20 @@ from fusesoc_firm.text.diagnostics import InputError, SourceRef
 
 @dataclass(frozen=True)
 class RequestingCore:
-    """The core file whose entry `called`, under `generate`, asks for a core; None where it was not found."""
+    """The core file whose entry `called`, under `generate`, requests a core; None if it was not found."""
 
     core: CoreFile | None = None
     called: str = ""
 
     @property
     def name(self) -> str:
-        """The requesting core's, as `vendor:library:name`; "" where it was not found."""
+        """The requesting core's name, as `vendor:library:name`; "" if it was not found."""
         found = self.core.item("name") if self.core else None
         return core_name(str(found[1].value)) if found else ""
 
     @property
     def generator(self) -> str:
-        """The generator that is called; "" where it was not found."""
+        """The generator that is called; "" if it was not found."""
         section = self.core.section("generate").get(self.called, {}) if self.core else {}
         return str(section.get("generator", ""))
 
@@ -39,15 +40,15 @@ class RequestingCore:
         return self._place(0)
 
     def key(self, parameter: str) -> SourceRef | None:
-        """The place of a parameter's name, else of the instance's."""
+        """The place of a parameter's name, otherwise of the instance's."""
         return self._place(0, "parameters", parameter) or self.instance()
 
     def value(self, parameter: str) -> SourceRef | None:
-        """The place of a parameter's value, else of the instance's name."""
+        """The place of a parameter's value, otherwise of the instance's name."""
         return self._place(1, "parameters", parameter) or self.instance()
 
     def items(self, parameter: str) -> list[SourceRef]:
-        """The place of each item of a list; none where it was not found."""
+        """The place of each item of a list; empty if it was not found."""
         found = self._item("parameters", parameter)
         if self.core is None or not found or not isinstance(found[1], yaml.SequenceNode):
             return []
@@ -62,7 +63,7 @@ class RequestingCore:
 
 
 def find_requesting_core(folder: Path, new_core: str) -> RequestingCore:
-    """Find the core in `folder` whose generator instance makes the core of this name (`<core>-<instance>`)."""
+    """Find the core in `folder` whose generator instance creates the core of this name (`<core>-<instance>`)."""
     for path in sorted(folder.glob("*.core")):
         try:
             core = read_core_once(path, path.stat().st_mtime_ns)
@@ -70,7 +71,7 @@ def find_requesting_core(folder: Path, new_core: str) -> RequestingCore:
             continue
         if not (name := core.item("name")):
             continue
-        # `vendor:library:name:version`, of which FuseSoC demands only the name.
+        # `vendor:library:name:version`, of which FuseSoC requires only the name.
         parts = str(name[1].value).split(":")
         called = new_core.removeprefix(f"{parts[2] if len(parts) > 2 else parts[-1]}-")
         if core.item("generate", called):

@@ -1,13 +1,13 @@
-"""Facts that an answer follows from: each a kind, a name and the state that was found when it was first looked at.
+"""The facts that determine the result of a call: each has a kind, a name and the state at its first reading.
 
-    file        the SHA-256 of its content
-    part        of a file of which a part was read: its size and time
-    folder      which names are in it
-    code        of our own files
-    program     the file that the PATH leads to, its size and time
+    file        the SHA-256 of the content
+    part        the size and time of a file that was read in part
+    folder      the names in the folder
+    code        the state of this package's own files
+    program     the path, size and time of the file on the PATH
 
-As long as all facts have these states, whatever follows from them is the same. An answer from the store waits for this
-module, so it imports only what that takes.
+As long as no state changes, the result does not change. A hit waits for this module, so it imports as little as
+possible.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from fusesoc_firm.store.layout import digest, digest_of
 from fusesoc_firm.text.files import read_file
 
 Fact = tuple[str, str, str | None]
-"""Kind, name and state; None as the state of what is not there."""
+"""Kind, name and state of a fact; the state of a missing object is None."""
 
 
 def facts(kind: str, names: Iterable[str]) -> list[Fact]:
-    """These facts in their present state."""
+    """The facts of a kind, in their present state."""
     return [(kind, name, state(kind, name)) for name in names]
 
 
 def state(kind: str, name: str) -> str | None:
-    """The present state of a fact; None if what it is of is not there. Raises `ValueError` for an impossible name."""
+    """The present state of a fact; None if the object is missing. Raises `ValueError` for an impossible name."""
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)
@@ -41,7 +41,7 @@ def state(kind: str, name: str) -> str | None:
         return own_code.state()
     if kind == "program":
         return _program(name)
-    # That of another version of this module.
+    # A kind from another version of this module.
     return None
 
 

@@ -1,16 +1,18 @@
-"""What lies in the store, and how: `store` says what is kept there, `plugin.recall` answers from it in a hurry.
+"""The files in the store and their formats; `store` decides what to keep, `plugin.recall` reads hits quickly.
 
     <root>/v4/<first two digits>/<key>.entry                 generated files
-    <root>/v4/<first two digits>/<digest of a call>.call     what decided the answer to a call, and its key
-    <root>/v4/<first two digits>/<key>.lock                  held while an entry is made
+    <root>/v4/<first two digits>/<digest of a call>.call     the facts that determine a call's key, and the key
+    <root>/v4/<first two digits>/<key>.lock                  held while an entry is built
 
-Each but the lock is a line with the SHA-256 of the rest, and appears by one rename: it is whole, or not there. An entry
-goes on with a line of JSON (what was asked for, names, lengths) and the contents; the others are JSON.
+Each file but the lock begins with a line with the SHA-256 of the rest. It is put in place by one rename, so it is
+either complete or missing. An entry continues with a line of JSON (the request, names, lengths) and the contents; the
+others are JSON.
 
-Whoever may write to the store can write files with right digests. So a file of another form is as damaged as one of
-which the digest is wrong: data of other types, names that lead out of the folder where the files are to be written.
+Anyone who can write to the store can write files with correct digests. So a file in another form counts as damaged,
+just like one with a wrong digest: data of other types, or names that lead out of the folder to which the files are
+written.
 
-Of Python's library no more is imported than that needs.
+This module imports as little of Python's library as possible.
 """
 
 from __future__ import annotations
@@ -30,22 +32,22 @@ if TYPE_CHECKING:
 LAYOUT = "v4"
 ENTRY, CALL, LOCK = ".entry", ".call", ".lock"
 KEPT = (ENTRY, CALL)
-"""The endings of what is kept; what is used less goes first."""
+"""The endings of the files that are kept; the least recently used are removed first."""
 
-# Of plain data, and of all else. They are read at once, so there is a bound.
+# The limits for plain data and for all other files, since each is read at once.
 _MOST_PLAIN_BYTES = 2**24
 _MOST_BYTES = 2**30
-# What file systems allow.
+# The limits of file systems.
 _LONGEST_NAME_BYTES, _LONGEST_PATH_BYTES = 255, 4000
 _DIGITS = frozenset("0123456789abcdef")
 _DIGEST_DIGITS = 64
 _FACT_PARTS, _FILE_PARTS = 3, 2
-# Of the note of a call.
+# Keys of a call's note.
 _WORDS = ("name", "core", "marks")
 
 
 def default_root(environment: Mapping[str, str] = os.environ) -> str:
-    """FUSESOC_FIRM_CACHE, else `fusesoc_firm` in XDG_CACHE_HOME, else in ~/.cache; absolute."""
+    """FUSESOC_FIRM_CACHE, or `fusesoc_firm` in XDG_CACHE_HOME, or in ~/.cache; absolute."""
     if chosen := environment.get("FUSESOC_FIRM_CACHE"):
         return os.path.abspath(os.path.expanduser(chosen))
     base = environment.get("XDG_CACHE_HOME") or "~/.cache"
@@ -53,12 +55,12 @@ def default_root(environment: Mapping[str, str] = os.environ) -> str:
 
 
 def place(digest: str, suffix: str) -> str:
-    """The name, in a store, of what belongs to a digest."""
+    """The path in a store of the file for a digest."""
     return f"{LAYOUT}/{digest[:2]}/{digest}{suffix}"
 
 
 def write(root: str, name: str, data: bytes) -> None:
-    """Keep data with its digest. Raises `OSError`."""
+    """Store data with its digest. Raises `OSError`."""
     whole = digest(data).encode() + b"\n" + data
     if len(whole) > _most(name):
         raise OSError(EFBIG, os.strerror(EFBIG))
@@ -66,12 +68,12 @@ def write(root: str, name: str, data: bytes) -> None:
 
 
 def write_json(root: str, name: str, data: object) -> None:
-    """Keep plain data. Raises `OSError`."""
+    """Store plain data as JSON. Raises `OSError`."""
     write(root, name, json.dumps(data).encode())
 
 
 def write_entry(root: str, name: str, about: Mapping[str, str], files: Mapping[str, bytes]) -> None:
-    """Keep generated files, and what was asked for. Raises `OSError`."""
+    """Store generated files with a description of their request. Raises `OSError`."""
     header = {"about": dict(about), "files": [[path, len(content)] for path, content in files.items()]}
     write(root, name, b"".join([json.dumps(header).encode(), b"\n", *files.values()]))
 
@@ -86,7 +88,7 @@ def read_note(root: str, name: str) -> dict[str, Any] | None:
 
 
 def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] | None:
-    """What was asked for, and the files in the order they were made; None if the entry is missing or damaged."""
+    """The description of the request, and the files in order of generation; None if missing or damaged."""
     line, _, contents = (_read(root, name) or b"").partition(b"\n")
     header = _plain(line)
     about = header.get("about") if isinstance(header, dict) else None
@@ -103,18 +105,18 @@ def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] 
 
 
 def is_whole(root: str, name: str) -> bool:
-    """Whether something that is kept is undamaged."""
+    """Whether a stored file is undamaged."""
     reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, CALL: read_note}
     return reads[name[name.rindex(".") :]](root, name) is not None
 
 
 def mark_used(root: str, *names: str) -> None:
-    """Note that these were used now, as far as the store can be written."""
+    """Set the time of last use of these files to now, if the store is writable."""
     for name in names:
         try:
             shared_files.mark_used(root, name)
         except OSError:
-            # What can only be read is used all the same.
+            # A read-only store is used without this record.
             return
 
 
@@ -129,7 +131,7 @@ def digest(data: bytes) -> str:
 
 
 def _read(root: str, name: str) -> bytes | None:
-    """What was kept under its digest; None if it is missing or damaged."""
+    """The data stored under its digest; None if it is missing or damaged."""
     found = shared_files.read(root, name, _most(name))
     if found is None:
         return None
@@ -142,7 +144,7 @@ def _most(name: str) -> int:
 
 
 def _plain(data: bytes | None) -> object:
-    """The data that JSON means; None if it is none, or is nested too deep."""
+    """The data in a JSON text; None if it is invalid or nested too deep."""
     if not data or len(data) > _MOST_PLAIN_BYTES:
         return None
     try:
@@ -164,7 +166,7 @@ def _is_digest(text: object) -> bool:
 
 
 def _are_facts(facts: object) -> bool:
-    """Whether these are kinds, names and states."""
+    """Whether each item has a kind, a name and a state."""
     return isinstance(facts, list) and all(
         isinstance(fact, list) and len(fact) == _FACT_PARTS and _are_texts(fact[:2]) for fact in facts
     )
@@ -183,7 +185,7 @@ def _lengths(listed: object) -> dict[str, int] | None:
 
 
 def _is_path(path: object) -> bool:
-    """Whether a path leads to a file below the folder that it is relative to, without a detour."""
+    """Whether a path leads directly to a file below the folder that it is relative to."""
     if not isinstance(path, str):
         return False
     try:
@@ -196,5 +198,5 @@ def _is_path(path: object) -> bool:
 
 
 def _folders(paths: Iterable[str]) -> set[str]:
-    """The folders above all of these."""
+    """All folders above these paths."""
     return {path[:place] for path in paths for place, letter in enumerate(path) if letter == "/"}

@@ -1,6 +1,6 @@
-"""The state of this package's own files, on which all that is generated depends, and of what it imports.
+"""The state of this package's files and imported packages, on which all generated output depends.
 
-An answer from the store waits for this module, so it imports only what that takes.
+A hit waits for this module, so it imports as little as possible.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
 IMPORTED = ("chevron", "numpy", "pyyaml", "rosbags")
-"""What generated text can depend on beside our own code."""
+"""The packages that affect generated text besides our own code."""
 
-# Modules, templates and data. In the other folders lie cores and pages, as files or as links.
+# Modules, templates and data. The other folders hold cores and pages, as files or links.
 _COUNTED = (".py", ".mustache", ".yaml", ".csv")
 _LEFT_OUT = ("__pycache__", "demos", "docs", "library")
-# A file can be edited twice within what its times tell apart.
+# File times are too coarse to tell apart two edits within this period.
 _NEW_NANOSECONDS = 2 * 10**9
 _STARTED = time.time_ns()
 
@@ -30,10 +30,10 @@ def digest(package: Path = PACKAGE) -> str:
 
 
 def state(package: Path = PACKAGE) -> str:
-    """What differs once one of our files is edited, added or removed.
+    """A value that changes when one of our files is edited, added or removed.
 
-    It takes a fraction of the time of `digest`, as it consists of names, sizes and times. A file that was so new when
-    this process started that these can err, or newer, counts by its content.
+    It consists of names, sizes and times, so it takes a fraction of the time of `digest`. For a file so new at the
+    start of this process that its time may be unreliable, it uses the content.
     """
     found = []
     for name, entry in _files(str(package)):
@@ -51,7 +51,7 @@ def names(package: Path = PACKAGE) -> list[str]:
 
 @lru_cache(maxsize=1)
 def _digest(package: Path, _state: str) -> str:
-    """The digest of our files in a state."""
+    """The digest of our files; `_state` invalidates the cache."""
     found = {name: _content(entry.path) for name, entry in _files(str(package))}
     return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
 

@@ -1,11 +1,11 @@
-"""Which files and folders this process reads, and in which state, as Python itself tells (audit hooks, PEP 578).
+"""Records the files and folders that this process reads, with their state, by Python's audit hooks (PEP 578).
 
-What a generator reads has to be among the inputs that its key covers, or an edit would go unnoticed. What Python
-consists of and what its packages hold is left out, as their versions count, and so is this package, whose files are
-counted apart. So is what is the machine's: `/dev`, `/etc`, `/proc`, `/sys`. What other programs read is not seen.
+The key must cover everything that a generator reads, or an edit would go unnoticed. Python and its installed packages
+are not recorded, as their versions count; nor is this package, whose files are counted separately; nor are the
+machine's `/dev`, `/etc`, `/proc` and `/sys`. Files that other programs read are not seen.
 
-Of a file that is too large to be an input, such as a bag, a reader takes parts and says so (`in_part`). Each `Part` is
-then an input; a repeated call is recalled as long as the file has the same size and time.
+If a file is too large to be an input, such as a bag, a reader takes parts and declares this with `in_part`. Each `Part`
+is then an input; a repeated call is a hit as long as the file has the same size and time.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from pathlib import Path
 from fusesoc_firm.store.facts import Fact, state
 from fusesoc_firm.store.own_code import PACKAGE
 
-# Events of Python with a path as their first argument.
+# Python's events whose first argument is a path.
 _OF_FILES = ("open", "sqlite3.connect")
 _OF_FOLDERS = ("os.listdir", "os.scandir")
 _OF_TEMPORARY = ("tempfile.mkdtemp", "tempfile.mkstemp")
 _MACHINE = ("/dev", "/etc", "/proc", "/sys")
 _PATHS_OF_PYTHON = ("stdlib", "platstdlib", "purelib", "platlib")
-# What folders of installed packages are called, Debian's and those of each user included.
+# The names of folders with installed packages, including Debian's and each user's.
 _PACKAGE_FOLDERS = ("site-packages", "dist-packages")
 
 
 @cache
 def _apart() -> tuple[str, ...]:
-    """Folders that count apart. `sysconfig` itself reads files, so the hook must not call this for the first time."""
+    """Folders that count separately. `sysconfig` reads files, so this must be called before the hook calls it."""
     paths = sysconfig.get_paths()
     return (*_MACHINE, str(PACKAGE), *(paths[name] for name in _PATHS_OF_PYTHON), sys.executable)
 
 
 @dataclass(frozen=True)
 class Part:
-    """What was taken of the file or folder at `path`, which is not read as a whole, under a name of its own."""
+    """The part that was read of the file or folder at `path`, under a name of its own."""
 
     path: Path
     name: str
@@ -49,15 +49,15 @@ class Part:
 
 
 Input = Path | Part
-"""What a generator depends on: a whole file, or part of one."""
+"""An input of a generator: a whole file, or part of one."""
 
 
 @dataclass
 class Reads:
-    """What was read: absolute paths in the order in which they were, each in its state before the first reading.
+    """The absolute paths that were read, in order, each with its state before the first reading.
 
-    `parts` are files that were read in part. What lies in `apart`, or in a new temporary folder, is not noted.
-    `python_path` is where Python finds packages.
+    `parts` are files that were read in part. Files in `apart` and in new temporary folders are not recorded.
+    `python_path` lists the places where Python finds packages.
     """
 
     files: dict[str, str | None] = field(default_factory=dict)
@@ -67,24 +67,24 @@ class Reads:
     python_path: tuple[str, ...] = field(default_factory=lambda: tuple(filter(None, sys.path)))
 
     def note_file(self, path: str) -> None:
-        """Note a file that is going to be read."""
+        """Record a file that is about to be read."""
         _note_state(self.files, "file", path)
 
     def facts(self) -> list[Fact]:
-        """All that was noted."""
+        """All recorded files, parts and folders."""
         kinds = {"file": self.files, "part": self.parts, "folder": self.folders}
         return [(kind, path, was) for kind, found in kinds.items() for path, was in found.items()]
 
 
-# Those that are noted now, the innermost last.
+# The active records, the innermost last.
 _current: list[Reads] = []
-# Absolute paths of the files that are read in part now.
+# Absolute paths of the files that are being read in part.
 _partly: list[set[str]] = []
 
 
 @contextmanager
 def noted(reads: Reads) -> Iterator[None]:
-    """Within it, what is read is added to `reads`."""
+    """Add everything that is read in the context to `reads`."""
     _install_hook()
     _current.append(reads)
     try:
@@ -95,7 +95,7 @@ def noted(reads: Reads) -> Iterator[None]:
 
 @contextmanager
 def in_part(files: Iterable[Path]) -> Iterator[None]:
-    """Within it, these files are read in part."""
+    """Treat these files as read in part within the context."""
     paths = {_absolute(str(file)) for file in files}
     if _current:
         for path in sorted(paths):
@@ -109,7 +109,7 @@ def in_part(files: Iterable[Path]) -> Iterator[None]:
 
 @cache
 def _install_hook() -> None:
-    """Once: a hook stays for as long as the process lives."""
+    """Install the hook once: it stays for the life of the process."""
     sys.addaudithook(_hook)
 
 
@@ -122,7 +122,7 @@ def _hook(event: str, arguments: tuple[object, ...]) -> None:
         elif _is_read(*arguments[1:]):
             _note(arguments[0], is_file=True)
     elif event in _OF_FOLDERS:
-        # An import lists the folders of Python's path, and never scans one.
+        # An import lists the folders of Python's path, and never scans them.
         if event != "os.listdir" or arguments[0] not in _current[-1].python_path:
             _note(arguments[0], is_file=False)
     elif event in _OF_TEMPORARY:
@@ -142,7 +142,7 @@ def _of_uri(name: object) -> object:
 
 
 def _note(path: object, *, is_file: bool) -> None:
-    # A number is a file that is open already, and None the current folder.
+    # A number is a file that is already open, and None is the current folder.
     if not isinstance(path, str | bytes) or (text := os.fsdecode(path)) == ":memory:":
         return
     absolute, reads = _absolute(text), _current[-1]
@@ -156,7 +156,7 @@ def _note(path: object, *, is_file: bool) -> None:
 
 def _note_state(found: dict[str, str | None], kind: str, path: str) -> None:
     if path not in found:
-        # It is read for that, which is not to be noted again.
+        # Computing the state reads the file, which must not be recorded again.
         found[path] = None
         found[path] = state(kind, path)
 
@@ -170,7 +170,7 @@ def _is_below(path: str, folders: Iterable[str]) -> bool:
 
 
 def _is_of_package(path: str, reads: Reads) -> bool:
-    """Tell whether a file is one of a package that Python finds elsewhere."""
+    """Whether a file belongs to a package that Python finds elsewhere."""
     for folder in reads.python_path:
         if path.startswith(f"{folder}{os.sep}"):
             if os.path.basename(folder) in _PACKAGE_FOLDERS:

@@ -1,13 +1,13 @@
-"""Files in a folder that other people may write to, such as the store of a team.
+"""Accesses files in a folder that other people may write to, such as a team's store.
 
-Nothing below its root is trusted: a name there may be a link, a pipe, a device or a folder. Every folder is opened from
-the one above it without following links, a file without waiting for it, and only a regular file counts. The root itself
-is the user's choice, and may be a link. All names are relative to it.
+Nothing below the root is trusted: a name may be a link, a pipe, a device or a folder. Every folder is opened from its
+parent without following links, files are opened without waiting, and only regular files count. The root itself is the
+user's choice, and may be a link. All names are relative to it.
 
-What is made in a folder that its group may write to belongs to the same group, which may write to it, too, whatever the
-umask, as in a shared repository of Git.
+New files and folders in a group-writable folder belong to the folder's group and are writable for it, regardless of the
+umask, as in a shared Git repository.
 
-Of Python's library no more is imported than that needs.
+This module imports as little of Python's library as possible.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from contextlib import contextmanager, suppress
 from fusesoc_firm.text.files import TEMPORARY
 
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-# A pipe is opened without waiting for its other end, a terminal without becoming ours.
+# Opening a pipe must not wait for its other end, and a terminal must not become the controlling one.
 _FILE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
 _RIGHTS = 0o666
-# So often other processes may remove a folder while a file is put there.
+# How often other processes may remove a folder while a file is being written to it.
 _TRIES = 100
 
 
@@ -38,7 +38,7 @@ def read(root: str, name: str, most: int) -> bytes | None:
             if not stat.S_ISREG(status.st_mode) or status.st_size > most:
                 return None
             with open(handle, "rb", closefd=False) as file:
-                # It appeared whole, so one that still grows is not ours.
+                # Our files appear whole, so one that is still growing is not ours.
                 content = file.read(status.st_size + 1)
             return content if len(content) == status.st_size else None
         finally:
@@ -48,16 +48,16 @@ def read(root: str, name: str, most: int) -> bytes | None:
 
 
 def write_whole(root: str, name: str, data: bytes) -> None:
-    """Write a file beside its place and put it there by one rename; missing folders are made. Raises `OSError`."""
+    """Write a temporary file next to the target, then rename it; creates missing folders. Raises `OSError`."""
     for _ in range(_TRIES - 1):
-        # Another process may remove the folder, or what is in it.
+        # Another process may remove the folder, or files in it.
         with suppress(FileNotFoundError):
             return _write(root, name, data)
     return _write(root, name, data)
 
 
 def open_lock(root: str, name: str) -> int:
-    """Open a file that is to be locked, which is made if it is missing; its content stays.
+    """Open a file to be locked; creates it if it is missing, and keeps its content.
 
     Raises `OSError`, also if it is not a regular file.
     """
@@ -68,7 +68,7 @@ def open_lock(root: str, name: str) -> int:
 
 
 def state(root: str, name: str) -> os.stat_result | None:
-    """The state of what is there, of a link its own; None if it is missing or cannot be told."""
+    """The state of a path, for a link its own; None if it is missing or inaccessible."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             return os.stat(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
@@ -77,7 +77,7 @@ def state(root: str, name: str) -> os.stat_result | None:
 
 
 def listed(root: str, name: str) -> list[tuple[str, os.stat_result]]:
-    """What is in the folders of a folder, with its state; and what is where only folders should be."""
+    """The entries of each folder within a folder, with their states; and anything found in place of a folder."""
     found = []
     for inner, status in _entries(root, name) if _is_folder(root, name) else [(name, state(root, name))]:
         if status is not None:
@@ -92,17 +92,17 @@ def mark_used(root: str, name: str) -> None:
 
 
 def remove(root: str, name: str) -> int:
-    """Remove what is there, a folder with all that it holds; the number of bytes removed. Raises `OSError`."""
+    """Remove a file, or a folder with its contents; returns the number of bytes removed. Raises `OSError`."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             return _remove(os.path.basename(name), folder)
     except FileNotFoundError:
-        # Another process was faster.
+        # Another process removed it first.
         return 0
 
 
 def _write(root: str, name: str, data: bytes) -> None:
-    # A name that no process of any machine has; a process id is one's own only where it runs.
+    # A name that is unique across machines; process ids are unique only on one.
     temporary = f"{TEMPORARY}{os.urandom(8).hex()}"
     with _opened(root, os.path.dirname(name), is_made=True) as folder:
         try:
@@ -129,7 +129,7 @@ def _open_lock(root: str, name: str) -> int:
 
 def _remove(name: str, above: int) -> int:
     removed = 0
-    # Other processes may remove the same at the same time.
+    # Other processes may remove the same file at the same time.
     with suppress(FileNotFoundError):
         status = os.stat(name, dir_fd=above, follow_symlinks=False)
         if not stat.S_ISDIR(status.st_mode):
@@ -147,7 +147,7 @@ def _remove(name: str, above: int) -> int:
 
 
 def _remove_folder(name: str, above: int) -> None:
-    """Remove a folder, unless another process has written into it, or a link to one."""
+    """Remove an empty folder or a link; keeps a folder that another process has written to."""
     try:
         os.rmdir(name, dir_fd=above)
     except NotADirectoryError:
@@ -173,7 +173,7 @@ def _entries(root: str, name: str) -> list[tuple[str, os.stat_result]]:
 
 @contextmanager
 def _opened(root: str, name: str, *, is_made: bool = False) -> Iterator[int]:
-    """A folder, opened; it and those above it are made if they are missing and it `is_made`."""
+    """Open a folder; with `is_made`, create it and its parents if they are missing."""
     if is_made:
         os.makedirs(root, exist_ok=True)
     handle = os.open(root, _FOLDER)
@@ -200,13 +200,13 @@ def _make_folder(name: str, above: int) -> None:
 
 
 def _share(handle: int, above: int) -> None:
-    """Give what was made in a folder the group and the rights of that group, if the group may write to the folder."""
+    """Give a new file the group and the group rights of its folder, if the group may write to the folder."""
     folder, made = os.fstat(above), os.fstat(handle)
     if not folder.st_mode & stat.S_IWGRP:
         return
     is_folder = stat.S_ISDIR(made.st_mode)
     rights = stat.S_IRGRP | stat.S_IWGRP | (stat.S_IXGRP | stat.S_ISGID if is_folder else 0)
-    # Not if this user is not in the group, or another one has made it.
+    # This fails if the user is not in the group, or another user created the file.
     with suppress(PermissionError):
         if made.st_gid != folder.st_gid:
             os.fchown(handle, -1, folder.st_gid)

@@ -1,15 +1,16 @@
 """A content-addressed store of generated files, so that nothing is generated twice.
 
-FuseSoC's own generator cache cannot be used: it sees neither the code nor the templates that a core is made with,
-keeps partial output after an interrupt, and is not locked. Here an entry's key covers all that decides its content,
-this package's own files included.
+FuseSoC's own generator cache is unsuitable: it ignores the generator's code and templates, keeps partial output after
+an interrupt, and has no lock. Here an entry's key covers everything that determines its content, including this
+package's files.
 
-A call that was answered leaves a note of all facts that its key follows from, by which `plugin.recall` answers it the
-next time without making the key. `layout` tells how all this lies in the store.
+Each answered call leaves a note of all facts that determine its key, so that `plugin.recall` can answer it the next
+time without computing the key. `layout` describes the files of the store.
 
-A file is written beside its place and appears there by one rename; it is read whole and checked before it is used. So
-no reader, on this machine or on another that shares the folder, sees half of it or is disturbed by its removal. Locks
-only save work: they need not hold between machines, and are never trusted. `shared_files` tells what else is not.
+A file is written next to its place and appears there by one rename; it is read whole and checked before use. So no
+reader, on this machine or on another that shares the folder, sees a partial file or is disturbed by its removal. Locks
+only avoid duplicate work: they need not work between machines, and are never trusted. `shared_files` lists what else is
+not trusted.
 """
 
 from __future__ import annotations
@@ -35,22 +36,22 @@ from fusesoc_firm.text.file_lock import take
 from fusesoc_firm.text.files import TEMPORARY
 
 Files = Mapping[str, bytes]
-"""Contents by file name; a name may hold `/`."""
+"""Contents by file name; a name may contain `/`."""
 
 _FORMER_LAYOUTS = ("v1", "v2", "v3")
 _DEFAULT_LIMIT = "1G"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
-# When the store is too large, so much is left that it is not so again at once.
+# Shrinking leaves a margin, so that the limit is not exceeded again at once.
 _KEPT_OF_LIMIT = 0.8
-# Who makes an entry may be stopped, or be on a machine that is no more. It is longer than generation takes.
+# The process that holds a lock may be stopped, or its machine may be gone. This exceeds the time of a generation.
 _LONGEST_WAIT_SECONDS = 120
-# What a process that was killed left behind; no file takes so long to be written.
+# The age after which a temporary file was left by a killed process; no write takes this long.
 _ABANDONED_SECONDS = 3600
 
 
 @dataclass(frozen=True)
 class Key:
-    """The digest of what decides a result; `about` is plain data that tells people what was asked for."""
+    """The digest of all inputs of a result; `about` is plain data that describes the request for people."""
 
     digest: str
     about: Mapping[str, str] = field(default_factory=dict, compare=False)
@@ -58,7 +59,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Entry:
-    """Generated files and whether they were found (True) or had to be made (False)."""
+    """Generated files, and whether they are a hit (True) or were built (False)."""
 
     files: Files
     is_from_store: bool
@@ -66,7 +67,7 @@ class Entry:
 
 @dataclass(frozen=True)
 class StoredFile:
-    """A file by its name in the store: its size in bytes, and when it was last used (seconds since the epoch)."""
+    """A file by its name in the store: its size in bytes, and the time of last use (seconds since the epoch)."""
 
     name: str
     size: int
@@ -75,22 +76,22 @@ class StoredFile:
 
 @dataclass(frozen=True)
 class Store:
-    """A store in the folder `root`, which is made when it is first written to, of about `limit` bytes at most."""
+    """A store in the folder `root`, created on the first write, which keeps about `limit` bytes at most."""
 
     root: Path
     limit: int
 
     def obtain(self, key: Key, build: Callable[[], Files], is_current: Callable[[], bool] = lambda: True) -> Entry:
-        """The files of a key, from the store if it has them undamaged, else from `build`, which are then kept.
+        """The files of a key: from the store if they are there undamaged, otherwise from `build`, and then stored.
 
-        Nothing is kept unless the key `is_current` after `build`: otherwise something was edited while it was read.
-        Processes that want the same at once wait for the first of them. Whatever `build` raises passes through. If the
-        store cannot be written, one line on stderr says so and the files are made without it.
+        Files are stored only if the key `is_current` after `build`: otherwise an input changed during the build.
+        Concurrent processes that need the same key wait for the first of them. Exceptions of `build` are passed on. If
+        the store is not writable, the files are built without it, and one line on stderr reports this.
         """
         if (files := self._find(key)) is not None:
             return Entry(files, True)
         with self._lock(key):
-            # While this process waited for the lock another one may have made the entry.
+            # Another process may have built the entry while this one waited for the lock.
             if (files := self._find(key)) is not None:
                 return Entry(files, True)
             files = build()
@@ -99,39 +100,39 @@ class Store:
         return Entry(files, False)
 
     def note(self, call: str, note: Mapping[str, object]) -> None:
-        """Note the answer to a call, by its digest, so that it can be recalled."""
-        # It only saves time.
+        """Store a call's note by the call's digest, so that the call can be recalled."""
+        # A failure costs only time.
         with suppress(OSError):
             if self.is_writable():
                 layout.write_json(self._root, place(call, CALL), note)
 
     def entries(self) -> list[StoredFile]:
-        """Every entry, the one that was used last first."""
+        """All entries, the most recently used first."""
         return [file for file in self._files() if file.name.endswith(ENTRY)]
 
     def size(self) -> int:
-        """The bytes of all that counts against the limit."""
+        """The number of bytes that count against the limit."""
         return sum(file.size for file in self._files())
 
     def is_writable(self) -> bool:
-        """Whether this user may add entries; True also if the store's folder is missing."""
+        """Whether this user may add entries; also True if the store's folder is missing."""
         there = next((folder for folder in (self.root / LAYOUT, self.root) if os.access(folder, os.F_OK)), None)
         return there is None or os.access(there, os.W_OK)
 
     def remove_damaged(self) -> list[Path]:
-        """Remove what is damaged, or is no file that a store can have, and name it. Raises `OSError`."""
+        """Remove damaged files and those that cannot belong to a store, and return them. Raises `OSError`."""
         damaged = []
         for name, status in self._listed():
             is_kept = name.endswith(KEPT)
             is_good = stat.S_ISREG(status.st_mode) and (not is_kept or layout.is_whole(self._root, name))
-            # What is no more was removed by another process.
+            # A file that is gone was removed by another process.
             if not is_good and shared_files.state(self._root, name) is not None:
                 shared_files.remove(self._root, name)
                 damaged.append(self.root / name)
         return damaged
 
     def shrink(self, limit: int) -> int:
-        """Remove what was not used for longest until `limit` bytes are left at most; the number of bytes removed.
+        """Remove the least recently used files until at most `limit` bytes are left; return the bytes removed.
 
         Raises `OSError`.
         """
@@ -143,7 +144,7 @@ class Store:
         return removed
 
     def clean(self) -> int:
-        """Remove all of it, that of former versions too; the number of bytes removed. Raises `OSError`."""
+        """Remove the whole store, including former versions; return the number of bytes removed. Raises `OSError`."""
         return sum(shared_files.remove(self._root, layout) for layout in (*_FORMER_LAYOUTS, LAYOUT))
 
     def _find(self, key: Key) -> Files | None:
@@ -155,21 +156,21 @@ class Store:
 
     @contextmanager
     def _lock(self, key: Key) -> Iterator[None]:
-        """Hold the lock of a key, which the system frees if the process dies.
+        """Hold the lock of a key, which the system releases if the process ends.
 
-        Who cannot have it, or has waited too long for it, goes on without.
+        A process that cannot take the lock, or has waited too long for it, continues without it.
         """
         name = place(key.digest, LOCK)
         try:
             handle, is_held = _locked(self._root, name)
         except OSError:
-            # If the store cannot be written, that is found out when the entry is.
+            # A read-only store is reported when the entry is written.
             yield
             return
         try:
             yield
         finally:
-            # While it is held: whoever waits for it then sees that the file is another one.
+            # Remove it while it is held, so that waiting processes notice that the file is a different one.
             if is_held:
                 with suppress(OSError):
                     shared_files.remove(self._root, name)
@@ -180,7 +181,7 @@ class Store:
             layout.write_entry(self._root, place(key.digest, ENTRY), key.about, files)
             self._shrink_if_needed()
         except OSError as error:
-            # Who may only read a store of others knows, or is told by `firm cache show`.
+            # Users of a read-only store expect this; `firm cache show` reports it.
             if self.is_writable():
                 print(f"warning: nothing is kept in the store {self.root}: {error.strerror}", file=sys.stderr)
 
@@ -194,7 +195,7 @@ class Store:
                     shared_files.remove(self._root, name)
 
     def _files(self) -> list[StoredFile]:
-        """What counts against the limit, the one that was used last first."""
+        """The files that count against the limit, the most recently used first."""
         found = [
             StoredFile(name, status.st_size, status.st_mtime)
             for name, status in self._listed()
@@ -211,7 +212,7 @@ class Store:
 
 
 def default_store(environment: Mapping[str, str] = os.environ) -> Store:
-    """The store that the environment names. Raises `InputError` for a limit that is no size."""
+    """The store that the environment names. Raises `InputError` if the limit is not a size."""
     limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
         fail(f"FUSESOC_FIRM_CACHE_SIZE is '{limit}', which is no size", hint="bytes, or such as 500M or 2G")
@@ -219,15 +220,15 @@ def default_store(environment: Mapping[str, str] = os.environ) -> Store:
 
 
 def parse_size(text: str) -> int | None:
-    """A number of bytes, with K, M, G or T for powers of 1024; None if it is none."""
+    """The number of bytes in a text, with K, M, G or T for powers of 1024; None if it is invalid."""
     found = re.fullmatch(r"(\d+)([KMGT]?)", text.strip().upper())
     return int(found[1]) * _UNITS[found[2]] if found else None
 
 
 def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | None], code: str) -> str:
-    """The digest of all that decides what comes of `request` (plain data).
+    """The digest of everything that determines the result of `request` (plain data).
 
-    `inputs` are the bytes of each file by name, None if there is none; `code` is the digest of our own files.
+    `inputs` holds the bytes of each file by name, None for missing files; `code` is the digest of our own files.
     """
     parts = {
         "request": request,
@@ -235,7 +236,7 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
         "code": code,
         "versions": {name: _version(name) for name in IMPORTED},
         "python": sys.version_info[:2],
-        # What a compiler made of an accelerator runs on one kind of machine only.
+        # A compiled accelerator runs on one kind of machine only.
         "machine": platform.machine(),
     }
     return digest_of(parts)
@@ -243,14 +244,15 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
 
 @cache
 def _version(package: str) -> str:
-    """Of what this process has imported; looking it up takes longer than all else of a key."""
+    """The version of an imported package, cached: the look-up takes longer than the rest of a key."""
     return version(package)
 
 
 def _locked(root: str, name: str) -> tuple[int, bool]:
-    """A lock, opened, and whether it is held; whoever had it before may have removed it meanwhile. Raises `OSError`.
+    """Open and lock a file; return the handle and whether the lock is held. Raises `OSError`.
 
-    A file system without locks, or one that another machine keeps, costs a second build at worst.
+    The previous holder may have removed the file in the meantime. A file system without locks, or with locks on each
+    machine only, costs a second build at worst.
     """
     end = time.monotonic() + _LONGEST_WAIT_SECONDS
     while True:

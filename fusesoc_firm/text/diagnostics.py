@@ -1,9 +1,9 @@
-"""Faults in the user's input: where they are, what they are, and what would be right; and warnings of what is doubtful.
+"""Faults in the user's input, each with its place and what is legal; and warnings of doubtful input.
 
-Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics`
-collector, goes on as far as it can, and lets the collector raise one `InputError` that holds all faults of
-the file. The two doors (`cli`, `plugin.answer`) print it and exit with 1; nobody else catches it. Warnings are only
-printed: they change neither what is made nor the exit status.
+Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics` collector and
+continues as far as it can. The collector then raises one `InputError` with all faults of the file. Only the two entry
+points (`cli`, `plugin.answer`) catch it: they print it and exit with 1. Warnings are only printed: they change neither
+the output nor the exit status.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-# Of a file that is none of ours at all, each line is a fault.
+# In a file of an entirely different kind, each line is a fault.
 _MOST_SHOWN = 200
-# Characters of a line that are shown around a fault, and of a word that is shown whole.
+# The most characters of a line shown around a fault, and the shortest word that is shortened.
 _WIDEST = 200
 _LONG_WORD = re.compile(r"\S{500,}")
 
 
 @dataclass(frozen=True)
 class SourceRef:
-    """A place in a text: `line` and `column` count from 1, `text` is that whole line, `width` the characters meant."""
+    """A place in a text: `line` and `column` count from 1, `text` is the whole line, `width` counts characters."""
 
     file: str
     line: int
@@ -35,27 +35,27 @@ class SourceRef:
         return f"{self.file}:{self.line}:{self.column}"
 
     def excerpt(self) -> str:
-        """The line with a caret under the place, or nothing where the text is unknown."""
+        """The line with a caret under the place; empty if the text is unknown."""
         if not self.text:
             return ""
         number = f"{self.line:5d}"
         first = max(0, self.column - _WIDEST // 2) if len(self.text) > _WIDEST else 0
         shown = "".join(c if c.isprintable() or c == "\t" else "?" for c in self.text[first : first + _WIDEST])
-        # Tabs keep their width under the caret only if they are repeated there.
+        # Only repeated tabs keep the caret aligned.
         indent = "".join("\t" if c == "\t" else " " for c in shown[: self.column - 1 - first])
         underline = "^" + "~" * (min(self.width, max(1, len(shown) - len(indent))) - 1)
         return f"{number} | {shown}\n{' ' * len(number)} | {indent}{underline}"
 
 
 def byte_place(file: str, data: bytes, position: int) -> SourceRef:
-    """The place of a byte in a file that is no text; its column counts bytes."""
+    """The place of a byte in a file that is not a text; its column counts bytes."""
     line_start = data.rfind(b"\n", 0, position) + 1
     return SourceRef(file, data.count(b"\n", 0, position) + 1, position - line_start + 1)
 
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """A fault or a warning: a sentence, its place (None where the input has no lines) and, if known, what is legal."""
+    """A fault or a warning: a sentence, its place (None for input without lines) and, if known, what is legal."""
 
     message: str
     source: SourceRef | None = None
@@ -73,7 +73,7 @@ class Diagnostic:
 
 
 def _readable(text: str) -> str:
-    """`text` for a terminal: what would steer it is escaped, and a word of any length is shortened."""
+    """`text` for a terminal: control characters are escaped, and very long words are shortened."""
     escaped = "".join(c if c.isprintable() or c in "\t\n" else repr(c)[1:-1] for c in text)
     return _LONG_WORD.sub(lambda word: f"{word[0][:100]}...{word[0][-20:]}", escaped)
 
@@ -98,23 +98,23 @@ class Diagnostics:
     _known: set[Diagnostic] = field(default_factory=set, repr=False)
 
     def error(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
-        """Note a fault and go on; the same fault at the same place is noted once."""
+        """Add a fault; duplicates at the same place are dropped."""
         diagnostic = Diagnostic(message, source, hint)
         if diagnostic not in self._known:
             self._known.add(diagnostic)
             self.found.append(diagnostic)
 
     def warn(self, message: str, source: SourceRef | None = None, hint: str = "") -> None:
-        """Note what is legal and probably not meant."""
+        """Add a warning of legal but probably unintended input."""
         self.warned.append(Diagnostic(message, source, hint, is_warning=True))
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
-        """Every warning, in the order of files, lines and columns."""
+        """All warnings, in the order of files, lines and columns."""
         return tuple(sorted(self.warned, key=_position))
 
     def take(self, error: InputError, source: SourceRef | None) -> None:
-        """Note the faults of another reader; those without a place belong to what asked for it, at `source`."""
+        """Add the faults of another reader; `source`, the place that caused the reading, replaces a missing place."""
         for fault in error.diagnostics:
             self.error(fault.message, fault.source or source, fault.hint)
 
@@ -130,12 +130,12 @@ def _position(diagnostic: Diagnostic) -> tuple[str, int, int]:
 
 
 def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoReturn:
-    """Raise an `InputError` of a single fault, where nothing else can be checked behind it."""
+    """Raise an `InputError` with a single fault, when nothing after it can be checked."""
     raise InputError([Diagnostic(message, source, hint)])
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:
-    """A hint for an unknown word: the nearest legal one, or the legal ones if none is near."""
+    """A hint for an unknown word: the nearest legal word, or all legal words if none is near."""
     legal = sorted(set(choices))
     if near := closest(word, legal):
         return f"did you mean '{near}'?"
@@ -146,9 +146,9 @@ def nearest(word: str, choices: Iterable[str]) -> str:
 
 
 def closest(word: str, choices: Iterable[str]) -> str | None:
-    """The word that was probably meant, whichever letters are capitals; None if none is near."""
+    """The word that was probably meant, regardless of case; None if none is near."""
     lowered = {choice.lower(): choice for choice in sorted(set(choices))}
-    # Two letters exchanged are nearer than a letter lost: `clocsk` is `clocks`, not `clock`.
+    # Swapped letters are nearer than a missing letter: `clocsk` is `clocks`, not `clock`.
     close = [choice for choice in lowered if sorted(choice) == sorted(word.lower())]
     close = close or difflib.get_close_matches(word.lower(), lowered, n=1, cutoff=0.6)
     return lowered[close[0]] if close else None

@@ -1,6 +1,7 @@
-"""A lock on a file or a folder, which the system frees when the process ends: one process of this machine at a time.
+"""A lock on a file or folder for one process of this machine, which the system releases when the process ends.
 
-Several machines that share a folder may each have it. `building/folder_lock.py` has a lock that holds between machines.
+Processes on several machines that share a folder may hold the lock at the same time. `building/folder_lock.py` has a
+lock that works between machines.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ _POLL_SECONDS = 0.02
 
 @contextmanager
 def locked(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Hold the lock of a file or a folder that is there; waits for it. No file is left over. Raises `OSError`."""
+    """Wait for the lock of an existing file or folder, and hold it. Creates no file. Raises `OSError`."""
     handle = os.open(path, os.O_RDONLY)
     try:
         take(handle)
@@ -26,9 +27,9 @@ def locked(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def take(handle: int, seconds: float | None = None) -> bool:
-    """Lock an open file, which frees it when it is closed; False if another process has it for so many seconds.
+    """Lock an open file until it is closed; False if another process holds the lock for `seconds`.
 
-    Without a limit it waits for as long as it takes. On a file system without locks every lock counts as taken.
+    Without a limit it waits indefinitely. On a file system without locks, every lock counts as taken.
     """
     end = None if seconds is None else time.monotonic() + seconds
     while True:

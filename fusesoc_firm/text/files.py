@@ -1,6 +1,6 @@
-"""Files that appear at once: no reader, on this machine or on another that shares the folder, sees half of one.
+"""Writes files atomically: no reader, on this machine or on another that shares the folder, sees a partial file.
 
-Of Python's library no more is imported than a file needs, as an answer out of the store waits for it.
+A hit waits for this module, so it imports as little as possible.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ import stat
 from contextlib import suppress
 
 TEMPORARY = ".new-"
-"""What the name of a file begins with that is not whole yet."""
+"""The prefix of the names of incomplete files."""
 
 
 def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
-    """Write a file beside its place, and put it there by one rename. Raises `OSError`."""
+    """Write a temporary file next to the target, then rename it. Raises `OSError`."""
     folder = os.path.dirname(os.fspath(path))
     os.makedirs(folder or ".", exist_ok=True)
-    # A name that no process of any machine has; a process id is one's own only where it runs.
+    # A name that is unique across machines; process ids are unique only on one.
     temporary = os.path.join(folder, f"{TEMPORARY}{os.urandom(8).hex()}")
     try:
         with open(temporary, "xb") as file:
@@ -31,9 +31,9 @@ def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
 
 
 def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool:
-    """Write a file, whole, unless it holds just that already; tell whether it was written.
+    """Write a whole file unless its content is unchanged; return whether it was written.
 
-    An unchanged file keeps its time, so nothing behind it is built again. Raises `OSError`.
+    An unchanged file keeps its time, so that later steps are not repeated. Raises `OSError`.
     """
     data = content.encode() if isinstance(content, str) else content
     if read_file(path) == data:
@@ -43,7 +43,7 @@ def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes | None:
-    """The content of a regular file; None if there is none that can be read. A pipe is not waited for."""
+    """The content of a regular file; None if it is missing or unreadable. Does not wait for pipes."""
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
@@ -58,14 +58,14 @@ def read_file(path: str | os.PathLike[str]) -> bytes | None:
 
 
 def is_file(path: str | os.PathLike[str]) -> bool:
-    """Whether a regular file is there; a path that no file can have, such as one that is too long, is none."""
+    """Whether a regular file exists; False for an impossible path, such as one that is too long."""
     return os.path.isfile(path)
 
 
 def read_regular(path: str | os.PathLike[str], most: int) -> bytes:
     """The content of a regular file of at most `most` bytes.
 
-    Raises `OSError`, with its reason, for anything else: to open a FIFO would wait for its writer, and a device may
+    Raises `OSError`, with the reason, for anything else: opening a FIFO would wait for its writer, and a device may
     never end.
     """
     with open(path, "rb", opener=_open_at_once) as file:

@@ -1,7 +1,7 @@
-"""What a name may be, and ROS names to names that are legal and distinct in VHDL, Verilog and SystemVerilog.
+"""Converts ROS names to legal, distinct names in VHDL, Verilog and SystemVerilog.
 
-A name stays as it is wherever it can. What has to change changes in the same way on every run, and the
-generated code says in a comment which ROS name a port stands for, so the mapping can be read backwards.
+Names stay unchanged if possible. Changes are the same on every run, and a comment in the generated code gives the ROS
+name of each port, so that the mapping can be reversed.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterable, Sequence
 
-# IEEE 1076-2008, IEEE 1364-2005 and IEEE 1800-2017: a name must be usable whatever target translates it.
+# IEEE 1076-2008, IEEE 1364-2005 and IEEE 1800-2017: a name must be legal in every language of a target.
 VHDL_KEYWORDS = frozenset(
     """abs access after alias all and architecture array assert assume assume_guarantee attribute begin block body
     buffer bus case component configuration constant context cover default disconnect downto else elsif end entity
@@ -40,8 +40,8 @@ VERILOG_KEYWORDS = frozenset(
 )
 KEYWORDS = VHDL_KEYWORDS | VERILOG_KEYWORDS
 
-# What std.standard, std_logic_1164 and numeric_std declare, and the libraries: a constant of such a name in a package
-# that is used as a whole would hide both, so that `severity error` no longer compiled.
+# The libraries, and the declarations of std.standard, std_logic_1164 and numeric_std. A constant with such a name, in a
+# package imported with `.all`, would hide the predefined name; `severity error` would no longer compile.
 VHDL_PREDEFINED = frozenset(
     """ack bel bit bit_vector boolean boolean_vector bs can character cr dc1 dc2 dc3 dc4 del delay_length dle em enq eot
     error esc etb etx failure false ff file_open_kind file_open_status firm foreign fs fsp gs gsp hr ht ieee integer
@@ -54,13 +54,13 @@ VHDL_PREDEFINED = frozenset(
     shift_left shift_right signed std_match unresolved_signed unresolved_unsigned unsigned""".split()
 )
 
-# The characters of a name or a description.
+# The longest name or description, in characters.
 LONGEST_TEXT = 200
-# Those of a path, such as of a source, and of the fields on the way into a deeply nested message.
+# The longest path, such as of a source file or of a field in a deeply nested message.
 LONGEST_PATH = 4096
 
 PREFIX_RULE = "lower-case letters, digits and single '_' between them, a letter first, at most 100"
-"""What a prefix of design units is made of."""
+"""The form of a legal prefix of design units."""
 
 _PREFIX = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 _LONGEST_PREFIX = 100
@@ -69,10 +69,10 @@ _UNDERSCORES = re.compile(r"_{2,}")
 
 
 def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None:
-    """What keeps `text` from being a name or a description, and what is legal; None if nothing does.
+    """Why `text` cannot be a name or a description, and what is legal; None if it can.
 
-    Such a text gets into comments, strings, labels and messages: everywhere it is one line that can be shown. So it
-    has no control characters, Unicode's line ends, lone surrogates, or characters that change the direction of writing.
+    The text appears in comments, strings, labels and messages, so it must be one printable line. It must not contain
+    control characters, Unicode line ends, lone surrogates, or characters that change the writing direction.
     """
     legal = f"legal is one line of at most {longest} printable characters"
     if len(text) > longest:
@@ -83,10 +83,10 @@ def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None
 
 
 def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "field") -> str:
-    """One legal identifier of the parts joined with `_`.
+    """Join the parts with `_` to one legal identifier.
 
-    It has no `__`, no `_` at its ends and no digit in front. A word of `avoid` (in lower case) gets the suffix; these
-    are the keywords of VHDL and Verilog unless others are given.
+    It has no `__`, no `_` at its ends and no leading digit. A word in `avoid` (in lower case) gets the suffix; by
+    default, these are the keywords of VHDL and Verilog.
     """
     joined = _UNDERSCORES.sub("_", _ILLEGAL.sub("_", "_".join(parts))).strip("_")
     if not joined or joined[0].isdigit():
@@ -95,18 +95,18 @@ def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "fie
 
 
 def distinct_identifiers(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
-    """An identifier for each name, in order, distinct without regard to case and none of `reserved`.
+    """An identifier for each name, in order; they differ from each other and from `reserved`, regardless of case.
 
-    VHDL does not tell `Stamp` from `stamp`; ROS does. A clash, with an earlier name or with a port of the
-    entity, is solved by the first free of `_2`, `_3`, ...
+    VHDL does not distinguish `Stamp` from `stamp`; ROS does. If a name clashes with an earlier name or with a port of
+    the entity, it gets the first free suffix of `_2`, `_3`, ...
     """
     return _distinct((identifier(*name) for name in names), reserved)
 
 
 def distinct_constants(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
-    """As `distinct_identifiers`, for constants of a VHDL package: in capitals, and none is a name that VHDL predefines.
+    """Like `distinct_identifiers`, for constants of a VHDL package: in capitals, and none predefined in VHDL.
 
-    `STATUS_OK` stays; `ERROR` and `IN` become `ERROR_VALUE` and `IN_VALUE`.
+    `STATUS_OK` is unchanged; `ERROR` and `IN` become `ERROR_VALUE` and `IN_VALUE`.
     """
     avoided = VHDL_KEYWORDS | VHDL_PREDEFINED
     return _distinct((identifier(*name, avoid=avoided, suffix="value").upper() for name in names), reserved)
@@ -125,7 +125,7 @@ def _distinct(bases: Iterable[str], reserved: Iterable[str]) -> list[str]:
 
 
 def is_prefix(text: str) -> bool:
-    """Whether a text may stand before the names of design units."""
+    """Whether a text may prefix the names of design units."""
     return len(text) <= _LONGEST_PREFIX and _PREFIX.fullmatch(text) is not None
 
 

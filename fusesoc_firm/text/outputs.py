@@ -1,4 +1,4 @@
-"""Files that a user names for what a command writes: checked before the work begins, and written."""
+"""Writes the files that a user names for a command's output, and checks them before the work begins."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from fusesoc_firm.text.diagnostics import fail
 
 
 def check_output(path: Path, endings: Sequence[str] = ()) -> None:
-    """Raise `InputError` if a file cannot be written there, or if its name has none of `endings`, where there are any.
+    """Raise `InputError` if the file cannot be written, or if its name has none of the `endings`, if any are given.
 
-    Its folder must exist: one that does not is more often misspelled than meant.
+    Its folder must exist, since a missing one is usually a misspelling.
     """
     if endings and path.suffix not in endings:
         fail(
@@ -24,19 +24,19 @@ def check_output(path: Path, endings: Sequence[str] = ()) -> None:
 
 
 def shown(path: Path) -> str:
-    """A path as short as it can be told here."""
+    """The path relative to the current folder if it is below, otherwise unchanged."""
     here = Path.cwd().resolve()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
 
 
 def check_parent(path: Path) -> None:
-    """Raise `InputError` unless the folder is there that something is to be written into."""
+    """Raise `InputError` unless the parent folder exists."""
     if not path.absolute().parent.is_dir():
         fail(f"cannot write {path}: there is no folder {path.parent}")
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder that a command is to fill, with those above it. Raises `InputError`."""
+    """Create a folder for a command's output, with its parents. Raises `InputError`."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -44,7 +44,7 @@ def make_folder(path: Path) -> None:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file of the user, with the folders above it. Raises `InputError`."""
+    """Write a file of the user, and create its parent folders. Raises `InputError`."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.encode() if isinstance(content, str) else content)

@@ -1,7 +1,7 @@
-"""Questions to a person at a terminal, or to a pipe: the same questions, the same rules for an answer.
+"""Asks questions at a terminal or through a pipe, with the same questions and the same rules for answers.
 
-At a terminal prompt_toolkit asks: it completes, shows what a question means, and lets nobody past with a wrong answer.
-From a pipe each answer is a line; a wrong one ends it, with its line.
+At a terminal, prompt_toolkit completes answers, explains the question and accepts only valid answers. From a pipe, each
+answer is a line; an invalid one ends the questions with an error at its line.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked: `name` in short, `meaning` in a sentence.
+    """A question: `name` in short, `meaning` in a sentence.
 
-    `words` complete an answer; if the question `is_choice`, there are no others. An empty answer means `default`, which
-    is empty where it may be left out, unless the question `is_required`. `check` says what is wrong with an answer.
+    `words` complete an answer; if the question `is_choice`, only they are legal. An empty answer means `default`, which
+    is empty if the answer is optional; if the question `is_required` and has no default, an empty answer is a fault.
+    `check` returns the fault of an answer.
     """
 
     name: str
@@ -35,7 +36,7 @@ class Question:
     check: Callable[[str], str | None] = lambda _: None
 
     def fault(self, answer: str) -> str | None:
-        """What is wrong with an answer."""
+        """The fault of an answer, or None."""
         if not answer:
             return f"'{self.name}' is needed: {self.meaning}" if self.is_required and not self.default else None
         if self.is_choice and answer not in self.words:
@@ -44,30 +45,30 @@ class Question:
 
     @property
     def prompt(self) -> str:
-        """The question as it stands before the answer."""
+        """The text shown before the answer."""
         ending = f" [{self.default}]" if self.default else "" if self.is_required else " (Enter: none)"
         return f"{self.name}{ending}: "
 
 
 class Asker(Protocol):
-    """Whoever gets answers."""
+    """A source of answers."""
 
     def ask(self, question: Question) -> str:
-        """The answer, or the question's default; without blanks around it."""
+        """The answer without surrounding blanks, or the question's default."""
 
     def tell(self, text: str) -> None:
-        """Say something."""
+        """Show a text."""
 
 
 class PipeAsker:
-    """Takes an answer from each line of a stream; the questions go to another one, with their answers."""
+    """Reads an answer from each line of a stream, and writes questions and answers to another."""
 
     def __init__(self, answers: Iterable[str], output: TextIO) -> None:
         self._answers = enumerate(answers, start=1)
         self._output = output
 
     def ask(self, question: Question) -> str:
-        """Raises `InputError` for a wrong answer, and when there is none."""
+        """The answer in the next line. Raises `InputError` for an invalid or missing answer."""
         line, text = next(self._answers, (0, ""))
         if not line:
             fail(f"the answers end before '{question.name}': {question.meaning}")
@@ -78,12 +79,12 @@ class PipeAsker:
         return answer or question.default
 
     def tell(self, text: str) -> None:
-        """Say something, between the questions."""
+        """Write a text between the questions."""
         print(text, file=self._output)
 
 
 class TerminalAsker:
-    """Asks a person."""
+    """Asks a person at the terminal."""
 
     def __init__(self) -> None:
         from prompt_toolkit import PromptSession
@@ -91,7 +92,7 @@ class TerminalAsker:
         self._session: PromptSession[str] = PromptSession()
 
     def ask(self, question: Question) -> str:
-        """Asks until the answer is right; Ctrl-D is as Ctrl-C."""
+        """Ask until the answer is valid; Ctrl-D acts like Ctrl-C."""
         from prompt_toolkit.completion import FuzzyWordCompleter
         from prompt_toolkit.validation import ValidationError, Validator
 
@@ -113,12 +114,12 @@ class TerminalAsker:
         return answer.strip() or question.default
 
     def tell(self, text: str) -> None:
-        """Say something, between the questions."""
+        """Print a text between the questions."""
         print(text)
 
 
 def asker() -> Asker:
-    """Whoever fits the standard input."""
+    """The asker that fits the standard input."""
     if sys.stdin.isatty() and sys.stdout.isatty():
         return TerminalAsker()
     return PipeAsker(sys.stdin, sys.stdout)

@@ -1,7 +1,7 @@
-"""Text from users quoted for the language that it is generated into.
+"""Quotes users' text for the language of the generated file.
 
-Names, descriptions, file names and the constants of messages hold any printable character. A template says what each
-is there, `{{comment block}}` or `{{string topic}}`, and the template's ending says in which language.
+Names, descriptions, file names and constants of messages may contain any printable character. A template gives the kind
+of each text, `{{comment block}}` or `{{string topic}}`, and its ending gives the language.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import yaml
 
 Quote = Callable[[str], str]
 
-# Characters that mean nothing to Tcl, Make or a shell, wherever they stand in a word.
+# Characters without special meaning to Tcl, Make or a shell, anywhere in a word.
 _PLAIN_WORD = re.compile(r"[A-Za-z0-9_./:+,-]+")
 _PRINTABLE_ASCII = range(0x20, 0x7F)
 _C_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n"}
@@ -24,22 +24,22 @@ _SECOND_QUESTION_MARK = re.compile(r"(?<=[?])[?]")
 
 
 def comment(text: str) -> str:
-    """`text` for a comment that ends with its line, in any language, as printable ASCII.
+    """`text` as printable ASCII for a comment that ends with its line, in any language.
 
-    VHDL-93 is Latin-1, and GHDL refuses UTF-8 even in comments. A backslash at the end of a line, which C also spells
-    `??/`, would take the next line into the comment.
+    VHDL-93 is Latin-1, and GHDL rejects UTF-8 even in comments. A backslash at the end of a line, which C also spells
+    `??/`, would extend the comment to the next line.
     """
     escaped = text.encode("unicode_escape").decode("ascii").replace("??/", "? ?/")
     return f"{escaped}." if escaped.endswith("\\") else escaped
 
 
 def lines_of(text: str) -> list[str]:
-    """The lines of a text that is data, each with its newline; unlike for `splitlines`, no other character ends one."""
+    """The lines of a text that is data, each with its newline; unlike in `splitlines`, only newlines end a line."""
     return [f"{line}\n" for line in text.removesuffix("\n").split("\n")]
 
 
 def c_string(text: str) -> str:
-    """A string literal of C and C++, with the bytes of UTF-8: octal, as hexadecimal escapes have no end."""
+    """A string literal of C and C++ with UTF-8 bytes; the escapes are octal, since hexadecimal escapes have no end."""
     letters = "".join(map(_c_byte, text.encode("utf-8", "surrogateescape")))
     # The second of two question marks could begin a trigraph.
     escaped = _SECOND_QUESTION_MARK.sub(r"\\?", letters)
@@ -53,7 +53,7 @@ def _c_byte(byte: int) -> str:
 
 
 def python_string(text: str) -> str:
-    """A string literal of Python, in double quotes unless more than a newline at its end needs an escape."""
+    """A string literal of Python, in double quotes unless more than a trailing newline needs an escape."""
     body = text.removesuffix("\n")
     if not body.isprintable() or {'"', "\\"} & {*body}:
         return repr(text)
@@ -61,7 +61,7 @@ def python_string(text: str) -> str:
 
 
 def tcl_word(text: str) -> str:
-    """One word of Tcl's that stands for `text`: nothing in it is substituted, and braces around it stay balanced."""
+    """A word of Tcl that evaluates to `text`: nothing is substituted, and surrounding braces stay balanced."""
     if _PLAIN_WORD.fullmatch(text):
         return text
     return f'"{"".join(map(_tcl_character, text))}"'
@@ -77,18 +77,18 @@ def _tcl_character(character: str) -> str:
 
 
 def yaml_scalar(text: str) -> str:
-    """A scalar of YAML on one line, which is the string `text` again, never a number or a list."""
+    """A YAML scalar on one line that reads back as the string `text`, never as a number or a list."""
     return _yaml(text, text).removesuffix("\n...")
 
 
 def yaml_list(texts: Iterable[str]) -> str:
-    """A list of strings in YAML on one line."""
+    """A YAML list of strings on one line."""
     words = [*texts]
     return _yaml(words, "".join(words))
 
 
 def _yaml(value: str | list[str], text: str) -> str:
-    # PyYAML folds newlines, and writes a NEL as it is but reads it as a blank, unless all is escaped.
+    # PyYAML folds newlines. It also writes a NEL unescaped but reads it as a blank, unless everything is escaped.
     is_plain = text.isprintable()
     style = None if is_plain else '"'
     shown = yaml.safe_dump(value, default_style=style, default_flow_style=True, allow_unicode=is_plain, width=10**6)
@@ -96,12 +96,12 @@ def _yaml(value: str | list[str], text: str) -> str:
 
 
 def dot_text(text: str) -> str:
-    """`text` between the quotes of a string of Graphviz's language."""
+    """`text` for a quoted string in Graphviz's language."""
     return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
 def plot_text(text: str) -> str:
-    """`text` as matplotlib writes it: a dollar begins no formula."""
+    """`text` for matplotlib, with dollars escaped so that none begins a formula."""
     return text.replace("\\", "\\\\").replace("$", "\\$")
 
 
@@ -111,14 +111,14 @@ def make_prerequisite(name: str) -> str:
 
 
 def make_argument(text: str) -> str:
-    """An argument of a command in a makefile's recipe, which Make and then a shell read."""
+    """An argument of a command in a makefile's recipe, escaped for Make and then for a shell."""
     return shlex.quote(text).replace("$", "$$")
 
 
 _HDL = {"comment": comment}
 _TCL = {"comment": comment, "word": tcl_word}
 _MARKUP = {"text": html.escape}
-# By the ending of a template: the ways in which a text may stand in its language.
+# The quoting functions of each language, by the ending of the template.
 QUOTES: Mapping[str, Mapping[str, Quote]] = MappingProxyType(
     {
         "vhd": _HDL,

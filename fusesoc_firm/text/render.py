@@ -1,23 +1,23 @@
-"""Strict mustache: a template and plain data in, text out, and an error wherever mustache would guess.
+"""Renders strict mustache templates: a template and plain data give text, or an error where mustache would guess.
 
-Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks a key up in the outer
-scopes if the inner one lacks it. In hardware each of these is a fault that compiles. So chevron only parses the
-templates, and the tree is expanded here, by these rules:
+Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks up missing keys in
+outer scopes. In hardware descriptions each of these is a fault that compiles. So chevron only parses the templates, and
+this module expands the tree by these rules:
 
-* `{{x}}` prints a string or an integer as it is. A bool or None has no agreed spelling.
-* `{{comment x}}` prints text of a user, quoted for where it stands in the language that the template's name ends with;
-  `quoting` has the ways of each language. A partial is in the language of the template that includes it.
-* `{{x-1}}` and `{{x+1}}` print an integer and a number more or less: `std_logic_vector({{width-1}} downto 0)`.
-* A key is looked up in the innermost scope and nowhere else; `../x` is the `x` of the scope around it. It must be
-  there, also in a part that is left out.
-* `{{#x}}` takes a bool (part or no part, same scope), a list (the part once an item), or a mapping or None (the part in
-  the mapping's scope, or no part). `{{^x}}` is the part for false, an empty list or None.
-* `{{#x?}}` is a part in the same scope, once, if there is an `x`: if it is not false, "", an empty list or None.
-* A list holds mappings, each the scope of its turn, or strings and integers, which `{{.}}` prints. Within it, `@first`
-  and `@last` are bools: whether this is the first turn, and the last.
-* `{{|}}` begins a column: in neighbouring lines, what follows it begins at the same place. `{{|20}}` begins it behind
-  20 characters at least. `{{|!}}` in a line parts it from those before.
-* `{{> name}}` includes `partials/name.mustache`; alone on a line, its indentation is that of every line included.
+* `{{x}}` prints a string or an integer unchanged. A bool or None has no standard spelling and is an error.
+* `{{comment x}}` prints a user's text, quoted for this purpose in the language given by the ending of the template's
+  name; `quoting` defines the kinds of each language. A partial is in the language of the including template.
+* `{{x-1}}` and `{{x+1}}` print an integer minus or plus a number: `std_logic_vector({{width-1}} downto 0)`.
+* A key is looked up only in the innermost scope; `../x` is the `x` of the scope around it. The key must exist, even in
+  an omitted section.
+* `{{#x}}` takes a bool (the section or nothing, same scope), a list (the section once per item), or a mapping or None
+  (the section in the mapping's scope, or nothing). `{{^x}}` is the section for false, an empty list or None.
+* `{{#x?}}` is a section in the same scope, once, unless `x` is false, "", an empty list or None.
+* A list holds mappings, each the scope of its iteration, or strings and integers, which `{{.}}` prints. Within it, the
+  bools `@first` and `@last` mark the first and the last iteration.
+* `{{|}}` begins a column: in adjacent lines, the text after it is aligned. `{{|20}}` begins it after at least 20
+  characters. `{{|!}}` in a line separates it from the lines before.
+* `{{> name}}` includes `partials/name.mustache`; alone on a line, its indentation applies to every included line.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from chevron.tokenizer import ChevronError, tokenize
 from fusesoc_firm.text.quoting import QUOTES, Quote
 
 Context = dict[str, Any]
-"""What a template is rendered for: plain data."""
+"""The context of a template: plain data."""
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 
 
 class TemplateError(Exception):
-    """A template and its context do not fit: a fault of this package, never of its user."""
+    """A template and its context do not match: an error in this package, never the user's."""
 
 
 @dataclass(frozen=True)
 class Rendering:
-    """A template below `TEMPLATES`, and the context that it was rendered for."""
+    """A template below `TEMPLATES`, and its context."""
 
     template: str
     context: Mapping[str, object]
@@ -55,7 +55,7 @@ class Rendering:
 
 @dataclass(frozen=True)
 class TracedLine:
-    """A line of a rendered text, the line of the template file it comes from, and the scope's path in the context."""
+    """A line of a rendered text, its line in the template file, and the scope's path in the context."""
 
     text: str
     template: str
@@ -64,11 +64,11 @@ class TracedLine:
 
 
 _RECORDS: list[dict[str, Rendering]] = []
-# Private characters, which no template holds, around the place of a line.
+# Private-use characters, which no template contains, enclose the place of a line.
 _MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
-# A line that is left out as a whole, whatever it gives.
+# A line that is removed as a whole, whatever its tag expands to.
 _STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
-# Where a column begins, and behind how many characters at least.
+# The start of a column, and the least number of characters before it.
 _COLUMN = re.compile("\ue002(\\d*)\ue003")
 _PARTED = "\ue004"
 _COLUMN_KEY = re.compile(r"\|(?P<least>\d*)")
@@ -107,9 +107,9 @@ _Node = _Literal | _Value | _Section | _Partial
 
 @dataclass(frozen=True)
 class _Scope:
-    """Where keys are looked up, and the way there from the context's root (`ports[3]`), for messages.
+    """A scope for key lookup, and its path from the context's root (`ports[3]`), for messages.
 
-    `turn` has `@first` and `@last` of the innermost list around.
+    `turn` has `@first` and `@last` of the innermost list around it.
     """
 
     data: object
@@ -128,8 +128,8 @@ class _Scope:
 def render(template_name: str, context: Mapping[str, object], templates: Path = TEMPLATES) -> str:
     """The text of `templates/<template_name>.mustache` for `context`.
 
-    The context may hold dict, list, str, int, bool and None only. Raises `TemplateError`, which names template, key and
-    scope, if the two do not fit.
+    The context may contain only dict, list, str, int, bool and None. If template and context do not match, raises
+    `TemplateError`, which names template, key and scope.
     """
     try:
         _require_plain(context, "")
@@ -144,7 +144,7 @@ def render(template_name: str, context: Mapping[str, object], templates: Path = 
 
 @contextmanager
 def recorded() -> Iterator[dict[str, Rendering]]:
-    """Within it, every text that is rendered is noted with what it is made of."""
+    """Record every text rendered in the context, with its template and its data."""
     renderings: dict[str, Rendering] = {}
     _RECORDS.append(renderings)
     try:
@@ -154,7 +154,7 @@ def recorded() -> Iterator[dict[str, Rendering]]:
 
 
 def traced_lines(rendering: Rendering) -> list[TracedLine]:
-    """Each line of what `render` makes of it, with where it comes from."""
+    """Each line of the rendered text, with its origin."""
     name = rendering.template
     expansion = _TracedExpansion(TEMPLATES, _quotes(name))
     marked = expansion.expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
@@ -163,7 +163,7 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
     traced: list[TracedLine] = []
     place = (f"{name}.mustache", 1, "")
     for line, text in zip(lines, texts, strict=True):
-        # A value may be of several lines, and a blank line has no mark: they belong to the one above.
+        # Values may have several lines, and blank lines have no mark: both belong to the line above.
         if found := _MARK.search(line):
             place = (found["file"], int(found["line"]), found["scope"])
         traced.append(TracedLine(text, *place))
@@ -177,13 +177,13 @@ def template_text(name: str, templates: Path = TEMPLATES) -> str:
 
 @dataclass(frozen=True)
 class _Expansion:
-    """One walk over a parsed template, whose language has `quotes`."""
+    """One walk over a parsed template; `quotes` are those of its language."""
 
     templates: Path
     quotes: Mapping[str, Quote]
 
     def expand(self, nodes: tuple[_Node, ...], scope: _Scope, is_taken: bool) -> str:
-        """The text of `nodes`; none where they are not taken, but then too every key is looked up."""
+        """The text of `nodes`; if `is_taken` is false, only look up every key and return no text."""
         text = "".join([self._node(node, scope, is_taken) for node in nodes])
         return text if is_taken else ""
 
@@ -230,7 +230,7 @@ class _Expansion:
 
 
 class _TracedExpansion(_Expansion):
-    """A walk over a marked template: the marks get the scope's path."""
+    """A walk over a marked template, which adds the scope's path to the marks."""
 
     def _parse(self, name: str) -> tuple[_Node, ...]:
         return _parse_marked(name, self.templates)
@@ -240,7 +240,7 @@ class _TracedExpansion(_Expansion):
 
 
 def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
-    """The scopes in which a section's body is expanded, each with whether its text counts."""
+    """The scopes in which a section's body is expanded, each with whether its text is used."""
     if section.is_inverted:
         yield scope, not _is_there(value)
     elif section.is_question or isinstance(value, bool):
@@ -276,7 +276,7 @@ def _look_up(key: str, scope: _Scope) -> object:
 
 
 def _quotes(template_name: str) -> Mapping[str, Quote]:
-    """The ways to quote in a template's language: `vhdl/board.vhd`, or `board/pcf`."""
+    """The quoting functions of a template's language: `vhdl/board.vhd`, or `board/pcf`."""
     return QUOTES.get(template_name.rpartition("/")[2].rpartition(".")[2], {})
 
 
@@ -297,12 +297,12 @@ def _kind(value: object) -> str:
 
 
 def _indented(text: str, indentation: str) -> str:
-    """Indent every line that is not empty; an empty one would only get blanks at its end."""
+    """Indent every line that is not empty."""
     return "\n".join(indentation + line if line.strip() else line for line in text.split("\n"))
 
 
 def _in_columns(text: str) -> str:
-    """The text with its columns aligned, each run of lines that have some for itself."""
+    """Align the columns of a text; each run of lines with columns is aligned on its own."""
     if not _COLUMN.search(text):
         return text
     lines: list[str] = []
@@ -319,7 +319,7 @@ def _in_columns(text: str) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """The lines of rows of cells, between which stands how long the one before is at least."""
+    """The aligned lines of rows, in which cells alternate with the minimum length of the cell before."""
     widths: dict[int, int] = {}
     for row in rows:
         for number, (cell, least) in enumerate(zip(row[:-1:2], row[1::2], strict=True)):
@@ -330,8 +330,8 @@ def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 
 
 def _require_plain(value: object, path: str) -> None:
-    """Raise unless `value` is made of plain data: what is computed while it is rendered could not be printed before."""
-    # Exact types: a subclass may print itself in another way (an IntEnum does).
+    """Raise unless `value` is plain data: values computed during rendering could not be printed beforehand."""
+    # Exact types, since a subclass may print differently (an IntEnum does).
     if value is None or type(value) in (str, int, bool):
         return
     if type(value) is list:
@@ -356,7 +356,7 @@ def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
 
 
 def _parse_marked(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file in which a mark begins every line that gives one, but for blank ones."""
+    """The tree of a template file with a mark at the start of every non-blank line that produces output."""
     lines = template_text(name, templates).split("\n")
     marked = [
         line if not line.strip() or _STANDALONE.fullmatch(line) else f"\ue000{name}.mustache:{number}:\ue001{line}"
@@ -374,7 +374,7 @@ def _tree(name: str, text: str) -> tuple[_Node, ...]:
 
 
 def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
-    """The nodes up to the end of the section that `tokens` stands in, or of the file."""
+    """The nodes up to the end of the current section of `tokens`, or of the file."""
     nodes: list[_Node] = []
     for kind, key in tokens:
         match kind:
@@ -393,7 +393,7 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
 
 
 def _value(key: str) -> _Node:
-    """What a tag prints: `x`, `comment x` or `x-1`, or the beginning of a column."""
+    """The node of a value tag: `x`, `comment x`, `x-1`, or the start of a column."""
     if key == _PARTED_KEY:
         return _Literal(_PARTED)
     if column := _COLUMN_KEY.fullmatch(key):
@@ -405,7 +405,7 @@ def _value(key: str) -> _Node:
 
 
 def _take_indentation(nodes: list[_Node]) -> str:
-    """Take off and return the blanks with which the last line of `nodes` begins, if it holds nothing else."""
+    """Remove and return the indentation of the last line of `nodes`, if the line contains nothing else."""
     match nodes:
         case [*before, _Literal(text)] if not (before and isinstance(before[-1], _Value) and "\n" not in text):
             rest, newline, line = text.rpartition("\n")

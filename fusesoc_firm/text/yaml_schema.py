@@ -1,6 +1,6 @@
-"""The grammar of a YAML file as a JSON Schema, which editors check and complete by.
+"""Describes the grammar of a YAML file as a JSON Schema, with which editors check and complete it.
 
-It says what a file's sections say (`yaml_sections`), no more: whether names are known is found by reading the file.
+It covers the same rules as the file's sections (`yaml_sections`). Unknown names are only found by reading the file.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 
 Schema = dict[str, Any]
 
-# Words may look like numbers to YAML.
+# YAML may read words as numbers.
 _WORD = {"type": ["string", "number", "boolean"]}
 
 
 def json_schema(section: type[Section], title: str) -> Schema:
-    """The schema of a file that is one section, in JSON Schema's draft 2020-12."""
+    """The schema of a file with one section, in JSON Schema's draft 2020-12."""
     definitions: dict[str, Schema] = {}
     _define(section, definitions)
     return {
@@ -32,7 +32,7 @@ def _reference(section: type[Section]) -> str:
 
 
 def _define(section: type[Section], definitions: dict[str, Schema]) -> None:
-    """Add the schema of a section and of all within it."""
+    """Add the schemas of a section and all sections within it."""
     if section.__name__ in definitions:
         return
     definition: Schema = {"type": "object", "additionalProperties": False, "properties": {}}
@@ -47,7 +47,7 @@ def _define(section: type[Section], definitions: dict[str, Schema]) -> None:
 
 
 def _spelt(name: str, entry: Key) -> Schema:
-    """That a key is there, in one of its spellings."""
+    """A schema that requires the key in exactly one of its spellings."""
     ways = [{"required": [spelling]} for spelling in (name, *entry.aliases)]
     found = ways[0] if len(ways) == 1 else {"oneOf": ways}
     if entry.unless is None:
@@ -57,7 +57,7 @@ def _spelt(name: str, entry: Key) -> Schema:
 
 
 def _property(entry: Key) -> Schema:
-    """A key's value; one without is as good as none, unless it is required."""
+    """The schema of a key's value; unless the key is required, it may be null."""
     value = _value(entry)
     legal = value if entry.is_required else {"anyOf": [value, {"type": "null"}]}
     return {"description": entry.meaning, **legal}

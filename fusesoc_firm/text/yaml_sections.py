@@ -1,8 +1,8 @@
-"""Typed sections of a YAML file: what a key is called, takes and means is said once, at its dataclass field.
+"""Typed sections of a YAML file: each dataclass field defines its key's name, form and meaning in one place.
 
-`read` turns a node into a section and reports whatever does not fit, with the place and what is legal. It goes
-on behind a fault: the section is there in any case, empty where nothing could be read, and says that it is not sound.
-So all faults of a file come at once, and who works on it can tell a fault from what only follows from one.
+`read` converts a node to a section and reports every fault, with its place and what is legal. It continues after a
+fault: it always returns a section, with empty values for unreadable ones, and marks it as not sound. So all faults of a
+file are reported at once, and callers can distinguish faults from their consequences.
 """
 
 from __future__ import annotations
@@ -19,34 +19,33 @@ from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef, closest, neare
 from fusesoc_firm.text.naming import text_fault
 from fusesoc_firm.text.yaml_text import Text, YamlText, integer, is_null, items, kind
 
-# What is wrong with a text, and what is legal; None if nothing is.
+# The fault of a text, and what is legal; None if there is no fault.
 TextRule = Callable[[str], tuple[str, str] | None]
 S = TypeVar("S", bound="Section")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A mapping of the file. Its places, and whether all of it could be read, are no keys."""
+    """A mapping of the file. `source`, `places` and `is_sound` are not keys."""
 
     source: SourceRef
     is_sound: bool = True
-    # Where the value of each key stands that was given, by the field's name.
+    # The place of each given key's value, by field name.
     places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def place(self, field: str) -> SourceRef:
-        """Where the value of a field's key stands; of one that was not given, where the section does."""
+        """The place of the value of a field's key, or that of the section if the key is missing."""
         return self.places.get(field, self.source)
 
 
 @dataclass(frozen=True)
 class Key:
-    """What the grammar says of a key.
+    """The grammar of a key.
 
-    `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list), the last two of type
-    `section`. `aliases` are other spellings of the key. `choices` are all legal values, if they can be listed.
-    A required key may be left out beside another one, by name, with a certain value: `unless`.
-    `only_of` is the kind of thing that may have the key, where its section tells of several kinds. A text must keep
-    the `rule`.
+    `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list); `type` is the type of the
+    last two. `aliases` are other spellings of the key. `choices` lists all legal values, if possible. A required key
+    may be omitted if another key has a certain value: `unless`. `only_of` limits the key to one kind of item, if its
+    section describes several kinds. A text must comply with the `rule`.
     """
 
     meaning: str
@@ -61,12 +60,12 @@ class Key:
     rule: TextRule = text_fault
 
     def is_needed(self, others: Mapping[str, object]) -> bool:
-        """Whether the key must be there beside `others`, given as words."""
+        """Whether the key is required, given the values of the `others` as words."""
         return self.is_required and (self.unless is None or others.get(self.unless[0]) != self.unless[1])
 
 
 def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
-    """A field of a section; without `is_required` it has `default` where the key is not given."""
+    """A field of a section; unless `is_required`, a missing key has the value `default`."""
     made = Key(meaning, **facts)
     if made.form in ("sections", "texts"):
         default = ()
@@ -74,7 +73,7 @@ def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
 
 
 def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
-    """Field name and key by the key's name in the file, in the grammar's order."""
+    """The field name and `Key` of each key, by its name in the file, in the grammar's order."""
     return {
         (field.metadata["key"].name or field.name): (field.name, field.metadata["key"])
         for field in dataclasses.fields(section)
@@ -83,12 +82,12 @@ def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
 
 
 def keys_only_of(section: type[Section], kind: str) -> list[str]:
-    """The names of the keys that only this kind of thing may have."""
+    """The names of the keys that are limited to this kind of item."""
     return [name for name, (_, entry) in keys_of(section).items() if entry.only_of == kind]
 
 
 def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics, what: str) -> S:
-    """The section that a node of `file` holds, with all that is wrong in it noted.
+    """Read a section from a node of `file`, and add all its faults to `faults`.
 
     `what` names the section in messages: "a block".
     """
@@ -97,13 +96,13 @@ def read(section: type[S], node: yaml.Node, file: YamlText, faults: Diagnostics,
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads the nodes of one file; whatever does not fit is noted, and read as None."""
+    """Reads the nodes of one file; values with faults are reported and read as None."""
 
     file: YamlText
     faults: Diagnostics
 
     def section(self, section: type[S], node: yaml.Node, what: str) -> S:
-        """A section with all keys that could be read, and empty values for required ones that could not."""
+        """The section with all readable keys, and empty values for required keys that are missing or unreadable."""
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
@@ -115,13 +114,13 @@ class _Reader:
         found = {field: value for field, value in values.items() if value is not None}
         blanks = _blanks(section, source)
         needed = {known[name][0] for name in _needed(known, given)}
-        # What lies behind a fault of the file's form is not known.
+        # After a fault in the file's form, the rest is unknown.
         is_sound = len(self.faults.found) == before and needed <= found.keys() and not self.file.is_cut
         places = {known[name][0]: self.file.source(value) for name, value in given.items()}
         return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
-        """The nodes of the known keys that were given a value, by the key's own name."""
+        """The nodes of the known keys with a value, by the key's main name."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
         meant: set[str] = set()
@@ -137,13 +136,13 @@ class _Reader:
                 given[name] = value
         needed = _needed(known, given)
         for name in needed:
-            # A key that is only misspelt is no second fault.
+            # A misspelt key is not reported as missing, too.
             if name not in given and not self.file.is_cut and name not in meant:
                 self._error(f"{what} needs the key '{name}': {known[name][1].meaning}", node)
         return {name: value for name, value in given.items() if not is_null(value) or name in needed}
 
     def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
-        """The value of a key in its form, or None if it does not fit."""
+        """The value of a key in its form, or None if it is invalid."""
         match entry.form:
             case "section":
                 return self.section(_section_type(entry), node, f"'{name}'")
@@ -179,7 +178,7 @@ class _Reader:
 
     def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
-            # The tag may have been written there, of whatever.
+            # The user may have put the integer tag on any text.
             with suppress(ValueError):
                 return integer(node.value)
         self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
@@ -198,7 +197,7 @@ class _Reader:
 
 
 def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:
-    """The names of the keys that must be there beside those that are given."""
+    """The names of the keys that are required beside the given ones."""
     words = {name: value.value for name, value in given.items()}
     return [name for name, (_, entry) in known.items() if entry.is_needed(words)]
 
@@ -227,7 +226,7 @@ def _empty(section: type[S], source: SourceRef) -> S:
 
 
 def _words_of_keys(section: type[Section]) -> str:
-    """The keys that a section needs, or those that it may have if it needs none."""
+    """The keys that a section requires, or those that it may have if it requires none."""
     keys = keys_of(section)
     required = [name for name, (_, entry) in keys.items() if entry.is_required]
     return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"

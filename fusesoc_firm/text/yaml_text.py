@@ -1,10 +1,10 @@
-"""YAML that remembers where everything stands.
+"""YAML with source positions.
 
-PyYAML's own nodes hold the marks; here they become `SourceRef`s, and what a reader takes out of a file stays
-tied to its place: `Text` is a string that knows it.
+PyYAML's nodes hold marks; here they become `SourceRef`s, and values keep their places: a `Text` is a string with its
+place.
 
-A file is bounded in bytes, levels and nodes before it is made into anything, as a few lines of aliases could mean more
-than any memory holds.
+The bytes, levels and nodes of a file are limited before anything is built from it, since a few lines of aliases can
+expand beyond any memory.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ from fusesoc_firm.text.files import read_regular
 
 MOST_LEVELS = 64
 LONGEST_NUMBER = 40
-"""Characters of a number. Python itself refuses to read one of thousands of digits, with a `ValueError`."""
+"""The most characters of a number. Python itself raises `ValueError` for numbers with thousands of digits."""
 
 _CONTROL_CHARACTERS = yaml.reader.Reader.NON_PRINTABLE
 _REPLACEMENT = "\ufffd"
-# What PyYAML finds where a line's indentation fits none of those above it.
+# PyYAML's errors for a line whose indentation does not match any line above.
 _INDENTATION_PROBLEMS = ("expected <block end>", "expected '<document start>'", "mapping values are not allowed here")
-# What a block may begin with: the dash of a list's item, or the first word of a line that is no comment.
+# A block begins with the dash of a list's item, or with the first word of a line that is not a comment.
 _BLOCK_BEGIN = re.compile(r" *(-(?= )|[^\s#:-][^\s:]*)")
-# The ends of lines that PyYAML counts.
+# The line ends that PyYAML counts.
 _LINE_END = re.compile("\r\n|[\r\n\x85\u2028\u2029]")
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """How large a file may be; an alias counts as what it stands for."""
+    """The limits of a file; an alias counts as the node that it refers to."""
 
     bytes: int
     nodes: int
 
 
 SMALL = Bounds(2**20, 50_000)
-"""A specification, a configuration, a board."""
+"""The limits of a specification, a configuration or a board."""
 LARGE = Bounds(2**26, 5_000_000)
-"""Data, such as stimuli with images, and what others may have generated, such as a core."""
+"""The limits of data, such as stimuli with images, and of files that others may generate, such as cores."""
 
 
 class TooLargeError(Exception):
-    """A text is beyond its bounds: it has more than `what`, at `mark`."""
+    """A text exceeds a limit: `what` names it, `mark` gives the place."""
 
     def __init__(self, what: str, mark: yaml.Mark) -> None:
         super().__init__(f"more than {what}")
@@ -58,7 +58,7 @@ class TooLargeError(Exception):
 
 
 class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
-    """Makes nodes of a parser's events, and raises `TooLargeError` at the first one beyond the bounds."""
+    """Composes nodes from a parser's events, and raises `TooLargeError` at the first one beyond the limits."""
 
     def __init__(self, parser: Any, bounds: Bounds) -> None:
         yaml.composer.Composer.__init__(self)
@@ -66,7 +66,7 @@ class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
         self.check_event, self.peek_event, self.get_event = parser.check_event, parser.peek_event, parser.get_event
         self._bounds = bounds
         self._nodes = self._level = 0
-        # The nodes within each anchor.
+        # The number of nodes within each anchor.
         self._sizes: dict[str, int] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
@@ -85,14 +85,14 @@ class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
 
 
 class Text(str):
-    """A string of a file and the place where it was written."""
+    """A string from a file, with its place."""
 
     __slots__ = ("source",)
 
     source: SourceRef | None
 
     def __new__(cls, value: str, source: SourceRef | None = None) -> Text:
-        """`value`, written at `source`; None where it was written nowhere (a default)."""
+        """Create a text written at `source`; None means that it is not in a file (a default)."""
         text = super().__new__(cls, value)
         text.source = source
         return text
@@ -100,9 +100,9 @@ class Text(str):
 
 @dataclass(frozen=True)
 class YamlText:
-    """A YAML file's lines and its root node; `file` is how it is called in messages.
+    """A YAML file's lines and its root node; `file` is its name in messages.
 
-    `is_cut` tells that the text stops being YAML somewhere, and `root` holds only what stands above.
+    `is_cut` means that the text becomes invalid YAML at some point, and `root` holds only the part above it.
     """
 
     file: str
@@ -118,7 +118,7 @@ class YamlText:
         return SourceRef(self.file, start.line + 1, start.column + 1, text, max(1, last - start.column))
 
     def text(self, node: yaml.ScalarNode) -> Text:
-        """A scalar's characters, whatever type YAML takes them for."""
+        """A scalar's characters, regardless of its YAML type."""
         return Text(str(node.value), self.source(node))
 
 
@@ -127,12 +127,12 @@ def read_yaml(
 ) -> YamlText:
     """Read a file within `bounds`, called `file` in messages.
 
-    Raises `InputError` if it cannot be read or is no YAML. With `faults`, what is no YAML is noted there, and what
-    stands above it is returned.
+    Raises `InputError` if the file cannot be read or is not YAML. With `faults`, invalid YAML is reported there
+    instead, and the part above it is returned.
     """
     name = file or str(path)
     try:
-        # Some editors put a byte order mark in front.
+        # Some editors write a byte order mark.
         text = read_regular(path, bounds.bytes).decode("utf-8-sig")
     except OSError as error:
         fail(f"cannot read {name}: {error.strerror}")
@@ -146,7 +146,7 @@ def read_yaml(
 
 
 def parse_yaml(text: str, file: str, faults: Diagnostics, bounds: Bounds = SMALL) -> YamlText:
-    """The nodes of a YAML text; where it stops being YAML is noted, and what stands above is kept."""
+    """Parse a YAML text; if it becomes invalid, report the place and keep the part above."""
     lines = tuple(_LINE_END.split(text.rstrip()))
     _note_control_characters(text, file, faults)
     text = _CONTROL_CHARACTERS.sub(_REPLACEMENT, text)
@@ -172,7 +172,7 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
     problem = error.problem or error.context or "syntax error"
     context = error.context_mark
     mark = error.problem_mark or context
-    # Where a word lacks its colon, or something is still open at the end, the fault is where that began.
+    # If a colon is missing, or a construct is still open at the end, report the place where it began.
     is_late = problem.startswith("could not find expected ':'") or (mark is not None and mark.line >= len(lines))
     if context is not None and is_late:
         mark, context = context, None
@@ -192,9 +192,9 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
 
 
 def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
-    """How far a line is indented, and how far what is still open above it; empty if it fits one of these."""
+    """The indentations of a line and of the blocks open above it; empty if it fits one of these."""
     indent = len(lines[number]) - len(lines[number].lstrip(" "))
-    # What each open block begins with, by the blanks in front of it, the outermost first.
+    # The first word of each open block by its indentation, the outermost first.
     open_blocks: dict[int, str] = {}
     for above, line in enumerate(lines[:number]):
         for start, word in _block_begins(line):
@@ -207,7 +207,7 @@ def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
 
 
 def _block_begins(line: str) -> Iterator[tuple[int, str]]:
-    """The column, from 0, and the word of each block that may begin in a line: several behind the dash of an item."""
+    """The column, from 0, and the word of each block that may begin in a line: several after the dash of an item."""
     position = 0
     while found := _BLOCK_BEGIN.match(line, position):
         yield found.start(1), found[1]
@@ -217,14 +217,14 @@ def _block_begins(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _composed(text: str, bounds: Bounds = SMALL) -> yaml.Node | None:
-    """The root node of a text. Raises `yaml.MarkedYAMLError`, in the words of Python's own parser."""
+    """The root node of a text. Raises `yaml.MarkedYAMLError` with the message of PyYAML's own parser."""
     with suppress(yaml.YAMLError):
         return _composed_by(getattr(yaml, "CSafeLoader", yaml.SafeLoader), text, bounds)
     return _composed_by(yaml.SafeLoader, text, bounds)
 
 
 def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
-    """By one of PyYAML's parsers; that of libyaml is much faster, but does not say as well what is wrong."""
+    """Compose with one of PyYAML's parsers; libyaml's is much faster, but its messages are less exact."""
     parser = loader(text)
     try:
         node: yaml.Node | None = _Composer(parser, bounds).get_single_node()
@@ -234,7 +234,7 @@ def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
 
 
 def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
-    """The root node of the lines above a fault or, if it lies in something still open, above that; None without any."""
+    """The root node of the lines above a fault, or above the construct still open there; None if there is none."""
     for mark in (error.problem_mark, error.context_mark):
         if mark is not None:
             with suppress(yaml.YAMLError, TooLargeError):
@@ -243,7 +243,7 @@ def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node 
 
 
 def integer(text: str) -> int:
-    """The integer that a plain scalar means to YAML, of at most `LONGEST_NUMBER` characters. Raises `ValueError`."""
+    """The integer value of a plain scalar of at most `LONGEST_NUMBER` characters. Raises `ValueError`."""
     if len(text) > LONGEST_NUMBER:
         raise ValueError(f"more than {LONGEST_NUMBER} characters")
     value = yaml.safe_load(text)
@@ -253,7 +253,7 @@ def integer(text: str) -> int:
 
 
 def yaml_data(text: str) -> Any:
-    """What a text means: mappings, lists and scalars. Raises `yaml.YAMLError` for whatever means nothing."""
+    """The mappings, lists and scalars in a text. Raises `yaml.YAMLError` for invalid values."""
     try:
         return data_of(_composed(text, LARGE))
     except TooLargeError as error:
@@ -261,26 +261,26 @@ def yaml_data(text: str) -> Any:
 
 
 def data_of(root: yaml.Node | None) -> Any:
-    """What the nodes of a text mean. Raises `yaml.YAMLError` for whatever means nothing."""
+    """The data in a node and its children. Raises `yaml.YAMLError` for invalid values."""
     try:
         return None if root is None else yaml.SafeLoader("").construct_document(root)
     except (ValueError, TypeError, LookupError, OverflowError) as error:
-        # A number of thousands of digits or of none, a date that is none, a key that is a list.
+        # Such as a number with no digits or with thousands, an invalid date, or a list as a key.
         raise yaml.YAMLError(str(error)) from error
 
 
 def yaml_dump(data: Any) -> str:
-    """Data as a text for people to read: in its own order."""
+    """Data as readable YAML, with its order kept."""
     return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
 
 
 def is_null(node: yaml.Node) -> bool:
-    """Tell whether a key was written without a value, as listing 6.1 of the dissertation does with `type:`."""
+    """Whether a key has no value, like `type:` in listing 6.1 of the dissertation."""
     return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"
 
 
 def kind(node: yaml.Node) -> str:
-    """What a node is, for messages: its word, "a list", "a mapping" or "nothing"."""
+    """The kind of a node for messages: its word, "a list", "a mapping" or "nothing"."""
     if is_null(node):
         return "nothing"
     if isinstance(node, yaml.MappingNode):
@@ -291,7 +291,7 @@ def kind(node: yaml.Node) -> str:
 def items(
     yaml_text: YamlText, node: yaml.MappingNode, faults: Diagnostics
 ) -> Iterator[tuple[Text, yaml.ScalarNode, yaml.Node]]:
-    """Key text, key node and value node of each item; a key that is no scalar, or comes twice, is a fault."""
+    """Yield key text, key node and value node of each item; a key that is not a scalar, or is repeated, is a fault."""
     seen: dict[str, SourceRef] = {}
     for key, value in node.value:
         if not isinstance(key, yaml.ScalarNode):

@@ -1,7 +1,7 @@
-"""Ctrl-C as our commands have it, whatever the process was started with.
+"""Makes Ctrl-C work in our commands, however the process was started.
 
-A script's shell lets what it starts in the background (`make test &`) ignore SIGINT, and so do some CI runners. Every
-program below inherits that, and Python then leaves it so.
+A script's shell makes background commands (`make test &`) ignore SIGINT, and so do some CI runners. All programs below
+inherit this, and Python keeps it.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import signal
 
 
 def accept_interrupts() -> None:
-    """Let SIGINT raise `KeyboardInterrupt` where it is ignored. Programs that are started afterwards get it, too.
+    """Let SIGINT raise `KeyboardInterrupt` even if it was ignored. Programs started afterwards receive it, too.
 
-    For the main thread of a process of our own, when it starts.
+    Call this at the start of a process, in its main thread.
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)

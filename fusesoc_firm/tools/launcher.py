@@ -1,12 +1,12 @@
-"""Starts the programs of a build for Edalize, as `firm tool` does.
+"""Starts the programs of a build for Edalize, like `firm tool`.
 
-Edalize's makefiles put the launcher in front of each program. It finds a program on the path or as YoWASP's package
-from PyPI, says which package brings one that is missing, and notes in the build's manifest which one has run. A program
-that fails leaves no output: make, started again, would take it for a good one, such as the layout that nextpnr writes
+Edalize's makefiles put the launcher before each program. It finds a program on the path or as YoWASP's package from
+PyPI, reports how to install a missing one, and records each program that ran in the build's manifest. It removes the
+output of a failed program: otherwise make would accept it when started again, such as the layout that nextpnr writes
 before it finds that the clock is too slow.
 
-`generators/launcher.mk` is the GNUmakefile of a build. Unless there is another launcher, it names `firm_launcher.sh`
-beside it, which starts this module for the first run of a program in a build.
+`generators/launcher.mk` is the GNUmakefile of a build. Unless another launcher is set, it uses the `firm_launcher.sh`
+next to it, which starts this module for the first run of each program in a build.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from fusesoc_firm.tools.interrupts import accept_interrupts
 from fusesoc_firm.tools.manifest import note
 from fusesoc_firm.tools.programs import find, ways
 
-# Options that name a program's output.
+# Options that name an output file.
 _OUTPUTS = ("--asc", "--textcfg", "--write")
-# Set by `firm_launcher.sh`: the file from which it learns that a program was noted, and where that is.
+# Set by `firm_launcher.sh`: the file that records that a program was noted, and the program's path.
 _NOTED = "FIRM_NOTED"
 
 
 def launch(program: str, arguments: Sequence[str]) -> int:
-    """Run a program to its end; its exit status. Raises `InputError` if it is not installed."""
+    """Run a program to its end, and return its exit status. Raises `InputError` if it is not installed."""
     path = find(program)
     if path is None:
         fail(f"the program '{program}' is not installed", hint=ways(program))
@@ -42,12 +42,12 @@ def launch(program: str, arguments: Sequence[str]) -> int:
         for option, value in pairwise(arguments):
             if option in _OUTPUTS:
                 Path(value).unlink(missing_ok=True)
-    # Killed by a signal, as a shell says it.
+    # The status after a signal, as in a shell.
     return status if status >= 0 else 128 - status
 
 
 def _run(command: Sequence[str]) -> int:
-    """The exit status of a command; who ends this process, as make does, ends it."""
+    """Run a command and return its exit status; if this process is terminated, as by make, so is the command."""
     program: subprocess.Popen[bytes] | None = None
     is_wanted = True
 
@@ -60,7 +60,7 @@ def _run(command: Sequence[str]) -> int:
     before = signal.signal(signal.SIGTERM, end)
     try:
         with subprocess.Popen(command) as program:
-            # The signal may have come while it was being started.
+            # The signal may have arrived during the start.
             if not is_wanted:
                 program.terminate()
             return program.wait()
@@ -69,20 +69,20 @@ def _run(command: Sequence[str]) -> int:
 
 
 def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
-    """Let `firm_launcher.sh` start a program from now on, unless a failure of it has to be cleaned up after."""
+    """Let `firm_launcher.sh` start a program from now on, unless its failed output would need to be removed."""
     if not any(option in arguments for option in _OUTPUTS) and (path := shutil.which(arguments[0])):
         noted.parent.mkdir(exist_ok=True)
         noted.write_text(f"{path}\n", encoding="utf-8")
 
 
 def starts_everything() -> bool:
-    """Whether programs of this build are started here, and not by a launcher that may find them elsewhere."""
+    """Whether this package starts the build's programs, not a launcher that may find them elsewhere."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
     return not words or words[-1] == "tool"
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The same as `firm tool`, which has other commands to get ready; a build starts a dozen programs."""
+    """The same as `firm tool`, without loading other commands, since a build starts a dozen programs."""
     accept_interrupts()
     noted = os.environ.pop(_NOTED, "")
     try:

@@ -1,9 +1,9 @@
-"""Where the FuseSoC libraries of this package are: one of reusable cores and generators, one of demo systems.
+"""The paths of this package's FuseSoC libraries: one of reusable cores and generators, one of demo systems.
 
-In a wheel the folders hold the files; in a checkout they lead by relative links to `cores`, `generators` and `specs`.
-Either way they hold nothing else: FuseSoC takes every `.core` below a library's folder, and a project that adds one
-never finds what a build or a virtual environment left in the checkout. `FUSESOC_IGNORE` beside them keeps them out of
-any other library, such as that of a project with its virtual environment in its own folder.
+In a wheel the folders hold the files; in a checkout they contain relative links to `cores`, `generators` and `specs`.
+Either way they hold nothing else: FuseSoC takes every `.core` below a library's folder, so a project that adds one
+never finds remains of a build or a virtual environment in the checkout. `FUSESOC_IGNORE` next to them keeps them out of
+all other libraries, such as that of a project whose folder contains its virtual environment.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The manifest of a build: which tools took part in it, beside what they made.
+"""The manifest of a build: the tools that took part in it, stored next to their outputs.
 
-Every program that has run is added, so an output that is not made again keeps the tools that made it.
-The file holds no dates and no paths: where the same tools build the same, it is the same.
+Every program that has run is added, so an output that is not rebuilt keeps its tools in the list. The file contains no
+dates and no paths, so it is the same wherever the same tools make the same build.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ _PACKAGES = ("edalize", "fusesoc", "fusesoc-firm")
 
 
 def note(program: str, folder: Path) -> None:
-    """Write a program that has run in a folder into its manifest, with the packages that had it run.
+    """Record a program that has run in a folder, with the packages that started it, in the folder's manifest.
 
-    Nothing is written of a program that is not known, such as mkdir. Programs may be noted at the same time.
+    Unknown programs, such as mkdir, are not recorded. Several programs may be recorded at the same time.
     """
     if program not in PROGRAMS:
         return
     programs = (program, *PROGRAMS[program].starts)
     found = packages(_PACKAGES) | {name: facts_of(name, path) for name in programs if (path := find(name))}
-    # Of the folder, so no file is left over.
+    # The folder itself is locked, so no lock file is left over.
     with locked(folder):
         tools = read(folder) | found
         _replace(folder / FILE, json.dumps({"tools": tools}, indent=2, sort_keys=True) + "\n")
 
 
 def read(folder: Path) -> dict[str, dict[str, str]]:
-    """What a folder's manifest says of each tool; nothing where there is none, or none that can be read."""
+    """The facts of each tool in a folder's manifest; empty if the manifest is missing or unreadable."""
     try:
         tools = json.loads((folder / FILE).read_text(encoding="utf-8"))["tools"]
     except (OSError, ValueError, LookupError, TypeError):
@@ -42,7 +42,7 @@ def read(folder: Path) -> dict[str, dict[str, str]]:
 
 
 def _replace(path: Path, text: str) -> None:
-    """Write a file, which is either the old one or the new one at any time; not at all if nothing changes."""
+    """Replace a file atomically, unless its text is unchanged."""
     if path.is_file() and path.read_text(encoding="utf-8") == text:
         return
     with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as part:

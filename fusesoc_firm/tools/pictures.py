@@ -8,14 +8,14 @@ from pathlib import Path
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output, write
 
-# What a graph becomes, by the ending of a file's name; DOT is Graphviz's own language.
+# The formats of a picture, by the ending of the file's name; DOT is Graphviz's own language.
 ENDINGS = (".svg", ".png", ".pdf", ".dot")
-# What is text, and can be printed.
+# The text formats, which can be printed.
 TEXTS = ("svg", "dot")
 
 
 def check_picture(path: Path | None, form: str | None) -> None:
-    """Raise `InputError` if no picture can be written to `path`, or if its name says another format than `form`."""
+    """Raise `InputError` if `path` is not writable, or if its ending contradicts `form`."""
     if path is None:
         return
     check_output(path, ENDINGS)
@@ -27,7 +27,7 @@ def check_picture(path: Path | None, form: str | None) -> None:
 
 
 def draw(dot: str, path: Path | None, form: str | None) -> None:
-    """Write a graph in DOT as a picture to `path`, or print it in the `form`, SVG unless given. Raises `InputError`."""
+    """Write a graph in DOT as a picture to `path`, or print it in `form`, by default SVG. Raises `InputError`."""
     if path:
         write(path, picture(dot, path.suffix.removeprefix(".")))
     else:

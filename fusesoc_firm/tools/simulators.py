@@ -1,6 +1,6 @@
-"""The simulators that systems are simulated with, as Edalize has them: a row for each.
+"""The supported simulators, as Edalize names them: one row each.
 
-A new one is a row here, and one in `programs.PROGRAMS` for each program that it starts.
+A new simulator needs a row here, and one in `programs.PROGRAMS` for each program that it starts.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Live:
-    """How a simulator is built that another program starts, and how it is started (docs/transport.md).
+    """How to build a simulator that another program starts, and how to start it (docs/reference/transports.md).
 
-    `parameter` stands before `NAME=value` on its command line. Where FuseSoC's build makes nothing, the makefile's
-    target `made_by` does. What starts it is the line of the makefile's target `run` that begins with `started_by`, or
-    else the program `V<toplevel>`.
+    `parameter` precedes `NAME=value` on its command line. If FuseSoC's build produces nothing, the makefile's target
+    `made_by` does. The start command is the line of the makefile's target `run` that begins with `started_by`, or else
+    the program `V<toplevel>`.
     """
 
     parameter: str
@@ -25,10 +25,10 @@ class Live:
 
 @dataclass(frozen=True)
 class Simulator:
-    """A simulator: its title, what to say of it beside the others, the programs that it starts.
+    """A simulator: its title, its differences from the others, and the programs that it starts.
 
-    One that does not read VHDL gets a netlist in Verilog, which GHDL makes. `options` are those of its flow in Edalize,
-    and `system_verilog` those that SystemVerilog needs. Functions in C++ need GHDL's own interface (VHPIDIRECT).
+    If it does not read VHDL, it gets a netlist in Verilog, which GHDL makes. `options` are those of its flow in
+    Edalize, and `system_verilog` those that SystemVerilog needs. C++ functions need GHDL's own interface (VHPIDIRECT).
     """
 
     title: str
@@ -48,7 +48,7 @@ SIMULATORS: dict[str, Simulator] = {
         calls_functions=True,
         programs=("ghdl",),
         options={"sim_options": "[--ieee-asserts=disable-at-0]"},
-        # FuseSoC builds nothing before it runs. The line of the makefile has the options of the analysis.
+        # FuseSoC builds nothing before the run. The makefile's line contains the options of the analysis.
         live=Live("-g", "analyze", "ghdl -r "),
     ),
     "icarus": Simulator(
@@ -69,16 +69,16 @@ SIMULATORS: dict[str, Simulator] = {
         live=Live("+"),
     ),
 }
-"""By Edalize's name, the one first that a system is simulated with where nothing else is said."""
+"""The simulators by Edalize's names; the first suitable one is the default."""
 
 
 def default_simulator(*, has_verilog: bool = False, is_live: bool = False) -> str:
-    """The first that can simulate a system, one with accelerators in Verilog or another."""
+    """The first simulator that can simulate a system, with accelerators in Verilog or without."""
     return next(iter(fitting(has_verilog=has_verilog, is_live=is_live)))
 
 
 def fitting(*, has_verilog: bool = False, is_live: bool = False) -> dict[str, Simulator]:
-    """Those that can simulate a system, with accelerators in Verilog or without: none of them reads both languages."""
+    """The simulators that can simulate a system, with accelerators in Verilog or without: none reads both languages."""
     return {
         name: item
         for name, item in SIMULATORS.items()

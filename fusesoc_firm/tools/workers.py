@@ -1,4 +1,4 @@
-"""Who does the work: processes of this machine, or the workers of a Dask cluster."""
+"""Runs tasks in processes of this machine, or on the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 _CONNECT_SECONDS = 10
-# Without proof of who is at the other end.
+# Protocols without authentication.
 _OPEN_PROTOCOLS = ("", "tcp", "ws")
-# Tasks handed out for each worker, so that none waits for the next one.
+# Tasks submitted per worker, so that none is idle between tasks.
 _AHEAD = 4
 
 
 @dataclass(frozen=True)
 class Workers:
-    """An executor, and how many tasks it does at once."""
+    """An executor, and the number of tasks that it runs at once."""
 
     executor: Executor
     count: int
 
     def run(self, function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[tuple[Task, Result]]:
-        """Each task with its result, as they come; tasks are taken from their source only when there is room."""
+        """Yield each task with its result as it finishes; tasks are taken from their source only when there is room."""
         pending: dict[Future[Result], Task] = {}
         for task in tasks:
             pending[self.executor.submit(function, task)] = task
@@ -56,9 +56,9 @@ def _finished(pending: dict[Future[Result], Task]) -> Iterator[tuple[Task, Resul
 
 @contextmanager
 def local_workers(jobs: int | None = None) -> Iterator[Workers]:
-    """Processes of this machine, one a core unless `jobs` says how many."""
+    """Processes of this machine, `jobs` or one per core."""
     count = jobs or len(os.sched_getaffinity(0))
-    # Started anew: a copy of a process that has threads (a progress bar's) may hang.
+    # Spawned: a copy of a process with threads (such as a progress bar's) may hang.
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(count, mp_context=context, initializer=_leave_interrupts_to_the_parent)
     try:
@@ -71,17 +71,17 @@ def local_workers(jobs: int | None = None) -> Iterator[Workers]:
 def cluster_workers(address: str) -> Iterator[Workers]:
     """The workers of the Dask cluster whose scheduler is at `address`, such as tls://10.0.0.1:8786.
 
-    Both ends of a connection run what the other one sends. With tls:// they know each other by certificates, those of
-    Dask's own configuration; without, what is neither of this machine is warned of.
+    Each end of a connection runs code from the other. With tls:// they authenticate each other by the certificates in
+    Dask's own configuration; without, a warning is printed unless the scheduler is on this machine.
 
-    Raises `InputError` if none answers, if it has no workers or its workers cannot do our tasks, and if it is lost.
+    Raises `InputError` if the cluster does not respond, has no workers or unsuitable ones, or is lost.
     """
     try:
-        # Its types are partial.
+        # Its type hints are incomplete.
         distributed: Any = import_module("distributed")
     except ImportError:
         fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
-    # What is lost is told here, once and in a sentence.
+    # A lost connection is reported here, once and in one sentence.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     security = _security(distributed, address)
     with _connected(distributed, address, security) as client:
@@ -101,7 +101,7 @@ def cluster_workers(address: str) -> Iterator[Workers]:
 
 
 def _security(distributed: Any, address: str) -> Any:
-    """What a connection to the scheduler is to prove. Raises `InputError` if certificates are missing."""
+    """The security settings of a connection to the scheduler. Raises `InputError` if certificates are missing."""
     protocol, _, place = address.rpartition("://")
     if protocol != "tls":
         if protocol in _OPEN_PROTOCOLS and not _is_here(place):
@@ -127,7 +127,7 @@ def _security(distributed: Any, address: str) -> Any:
 
 
 def _is_here(place: str) -> bool:
-    """Whether the host of `host:port` is this machine's loopback."""
+    """Whether the host in `host:port` is this machine's loopback."""
     host = place.rpartition(":")[0].strip("[]")
     try:
         return host == "localhost" or ip_address(host).is_loopback
@@ -136,20 +136,20 @@ def _is_here(place: str) -> bool:
 
 
 def _connected(distributed: Any, address: str, security: Any) -> Any:
-    """A client of the scheduler. Raises `InputError` if none answers."""
+    """A client of the scheduler. Raises `InputError` if the scheduler does not respond."""
     try:
         return distributed.Client(address, timeout=_CONNECT_SECONDS, security=security)
-    # The last two: what Dask's configuration refuses.
+    # Dask raises the last two for an invalid configuration.
     except (OSError, ValueError, RuntimeError, TypeError) as error:
         reason = str(error).split("\n", 1)[0]
-    # What is left of the client ends its loop when it is collected. If that came while another one begins, both would
-    # wait for the same lock for ever.
+    # A discarded client stops its loop when it is garbage-collected. If that happened while another client starts, both
+    # would wait for the same lock forever.
     gc.collect()
     return fail(f"no Dask scheduler answers at '{address}'", hint=reason)
 
 
 def _check_versions(client: Any, address: str) -> None:
-    """The workers must have what we have: results are to be the same wherever they come from."""
+    """Raise `InputError` unless the workers have our versions: results must be the same on all machines."""
     found = client.run(_version, on_error="return")
     for worker, version in sorted(found.items()):
         if version != __version__:
@@ -165,5 +165,5 @@ def _version() -> str:
 
 
 def _leave_interrupts_to_the_parent() -> None:
-    # A handler, not SIG_IGN: that one the simulators would inherit, but Ctrl-C shall end them.
+    # A handler, not SIG_IGN: simulators would inherit that, but Ctrl-C must end them.
     signal.signal(signal.SIGINT, lambda *_: None)

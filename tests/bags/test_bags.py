@@ -1,4 +1,4 @@
-"""Stimuli out of recorded bags, which the tests write with rosbags."""
+"""Stimuli from recorded bags, which the tests write with rosbags."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from tests.typestores import typestore
 KINDS = ("ros1", "sqlite3", "mcap")
 POINT, VECTOR, STRING = "geometry_msgs/msg/Point", "geometry_msgs/msg/Vector3", "std_msgs/msg/String"
 
-# Topic, type, x, and when it was recorded, in ns.
+# Topic, type, x, and the time of recording in ns.
 Recording = tuple[str, str, float, int]
 
 
@@ -47,7 +47,7 @@ def subscriber(block: str, message: str, ros: Middleware, number: int = 0, topic
 
 
 def write(folder: Path, kind: str, recordings: Iterable[Recording]) -> Path:
-    """A bag of messages with x set and all else zero; of a string, 'x'."""
+    """Write a bag of messages in which x is set and all else is zero; strings are 'x'."""
     path = folder / ("recorded.bag" if kind == "ros1" else "recorded")
     with open_writer(path, kind) as writer:
         fill(writer, kind, recordings)
@@ -71,7 +71,7 @@ def fill(writer: Any, kind: str, recordings: Iterable[Recording]) -> None:
 
 
 def cut(path: Path, share: float) -> None:
-    """Cut the file of a bag off."""
+    """Truncate the file of a bag."""
     file = path if path.is_file() else next(file for file in path.iterdir() if file.suffix in (".mcap", ".db3"))
     data = file.read_bytes()
     file.write_bytes(data[: int(len(data) * share)])
@@ -321,7 +321,7 @@ def test_transforms_under_either_name_of_their_message(tmp_path: Path, ours: str
         ((stream, route),) = routes_of(bag, [taker], signatures_of([taker])).items()
     assert (route.misfit, route.subscribers) == ("", (taker,))
     assert stream.signature == "94810edda583a504dfda3829e70d7eec"
-    # By its type alone, too.
+    # Matched by type alone, too.
     (found,) = read_stimuli(tmp_path / "drive.bag", [subscriber("transforms", ours, ROS1)])
     assert found.payload == payload
 

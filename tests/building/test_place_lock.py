@@ -1,4 +1,4 @@
-"""The lock on a folder of the build root: one owner at a time, and none that is gone keeps others out."""
+"""The lock on a folder of the build root: one owner at a time, and an owner that is gone does not block others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FORK = multiprocessing.get_context("fork")
 
 
 def work_alone(path: Path, log: Path, times: int) -> None:
-    """Take the lock so many times, and note when this process begins and ends what it does alone."""
+    """Take the lock `times` times, and log the start and end of each exclusive period."""
     for _ in range(times):
         lock = FolderLock(path)
         while lock.acquire():
@@ -38,7 +38,7 @@ def take_and_stay(path: Path) -> None:
 
 
 def killed_owner(path: Path) -> BaseProcess:
-    """A process that had the lock when it was killed."""
+    """A process that was killed while it held the lock."""
     owner = FORK.Process(target=take_and_stay, args=(path,))
     owner.start()
     while not path.exists():
@@ -74,7 +74,7 @@ def test_who_has_it_is_named(tmp_path: Path) -> None:
 
 
 def test_of_a_killed_owner_one_takes_it_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many find at the same time that the owner is gone."""
+    """Many processes notice at the same time that the owner is gone."""
     monkeypatch.setattr(folder_lock, "_GRACE_SECONDS", 0.05)
     for number in range(5):
         path, log = tmp_path / f"{number}.lock", tmp_path / f"{number}.log"
@@ -99,7 +99,7 @@ def test_a_process_of_the_same_number_is_another_one(tmp_path: Path, monkeypatch
 
 
 def of_another_machine(path: Path) -> FolderLock:
-    """A lock that somebody elsewhere holds, of whose process nothing is known here."""
+    """A lock held on another machine, whose process is unknown here."""
     lock = FolderLock(path)
     assert lock.acquire() is None
     path.write_text(json.dumps(json.loads(path.read_text()) | {"machine": "elsewhere", "process": 1, "started": "0"}))
@@ -114,14 +114,14 @@ def test_an_owner_elsewhere_has_it_while_its_file_is_touched(tmp_path: Path, mon
     for _ in range(12):
         assert mine.acquire()
         time.sleep(0.05)
-        # Whatever clock that machine has.
+        # The other machine's clock does not matter.
         path.touch()
         os.utime(path, ns=(0, path.stat().st_mtime_ns - 10**18))
     end = time.monotonic() + 0.3
     while mine.acquire():
         time.sleep(0.05)
     assert time.monotonic() >= end
-    # It is told so, and takes nothing away when it ends.
+    # It notices this, and removes nothing when it ends.
     assert not lost.beat()
     lost.release()
     assert mine.beat()

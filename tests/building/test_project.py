@@ -1,4 +1,4 @@
-"""How the cores of a project hang together, and what they use: `firm graph`, `firm affected`, `firm lock`."""
+"""The dependencies of a project's cores, and the items they use: `firm graph`, `firm affected`, `firm lock`."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def git(*arguments: str) -> None:
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A repository of four cores, as the current folder, beside our library."""
+    """A repository of four cores, as the current folder, next to our library."""
     for name in ("HOME", "XDG_CONFIG_HOME", "FUSESOC_FIRM_CACHE"):
         monkeypatch.setenv(name, str(tmp_path / "home"))
     root = tmp_path / "project"
@@ -227,7 +227,7 @@ def test_what_is_unknown_is_a_fault(project: Path, capsys: Captured, arguments: 
 
 
 def locked(capsys: Captured) -> list[str]:
-    """What differs from the lock file of the top core."""
+    """The differences from the lock file of the top core."""
     status = main(["lock", "me:p:top", "--locked"])
     captured = capsys.readouterr()
     assert status == (1 if captured.err else 0)
@@ -245,7 +245,7 @@ def test_a_lock_names_messages_cores_and_tools(project: Path, capsys: Captured) 
     assert size["signature"].startswith("RIHS01_")
     assert lock["messages"]["geometry_msgs/Point (ROS 2)"]["source"] == "rosbags ros2_jazzy"
     assert {"me:p:branch:1.0", f"robot:axis:firm_axis:{__version__}"} <= lock["cores"].keys()
-    # The one is for a target that the core has not, the other is the core itself.
+    # The former is for a target that the core does not have, the latter is the core itself.
     assert not {"me:p:leaf:1.0", "me:p:top:1.0"} & lock["cores"].keys()
     assert lock["tools"]["fusesoc"] == {"version": version("fusesoc")}
     assert locked(capsys) == []
@@ -263,7 +263,7 @@ def test_a_copy_of_the_project_is_locked_alike(
 def test_what_differs_from_the_lock_is_said(project: Path, capsys: Captured) -> None:
     main(["lock", "me:p:top"])
     capsys.readouterr()
-    # What is the core's own.
+    # The core's own files are not locked.
     (project / "top/top.core").write_text(f"{TOP}# edited\n")
     assert locked(capsys) == []
     (project / "branch.core").write_text(f"{BRANCH}# edited\n")
@@ -305,7 +305,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     assert locked(capsys) == ["tool ghdl: version is GHDL 3.0.0, but GHDL 2.0.0 is locked"]
     (project / "bin" / "ghdl").unlink()
     assert locked(capsys) == ["tool ghdl is locked, but not installed"]
-    # What is installed, too, is no difference.
+    # Additional installed programs do not count as a difference, either.
     main(["lock", "me:p:top"])
     capsys.readouterr()
     install("GHDL 2.0.0")
@@ -373,7 +373,7 @@ def test_a_generator_refuses_what_is_not_locked(
     assert call(project, **{**more, "message": "geometry_msgs/Vector3"}) == 1
     assert "message geometry_msgs/Vector3 (ROS 2) is used, but not locked" in capsys.readouterr().err
     size.write_text("uint8 a\n")
-    # It is in the store, and compared all the same.
+    # The core is in the store, and is compared nevertheless.
     assert call(project, **more) == 0
     monkeypatch.setattr("fusesoc_firm.store.own_code.digest", lambda: "edited")
     assert call(project, **more) == 1

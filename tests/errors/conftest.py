@@ -1,4 +1,4 @@
-"""What the tests of this folder share."""
+"""Fixtures and helpers for the tests in this folder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SPEC_FOLDER = Path(__file__).parent / "spec"
 
 
 def make_libraries() -> dict[Middleware, MessageLibrary]:
-    """The messages that the bad specifications of `spec` can name, those in `spec/messages` among them."""
+    """The messages that the bad specifications of `spec` can name, including those in `spec/messages`."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(SPEC_FOLDER)  # so that messages show relative paths
         return {ros: MessageLibrary(ros, [Path("messages")]) for ros in (ROS1, ROS2)}

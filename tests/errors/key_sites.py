@@ -1,5 +1,6 @@
-"""Every key of a specification and where it stands, found by the grammar; and what goes wrong with keys: texts without
-one, with one misspelt, with one indented otherwise, and texts that end at one.
+"""Finds every key of a specification by the grammar, and makes faulty texts from it.
+
+A faulty text lacks the key, misspells it, indents it differently, or ends at it.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 
 @dataclass(frozen=True)
 class KeySite:
-    """A key of `text`: its section's grammar and node, the nodes of key and value, and its neighbours, if it has any.
+    """A key of `text`: its section's grammar and node, the nodes of key and value, and the next key, if any.
 
-    `parents` are the lines, from 1, and the words by which messages may mean the section: keys that lead to it, names.
+    `parents` are the lines, from 1, and the words by which messages may refer to the section: keys that lead to it,
+    names.
     """
 
     text: str
@@ -30,24 +32,24 @@ class KeySite:
 
     @property
     def name(self) -> str:
-        """The key as it stands in the file."""
+        """The key as written in the file."""
         return str(self.key_node.value)
 
     @property
     def entry(self) -> Key:
-        """What the grammar says of it."""
+        """The grammar's entry for the key."""
         return keys_of(self.section)[spellings_of(self.section)[self.name]][1]
 
     @property
     def is_needed(self) -> bool:
-        """Whether it must be there beside the other keys of its section."""
+        """Whether the key is required, given the other keys of its section."""
         names = spellings_of(self.section)
         others = {names[key.value]: value.value for key, value in self.node.value if key is not self.key_node}
         return self.entry.is_needed(others)
 
     @property
     def line(self) -> int:
-        """Its line, from 1."""
+        """The line of the key, from 1."""
         return self.key_node.start_mark.line + 1
 
     @property
@@ -59,7 +61,7 @@ class KeySite:
         return f"'{self.name}' at line {self.line}"
 
     def without(self) -> str:
-        """The text without the key and its value; what is behind them in the section takes their place."""
+        """The text without the key and its value; the rest of the section moves up."""
         start, end = self.key_node.start_mark.index, _end(self.value).index
         if self.next_key:
             end = self.next_key.start_mark.index
@@ -73,7 +75,7 @@ class KeySite:
         return self.text[:start] + word + self.text[end:]
 
     def shifted(self, shift: int) -> str | None:
-        """The text with the key's line indented otherwise; None if something stands before the key there."""
+        """The text with the key's line indented by `shift` more; None if other text precedes the key in its line."""
         start = self.key_node.start_mark
         margin = self.text[start.index - start.column : start.index]
         if margin.strip() or len(margin) + shift < 0:
@@ -81,13 +83,13 @@ class KeySite:
         return self.text[: start.index - start.column] + " " * (len(margin) + shift) + self.text[start.index :]
 
     def cut(self, shift: int) -> str | None:
-        """As `shifted`, up to the end of the key's line."""
+        """Like `shifted`, up to the end of the key's line."""
         shifted = self.shifted(shift)
         return shifted and "".join(shifted.splitlines(keepends=True)[: self.line])
 
 
 def key_sites(text: str, grammar: type[Section]) -> list[KeySite]:
-    """Every key of a right file, outer ones first."""
+    """Every key of a valid file, outer ones first."""
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     assert isinstance(root, yaml.MappingNode)
     return list(_sites(text, root, grammar, {}))
@@ -99,7 +101,7 @@ def spellings_of(section: type[Section]) -> dict[str, str]:
 
 
 def misspellings(word: str) -> list[str]:
-    """The word with a letter dropped, doubled, or two exchanged, at every place."""
+    """The word with a letter dropped or doubled, or with two letters swapped, at every position."""
     made = [word[:i] + word[i + 1 :] for i in range(len(word))]
     made += [word[: i + 1] + word[i:] for i in range(len(word))]
     made += [word[:i] + word[i + 1] + word[i] + word[i + 2 :] for i in range(len(word) - 1)]
@@ -121,7 +123,7 @@ def _sites(text: str, node: yaml.MappingNode, section: type[Section], above: Map
 
 
 def _end(node: yaml.Node) -> yaml.Mark:
-    """Behind a node's last character; PyYAML has the end of a block where the next token begins."""
+    """The position after a node's last character; PyYAML ends a block where the next token begins."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         return _end(last[1] if isinstance(last, tuple) else last)

@@ -1,4 +1,4 @@
-"""Bad configuration files of FIRM and what a user is told: NAME.yaml and, word for word, NAME.expected."""
+"""Bad configuration files and their messages: NAME.yaml and, word for word, NAME.expected."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Every key of every specification that is shipped, left out, misspelt, indented otherwise, and as the file's end.
+"""Every key of every shipped specification: omitted, misspelt, indented differently, and as the end of the file.
 
-`firm system check` must say what is wrong where it is, with the key's name, and what is legal must be a system.
+`firm system check` must report the fault at its place, with the key's name, and a valid text must give a system.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _EXCERPT = re.compile(r" *(?P<line>\d+) \| (?P<text>.*)")
 
 
 def specifications() -> list[Path]:
-    """A specification has the keys that the grammar requires; stimuli have none of them."""
+    """The specifications: files with the keys that the grammar requires, none of which stimuli have."""
     required = {name for name, (_, entry) in keys_of(Specification).items() if entry.is_required}
     found = []
     for path in sorted(SPECS.glob("*/*.yaml")):
@@ -42,7 +42,7 @@ def specifications() -> list[Path]:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault as it was printed: `words` are its message and hint, `excerpt` is the line that is shown, if one is."""
+    """A fault as printed: `words` are its message and hint, `excerpt` is the displayed line, if any."""
 
     file: str
     line: int
@@ -53,7 +53,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Answer:
-    """What `firm system check` said of a text."""
+    """The result of `firm system check` for a text."""
 
     text: str
     code: int
@@ -63,7 +63,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Checker:
-    """Runs `firm system check` for texts of a specification, beside its sources."""
+    """Runs `firm system check` on variants of a specification, next to its sources."""
 
     path: Path
     message_paths: Sequence[Path]
@@ -78,7 +78,7 @@ class Checker:
 
 
 def _faults(printed: str) -> list[Fault]:
-    """Faults; a line that is no part of one is a fault of the printing."""
+    """The printed faults; a line that does not belong to one is an error in the output."""
     found: list[Fault] = []
     for line in printed.splitlines():
         if place := _PLACE.fullmatch(line):
@@ -110,7 +110,7 @@ def checker(
     known: dict[Middleware, MessageLibrary] = {}
 
     def shared(paths: Sequence[Path], _: Mapping[str, str] | None, store: str | None) -> object:
-        """Libraries are made once, and know no installed ROS."""
+        """Create the libraries once, without an installed ROS."""
         if not known:
             known.update(make(paths, None, store))
         return known
@@ -130,7 +130,7 @@ def sites(checker: Checker) -> list[KeySite]:
 
 
 def problem(checker: Checker, answer: Answer) -> str:
-    """What is wrong with an answer whatever was asked: places that are none, or a status that does not fit."""
+    """An error in a result, whatever the text: an impossible place, or a status that does not fit."""
     if (answer.code == 0) != (not answer.faults) or (answer.code == 0) != (" is right: " in answer.output):
         return f"exit status {answer.code} with {len(answer.faults)} faults"
     lines = answer.text.splitlines()
@@ -160,7 +160,7 @@ def test_a_key_that_is_left_out(checker: Checker) -> None:
 
 
 def _names_what_lacks(fault: Fault, site: KeySite) -> bool:
-    """A fault must name the key, and stand in its section or name that."""
+    """Whether a fault names the key, and is in its section or names it."""
     is_near = fault.line in site.lines or fault.line in site.parents.values()
     is_meant = any(f"'{word}'" in fault.words for word in site.parents)
     if site.is_needed:
@@ -241,7 +241,7 @@ def test_a_file_that_ends_behind_a_key(checker: Checker, shift: int) -> None:
 
 
 def _what_no_fault_tells(answer: Answer, site: KeySite) -> str:
-    """A line that fits nowhere is shown, or named by the fault of the first line that does not fit it."""
+    """The fault of an unreported line: one that fits nowhere must be shown, or named by another line's fault."""
     told = [
         fault
         for fault in answer.faults

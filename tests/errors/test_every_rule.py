@@ -1,4 +1,4 @@
-"""Every place that notes a fault of a specification is reached by a bad specification in `tests/errors/spec`."""
+"""Every statement that reports a fault in a specification is reached by a bad specification in `tests/errors/spec`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from tests.errors.conftest import make_libraries
 from tests.errors.test_spec_errors import SPECIFICATIONS, derive_file
 
 PACKAGE = Path(sys.modules["fusesoc_firm"].__path__[0])
-# What a specification is read and judged by.
+# The modules that read and check a specification.
 BESIDE = """
     text/yaml_text.py text/yaml_sections.py frame/select.py converter/limits.py message/library.py
 """.split()
 SOURCES = (*sorted((PACKAGE / "system").rglob("*.py")), *(PACKAGE / name for name in BESIDE))
-# What notes a fault, and functions whose faults are of something else than the specification's text.
+# The calls that report faults, and functions that report faults outside the specification's text.
 NOTING_METHODS, NOTING_FUNCTIONS = ("error", "_error", "take"), ("fail", "InputError")
 OTHER_FAULTS = {
     ("system/views/diagram.py", "diagram"): "a program or package that is not installed",
@@ -43,7 +43,7 @@ OTHER_FAULTS = {
 
 @dataclass(frozen=True)
 class Rule:
-    """A call that notes a fault: the file below the package, the function, the lines of the call."""
+    """A call that reports a fault: the file below the package, the function, the lines of the call."""
 
     file: str
     function: str
@@ -74,7 +74,7 @@ def _notes(function: ast.expr) -> bool:
 
 @pytest.fixture
 def reached(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, int]]:
-    """The lines that were at work when a fault was noted: files below the package, and lines."""
+    """The lines that were active when a fault was reported: files below the package, and lines."""
     found: set[tuple[str, int]] = set()
 
     def watched(method: Callable[..., None], self: object, *arguments: object) -> None:
@@ -93,7 +93,7 @@ def reached(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, int]]:
 
 
 def test_every_rule_has_a_bad_specification(reached: set[tuple[str, int]], monkeypatch: pytest.MonkeyPatch) -> None:
-    # New ones: a library notes what is wrong in a file when it first reads it.
+    # New libraries, since a library reports the faults of a file when it first reads it.
     libraries = make_libraries()
     for path in SPECIFICATIONS:
         with pytest.raises(InputError):

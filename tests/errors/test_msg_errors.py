@@ -1,4 +1,4 @@
-"""Every bad `.msg` file beside its exact message: `<name>.msg` and `<name>.expected`, a folder for each version."""
+"""Every bad `.msg` file with its exact message: `<name>.msg` and `<name>.expected`, a folder for each version."""
 
 from __future__ import annotations
 

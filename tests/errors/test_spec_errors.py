@@ -1,4 +1,4 @@
-"""Bad specifications and what a user is told: NAME.yaml and, word for word, NAME.expected."""
+"""Bad specifications and their messages: NAME.yaml and, word for word, NAME.expected."""
 
 from __future__ import annotations
 

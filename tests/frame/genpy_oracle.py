@@ -1,7 +1,7 @@
-"""The reference of ROS 1: genpy makes classes of any definition, and these serialise themselves.
+"""The reference for ROS 1: genpy creates classes for any definition, which serialise themselves.
 
-Debian has it (python3-genpy) outside every virtual environment, so its folder is searched last. Where it is not
-installed, `has_genpy` is false.
+Debian installs it (python3-genpy) outside every virtual environment, so its folder is searched last. `has_genpy` is
+false if it is not installed.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ has_genpy = dynamic is not None
 
 
 class GenpyOracle:
-    """One message and all below it."""
+    """One message and its nested messages."""
 
     def __init__(self, name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> None:
         others = [definition for other, definition in definitions.items() if other != name]
@@ -58,7 +58,7 @@ class GenpyOracle:
     def _message(self, name: MessageName, value: Mapping[str, Any]) -> Any:
         message = self._classes[str(name)]()
         for field in self._definitions[name].fields:
-            # genpy's way out of Python's own words.
+            # genpy renames fields that are Python keywords.
             attribute = f"{field.name}_" if keyword.iskeyword(field.name) else field.name
             setattr(message, attribute, self._argument(field.type, value[field.name]))
         return message
@@ -71,7 +71,7 @@ class GenpyOracle:
                 return self._message(name, value)
             case PrimitiveType("time" | "duration" as name):
                 time = genpy.Time() if name == "time" else genpy.Duration()
-                # The constructor would carry what is above a second.
+                # The constructor would normalise nanoseconds beyond a second.
                 time.secs, time.nsecs = value["sec"], value["nsec"]
                 return time
         return value

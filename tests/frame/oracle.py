@@ -1,11 +1,11 @@
-"""A judge of layouts that is not ours: rosbags knows the types, makes the bytes, and says what a field is.
+"""An independent reference for layouts: rosbags provides the types, serialises values, and describes fields.
 
     oracle = Oracle(ROS2, {"awkward_msgs/Flags": "bool[9] flags\n"})
     value = oracle.random_value("geometry_msgs/Point", random.Random(7))
     payload = oracle.serialise("geometry_msgs/Point", value)
 
-Values are nested dictionaries and lists of Python numbers, as our codec takes them. Floats that are drawn for a
-`float32` are representable in it.
+Values are nested dictionaries and lists of Python numbers, as in our codec. Random values of a `float32` are
+representable in it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from tests.typestores import typestore
 
 _STORES = {ROS1: Stores.ROS1_NOETIC, ROS2: Stores.ROS2_JAZZY}
 _ROS1_TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
-# ROS 2's stand-in for the fields of an empty message; nobody sets it.
+# ROS 2's placeholder for the fields of an empty message, which is never set.
 _STAND_IN = "structure_needs_at_least_one_member"
 _EXTREME_FLOATS = (0.0, -0.0, math.inf, -math.inf, math.nan, 1.0)
 _LARGEST_SIGNED = 2**31 - 1
@@ -41,7 +41,7 @@ _LARGEST_INT8 = 127
 
 
 class Oracle:
-    """The messages of one distribution, the newest unless another is named, and any others by their text."""
+    """The messages of one distribution (by default the newest), and others given by their texts."""
 
     def __init__(
         self, ros: Middleware, texts: Mapping[str, str] | None = None, distribution: str | None = None
@@ -55,7 +55,7 @@ class Oracle:
             self._store.register(get_types_from_msg(text, _long_name(name)))
 
     def fixed_size_messages(self) -> list[str]:
-        """Every message of the distribution that holds neither a string nor a sequence, sorted."""
+        """Every message of the distribution without strings and sequences, sorted."""
         known = {str(name) for name in self._library.names()}
         return [name for name in sorted(known) if self._is_fixed(_long_name(name))]
 
@@ -64,25 +64,25 @@ class Oracle:
         return sorted(str(name) for name in self._library.names())
 
     def closure(self, name: str) -> dict[MessageName, MessageDefinition]:
-        """Our own definitions of it and of all below it."""
+        """Our definitions of a message and all nested messages."""
         if name in self._texts:
             return parsed(self._texts, self.ros)
         return self._library.closure(parse_name(name))
 
     def definition_text(self, name: str) -> str:
-        """The message and all within it in one text, parted as ROS 1's `gendeps --cat` does."""
+        """The joint text of a message, in the form of ROS 1's `gendeps --cat`."""
         return str(self._store.generate_msgdef(_long_name(name), ros_version=self.ros.number)[0])
 
     def frame(self, name: str) -> Frame:
-        """Our own frame of it: what is judged."""
+        """Our frame of a message, which is under test."""
         return frame_of(parse_name(name), self.closure(name))
 
     def random_value(self, name: str, source: random.Random) -> dict[str, Any]:
-        """A value with an extreme one in about every fourth place."""
+        """A random value; about every fourth number is an extreme one."""
         return self._message_value(_long_name(name), source)
 
     def serialise(self, name: str, value: Mapping[str, Any]) -> bytes:
-        """The payload; the padding of CDR is zero."""
+        """The payload; CDR's padding is zero."""
         message = self._message(_long_name(name), value)
         if self.ros is ROS1:
             return bytes(self._store.serialize_ros1(message, _long_name(name)))
@@ -108,7 +108,7 @@ class Oracle:
 
     def _message_value(self, long_name: str, source: random.Random) -> dict[str, Any]:
         if self.ros is ROS1 and long_name in _ROS1_TIMES:
-            # rosbags gives both halves the types of ROS 2; where the ranges overlap, the bytes are those of ROS 1.
+            # rosbags gives both parts ROS 2's types; where the ranges overlap, the bytes match ROS 1's.
             return {half: source.choice((0, 1, _LARGEST_SIGNED, source.getrandbits(31))) for half in ("sec", "nsec")}
         return {name: self._value(kind, source) for name, kind in self._fields(long_name)}
 
@@ -126,7 +126,7 @@ class Oracle:
         arguments = {}
         for name, kind in self._fields(long_name):
             if self.ros is ROS1 and long_name in _ROS1_TIMES:
-                # rosbags gives both halves the names and types of ROS 2: the same bits are other numbers there.
+                # rosbags gives both parts ROS 2's names and types, in which the same bits are different numbers.
                 is_seconds = name == "sec"
                 half = value["sec" if is_seconds else "nsec"] % 2**32
                 arguments[name] = half - 2**32 if is_seconds and half > _LARGEST_SIGNED else half
@@ -143,7 +143,7 @@ class Oracle:
             case (Nodetype.ARRAY | Nodetype.SEQUENCE, (inner, _)):
                 return [self._argument(inner, element) for element in value]
             case (Nodetype.BASE, ("byte", _)) if value > _LARGEST_INT8:
-                # rosbags packs a lone `byte` as a signed number, also in ROS 2, where it is 0 to 255.
+                # rosbags packs a single `byte` as a signed number, even in ROS 2, where it is 0 to 255.
                 return value - 256
         return value
 
@@ -154,9 +154,9 @@ class Oracle:
 
 
 class DefinitionsOracle(Oracle):
-    """The messages of `definitions`, whatever distributions call by the same names.
+    """The messages of `definitions`, even if distributions use the same names.
 
-    `refused` are those that rosbags cannot read, each with its reason.
+    `refused` holds those that rosbags cannot read, each with the reason.
     """
 
     def __init__(self, ros: Middleware, definitions: Mapping[MessageName, MessageDefinition]) -> None:
@@ -185,12 +185,12 @@ def parsed(texts: Mapping[str, str], ros: Middleware) -> dict[MessageName, Messa
 
 
 def plain_text(definition: MessageDefinition) -> str:
-    """The fields in the way that every parser reads: without defaults and constants, which are not sent."""
+    """The fields in a form that every parser reads: without defaults and constants, which are not sent."""
     return "".join(f"{field.type} {field.name}\n" for field in definition.fields)
 
 
 def is_same(left: Any, right: Any) -> bool:
-    """Whether two values are equal, where NaN equals NaN and parts that hold no number may be absent."""
+    """Whether two values are equal; NaN equals NaN, and parts without a number may be missing."""
     if isinstance(left, Mapping) and isinstance(right, Mapping):
         names = {name for side in (left, right) for name, value in side.items() if not _is_hollow(value)}
         return all(name in left and name in right and is_same(left[name], right[name]) for name in names)
@@ -198,7 +198,7 @@ def is_same(left: Any, right: Any) -> bool:
         return len(left) == len(right) and all(is_same(*pair) for pair in zip(left, right, strict=True))
     if isinstance(left, float) and isinstance(right, float):
         return struct.pack("d", left) == struct.pack("d", right) or (math.isnan(left) and math.isnan(right))
-    # A codec that gives 1 for True or 1.0 for 1 is wrong.
+    # A codec that returns 1 for True or 1.0 for 1 is wrong.
     return type(left) is type(right) and bool(left == right)
 
 

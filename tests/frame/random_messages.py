@@ -1,4 +1,4 @@
-"""Definitions drawn at random: small, deeply nested, and of all that moves a field on the wire."""
+"""Random definitions: small, deeply nested, and with every feature that affects positions on the wire."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _NUMBERS = ["bool", "uint8", "int8", "int16", "uint32", "float32", "float64", "i
 
 
 def random_texts(ros: Middleware, chance: random.Random, count: int = 5) -> dict[str, str]:
-    """`count` messages, by their names; the last may be made of all others."""
+    """`count` messages, by name; each may contain those before it."""
     names: list[str] = []
     texts = {}
     for number in range(count):
@@ -34,7 +34,7 @@ def _field(ros: Middleware, chance: random.Random, names: list[str]) -> str:
 
 
 def deep_texts(ros: Middleware, chance: random.Random, levels: int) -> dict[str, str]:
-    """Messages `L0` to `L<levels - 1>`, by their names: each holds the one before it, among other fields."""
+    """Messages `L0` to `L<levels - 1>`, by name: each contains the one before it, among other fields."""
     sizes = ["", "[]", "[1]", "[2]", *(["[<=1]", "[<=3]"] if ros is ROS2 else [])]
     texts = {}
     for level in range(levels):

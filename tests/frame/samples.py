@@ -1,4 +1,4 @@
-"""Messages that are hard on a layout or on a generator of hardware, and that no distribution holds."""
+"""Messages that are difficult for layouts or hardware generators, and that no distribution contains."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fusesoc_firm.message.middleware import Middleware
 
 PACKAGE = "awkward_msgs"
 
-# Words that VHDL, Verilog or the converters themselves need: every one of them must still work as a field.
+# Reserved words of VHDL and Verilog, and names in the converters: each must still work as a field.
 _WORDS = """
     entity signal in out is others process wait case all always wire reg assign logic module bit byte packed
     clk rst_n s_axis_tdata s_axis_tready m_axis_tdata m_axis_tvalid segment_valid msg_valid msg_ready frame_error
@@ -25,14 +25,14 @@ _SHARED = {
     "Words": "".join(f"uint8 {word}\n" for word in _WORDS),
     "Flags": "bool first\nbool[9] many\nuint16 between\nbool[1] one\nbool last\n",
     "Unaligned": "bool flag\nfloat64 value\nuint8 tail\n",
-    # In CDR the gaps of the elements differ, since each starts where the one before ended.
+    # In CDR the elements have different gaps, since each starts where the previous one ended.
     "Gaps": "Unaligned[3] elements\nuint16[3] triple\nUnaligned single\nint64 last\n",
     "Cell": "int8 kind\nuint16[2] pair\n",
     "Row": "Cell[3] cells\nfloat32 weight\n",
     "Grid": "bool before\nRow[2] rows\nfloat64 behind\n",
     "Hollow": "Nothing nothing\nuint8 value\nNothing[3] nothings\nfloat64 last\n",
     "Signed": "byte b\nchar c\nint8 i\nbyte[3] bs\nchar[2] cs\nint16[2] words\n",
-    # The names of two leaves meet once their paths are joined.
+    # The names of two leaves become equal when their paths are joined.
     "Inner": "uint8 b\nuint8 b_c\n",
     "Joined": "Inner a\nuint16 a_b\nuint16 a_b_2\nuint16 a_b_c\n",
     "Numbers": (
@@ -49,7 +49,7 @@ _ROS1 = {
     "Zero": "uint8[0] none\nuint16 value\nInner[0] nobody\nbool[0] nowhere\n",
 }
 
-# The payload is 4 bytes longer; these and their up to 3 trailing bytes lie round a carry of the length's lowest byte.
+# The payload is 4 bytes longer. With up to 3 trailing bytes, the lengths lead to a carry out of the length's low byte.
 _ROS2 = {
     "Tuned": "uint8 gain 7\nfloat32 rate 0.5\n",
     "Defaults": """float64 x 1.5\nint16[3] triple [1, -2, 3]\nbool flag true\nuint8 plain\nTuned tuned\nTuned[2] pair

@@ -1,4 +1,4 @@
-"""Every message of fixed size of two distributions, and the awkward ones: our bytes and values against rosbags'."""
+"""Our bytes and values against rosbags', for every message of fixed size in two distributions and the samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the codec refuses, and how it says so; what it accepts is compared with rosbags elsewhere."""
+"""Values that the codec rejects, and its messages; accepted values are compared with rosbags elsewhere."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ NANS_64 = (0x7FF0000000000001, 0xFFF4000000000000, 0x7FF8000000000001, 0xFFFFFFF
 
 
 def test_the_bits_of_every_nan_stay() -> None:
-    """A signalling NaN, the top bit of whose fraction is zero, must not become a quiet one."""
+    """A signalling NaN, in which the top bit of the fraction is zero, must not become a quiet one."""
     both = layout(ROS1, "float32 a\nfloat32[7] b\nfloat32[] c\nfloat64 d\nfloat64[4] e\nfloat64[] f\n")
     some = random.Random(7)
     for _ in range(50):
@@ -113,7 +113,7 @@ def test_the_bits_of_every_nan_stay() -> None:
         payload += struct.pack(f"<I{len(double)}Q", len(double), *double)
         message = decode(both, payload)
         assert encode(both, message) == payload
-        # As a model gets them, and a process of a cluster.
+        # Models and processes of a cluster receive such copies.
         for copied in (deepcopy(message), pickle.loads(pickle.dumps(message))):
             assert encode(both, copied) == payload
 

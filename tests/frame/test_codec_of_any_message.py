@@ -1,4 +1,4 @@
-"""What the codec takes, gives and refuses; test_every_message compares its bytes with those of others."""
+"""Values that the codec accepts, returns and rejects; test_every_message compares its bytes with those of others."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def test_octets_are_bytes_or_a_list(type_: str, data: Any) -> None:
         (ROS1, "string s\n", "hé", "03000000 68c3a9"),
         (ROS2, "string s\n", "hé", "04000000 68c3a900"),
         (ROS2, "string s\n", "", "01000000 00"),
-        # Bytes that are no UTF-8.
+        # These bytes are not UTF-8.
         (ROS1, "string s\n", "a\udcff", "02000000 61ff"),
-        # UTF-16 in four bytes a unit, without a zero at the end.
+        # UTF-16 with four bytes per unit, without a final zero.
         (ROS2, "wstring s\n", "aé", "02000000 61000000 e9000000"),
         (ROS2, "wstring s\n", "🤖", "02000000 3ed80000 16dd0000"),
         (ROS2, "wstring s\n", "\ud83e", "01000000 3ed80000"),

@@ -1,4 +1,4 @@
-"""Messages of many levels, drawn at random: our layout and lengths, each worked out once, against rosbags' bytes."""
+"""Random messages of many levels: our layout and lengths against rosbags' bytes, with each computed once."""
 
 from __future__ import annotations
 

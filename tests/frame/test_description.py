@@ -1,4 +1,4 @@
-"""A Frame for people: as plain data and as a tree."""
+"""Readable forms of a Frame: plain data and a tree."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Messages of any size: our bytes, values and lengths against serialisers that are not ours.
+"""Messages of any size: our bytes, values and lengths against independent serialisers.
 
-The judges are rosbags for both versions and genpy, ROS 1's own, where it is installed. Tried are all messages of all
-distributions, definitions drawn at random, and all of the folder that the environment variable CORPUS names
+The references are rosbags for both versions and, if it is installed, genpy, ROS 1's own. The messages are those of all
+distributions, random ones, and all in the folder that the environment variable CORPUS names
 (`ros1/<package>/msg/*.msg`, `ros2/...`).
 """
 
@@ -46,7 +46,7 @@ def new_seed() -> random.Random:
 
 
 def check(frame: Frame, serialise: Serialise, value: Mapping[str, Any], kind: str) -> None:
-    """All that we say of a value and its bytes against the bytes of a judge."""
+    """Compare all our results for a value and its bytes with the bytes of a reference."""
     payload = serialise(value)
     used = used_bytes(frame, payload)
     told = f"{frame.message}: {value}"
@@ -58,7 +58,7 @@ def check(frame: Frame, serialise: Serialise, value: Mapping[str, Any], kind: st
     assert length.maximum is None or len(payload) <= length.maximum, told
     if kind == EMPTY:
         assert length.minimum == len(payload), told
-    # Padding decides nothing.
+    # The content of padding must have no effect.
     garbage = bytes(byte if use else byte ^ 0xA5 for byte, use in zip(payload, used, strict=True))
     assert is_same(decode(frame, garbage), value), told
 
@@ -120,7 +120,7 @@ def test_random_definitions_against_genpy() -> None:
 
 
 def corpus(ros: Middleware) -> Iterator[tuple[MessageName, dict[MessageName, MessageDefinition]]]:
-    """Every message whose parts are all known, with these."""
+    """Yield every message whose nested messages are all known, with these."""
     library = MessageLibrary(ros, [Path(CORPUS, f"ros{ros.number}")])
     unknown = Counter[str]()
     for path in sorted(Path(CORPUS, f"ros{ros.number}").glob("*/msg/*.msg")):
@@ -161,7 +161,7 @@ def test_the_corpus_against_genpy() -> None:
     for name, definitions in corpus(ROS1):
         try:
             oracle = GenpyOracle(name, definitions)
-        except Exception as error:  # noqa: BLE001 - it refuses by exceptions of many types
+        except Exception as error:  # noqa: BLE001 - it raises exceptions of many types
             refused[f"{type(error).__name__}: {error}"] += 1
             continue
         try:
@@ -175,7 +175,7 @@ def test_the_corpus_against_genpy() -> None:
 
 
 def has_wstring(definition: MessageDefinition) -> bool:
-    """rosbags knows no wstring."""
+    """Whether the definition contains a wstring, which rosbags does not support."""
 
     def is_wide(type_: FieldType) -> bool:
         element = type_.element if isinstance(type_, ArrayType | SequenceType) else type_

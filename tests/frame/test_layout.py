@@ -1,4 +1,4 @@
-"""Layouts worked out by hand from the two serialisations, and the faults of messages that have no fixed size."""
+"""Layouts derived by hand from the two serialisations, and the faults of messages without a fixed size."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_ros2_is_aligned_behind_its_header() -> None:
     frame = layout(ROS2, "bool a\nfloat64 b\nuint16[3] c\nuint32 d\nuint8 e\n")
     assert runs(frame) == {"a": [(4, 1)], "b": [(12, 1)], "c": [(20, 3)], "d": [(28, 1)], "e": [(32, 1)]}
     assert (frame.prefix, frame.checked_prefix, frame.trailing_bytes) == (b"\0\1\0\0", 2, 3)
-    # Nothing is padded behind the last field.
+    # There is no padding after the last field.
     assert (frame.payload_bytes, frame.frame_bytes) == (33, 38)
 
 

@@ -61,7 +61,7 @@ def test_expressions(ros: Middleware, name: str, expected: str) -> None:
         ("string[2] a\n", False, 4 + 5 + 3 + 5, None),
         ("string<=1[2] a\n", False, 4 + 5 + 3 + 5, 4 + 6 + 2 + 6),
         ("Text[<=2] a\n", False, 8, None),
-        # The loop is not walked four thousand million times.
+        # The loop must not be walked four thousand million times.
         ("string<=1[<=4294967295] a\n", False, 8, 4 + 4 + 4294967295 * 8 - 2),
     ],
 )
@@ -76,7 +76,7 @@ def test_counts_suffice_where_it_says_so() -> None:
     assert length.is_computed
     for size, count in itertools.product(range(9), range(4)):
         value = {"s": "x" * size, "a": [{"x": 1.0, "y": 2}] * count, "b": [3.0] * count}
-        # Nothing but the numbers of elements is looked at.
+        # Only the numbers of elements matter.
         counts = {"s": "y" * size, "a": [None] * count, "b": [None] * count}
         assert length.of(counts) == len(encode(made, value))
 

@@ -1,4 +1,4 @@
-"""The tree of nodes: what is known of the wire before there is a payload."""
+"""The tree of nodes: the part of the layout that is known before there is a payload."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def outline(nodes: tuple[Node, ...]) -> list[str]:
         (ROS2, "std_msgs/String", "4 string"),
         (ROS1, "std_msgs/Empty", ""),
         (ROS2, "std_msgs/Empty", "5"),
-        # Every string in an array ends anywhere.
+        # A string in an array may end anywhere.
         (
             ROS2,
             "sensor_msgs/JointState",
@@ -67,25 +67,25 @@ def test_messages_of_the_distributions(ros: Middleware, name: str, expected: str
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        # Prefix and a count, then four bytes up to eight: all known.
+        # The prefix and a count, then four bytes up to eight: all are known.
         ("float64[] a\n", "4 4+float64[]"),
         ("uint32 x\nfloat64[] a\n", "8 float64[]"),
-        # An empty array ends behind its count, any other at a multiple of eight.
+        # An empty array ends after its count, any other at a multiple of eight.
         ("float64[] a\nfloat64 b\n", "4 4+float64[] pad8 8"),
         ("uint32 x\nfloat64[] a\nfloat64 b\n", "8 float64[] 8"),
         ("float64[] a\nuint32 b\nuint16 c\n", "4 4+float64[] 6"),
         ("uint16[] a\nuint16 b\nuint32 c\n", "4 uint16[] 2 pad4 4"),
-        # At most two bytes more: nothing more than that can be said of the next position.
+        # At most two more bytes: the next position is not known more exactly.
         ("uint8[<=2] a\nuint32 b\n", "4 uint8[<=2] pad4 4"),
         (
             "string s\nuint8 a\nuint16 b\nuint8 c\nuint32 d\nuint16 e\nuint8 f\nfloat64 g\n",
             "4 string 1 pad2 3 pad4 7 pad8 8",
         ),
-        # A padding that is always the same is part of the loop's run, the first of which starts at 4.
+        # Constant padding is part of the loop's run, the first of which starts at 4.
         ("Odd[] a\n", "4 (16)"),
-        # Elements start at 4 or, behind another, at 1 modulo 8.
+        # Elements start at 4 or, after another element, at 1 modulo 8.
         ("Tail[] a\n", "4 (pad8 9)"),
-        # A loop that is empty ends behind its count.
+        # An empty loop ends after its count.
         ("Eight[] a\nfloat64 b\n", "4 (pad8 8) pad8 8"),
         ("Byte[] a\nuint16 b\n", "4 (1) pad2 2"),
         ("Tail[2] a\n", "29"),

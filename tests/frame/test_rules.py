@@ -1,4 +1,4 @@
-"""The rules of the two serialisations as tables: what a layout takes from them must be complete and consistent."""
+"""The rules of the two serialisations as tables, which must be complete and consistent for layouts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Messages of variable size that are hard on converters, and that no distribution holds."""
+"""Messages of variable size that are difficult for converters, and that no distribution contains."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _SHARED = {
     "Text": "string text\n",
     "Bytes": "uint8[] data\n",
     "Numbers": "uint8 before\nfloat64[] many\nuint16[] halves\nfloat32 behind\nbool[] flags\n",
-    # Every size of element, wherever it may start.
+    # Elements of every size, at every possible start.
     "Sizes": "".join(f"uint8[] b{bits}\nuint{bits}[] n{bits}\nuint8 t{bits}\n" for bits in (8, 16, 32, 64)),
     "Texts": "string[] texts\nstring[3] three\nuint8 last\n",
     "Named": "string name\nfloat64 value\n",
     "Plain": "uint8 kind\nfloat64 value\n",
     "Plains": "Plain[] plains\nPlain[2] two\n",
     "Nameds": "Named[] many\nNamed[3] three\nNamed one\nuint8 last\n",
-    # Arrays of messages with arrays of messages with arrays.
+    # Arrays of messages that contain such arrays, at two levels.
     "Leaf": "uint16 id\nuint16[] data\n",
     "Branch": "string label\nLeaf[] leaves\nint64 weight\n",
     "Tree": "uint8 height\nBranch[] branches\nLeaf[2] roots\n",
@@ -29,7 +29,7 @@ _SHARED = {
     "Hollow": "uint8 first\nNothing[] nothings\nstring text\nNothing[2] two\n",
     "Flags": "bool a\nbool[3] b\nstring c\nbool d\nFlag[] e\n",
     "Flag": "bool on\nbool[2] more\n",
-    # Words that the publisher itself uses.
+    # Names that the publisher itself uses.
     "Words": "".join(
         f"uint8 {word}\n" for word in "data index word valid last ready count length place header size step".split()
     )
@@ -40,7 +40,7 @@ _SHARED = {
 }
 _ROS1 = {"Times": "time stamp\ntime[2] stamps\nstring text\nduration[3] spans\nuint8[] data\n"}
 _ROS2 = {
-    # The same on the wire: rosbags knows no wstring, but numbers of four bytes.
+    # Equal on the wire: rosbags does not support wstring, but it supports numbers of four bytes.
     "Units": "uint32[] text\nUnit[] texts\nuint8 last\n",
     "Unit": "uint32[] units\n",
     "Wides": "wstring text\nwstring[] texts\nuint8 last\n",

@@ -28,7 +28,7 @@ location = {library_root()}
 [library.project]
 location = .
 """
-# A generator whose instances do what a test needs: say what they see, fail, or stay.
+# A generator whose instances do what a test needs: print their environment, fail, or keep running.
 ACTOR = """\
 import os, subprocess, sys, time, yaml
 call = yaml.safe_load(open(sys.argv[1]))
@@ -88,7 +88,7 @@ end architecture;
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    """A project of two cores, beside a store of its own."""
+    """A project of two cores, next to a store of its own."""
     folder = tmp_path / "project"
     folder.mkdir()
     texts = {
@@ -104,7 +104,7 @@ def project(tmp_path: Path) -> Path:
 
 
 def start(project: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
-    """`firm build`, which has to listen to SIGINT, although whoever starts it ignores that."""
+    """Start `firm build`, which must react to SIGINT even if its parent ignores it."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("FUSESOC", "EDALIZE"))}
     return subprocess.Popen(
         [*IGNORING_INTERRUPTS, sys.executable, "-m", "fusesoc_firm.cli", "build", *arguments],
@@ -138,7 +138,7 @@ def test_every_target_of_every_core_has_its_place(project: Path) -> None:
     assert status == 0
     rows = [line.split() for line in out[:-1]]
     assert rows[0] == ["core", "target", "result", "seconds", "log"]
-    # In the order in which they are asked for, whichever was done first.
+    # In the order of the request, regardless of which was done first.
     expected = [("one", "good"), ("one", "old-ghdl"), ("two", "good"), ("two", "old-ghdl")]
     for row, (core, folder) in zip(rows[1:], expected, strict=True):
         target = folder.partition("-")[0]
@@ -147,7 +147,7 @@ def test_every_target_of_every_core_has_its_place(project: Path) -> None:
         assert f"INFO: Generating me:project:{core}-good:1.0" in (project / log).read_text().splitlines()
         assert (place(project, core, folder) / f"me_project_{core}_1.0.eda.yml").is_file()
     assert re.fullmatch(r"4 builds in \d+\.\d s", out[-1])
-    # The one that FuseSoC's configuration names would be that of all.
+    # A work root in FuseSoC's configuration would be shared by all builds.
     assert not (project / "nowhere").exists()
     assert not list((project / "build").rglob("*.lock*"))
 
@@ -184,7 +184,7 @@ def test_programs_are_started_by_firm_tool_unless_the_user_says_otherwise(projec
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All that FuseSoC and generators wrote, but for GHDL's library, which holds dates, and what names the run."""
+    """All files of FuseSoC and generators, except GHDL's library, which has dates, and files that name the run."""
     files = (path for path in folder.rglob("*") if path.is_file() and path.suffix not in (".cf", ".o", ".run"))
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
@@ -205,7 +205,7 @@ def test_eight_runs_of_one_target_at_once(project: Path, tmp_path: Path) -> None
 
 
 def processes(project: Path) -> list[int]:
-    """Those of the instances that stay."""
+    """The process ids of the instances that keep running."""
     path = project / "processes"
     return [int(word) for word in path.read_text().split()] if path.is_file() else []
 
@@ -219,7 +219,7 @@ def is_running(process: int) -> bool:
 
 @pytest.fixture
 def staying(project: Path) -> subprocess.Popen[str]:
-    """Two builds that do not end by themselves, under way."""
+    """Two builds in progress that do not end by themselves."""
     running = start(project, "one", "two", "--target", "long", "--setup", "--jobs", "2")
     wait_until(lambda: len(processes(project)) == 4)
     assert all(map(is_running, processes(project)))
@@ -238,7 +238,7 @@ def test_killed_it_leaves_nothing_behind_that_hinders(project: Path, staying: su
     staying.kill()
     staying.communicate()
     wait_until(lambda: not any(map(is_running, processes(project))))
-    # The same place; its lock is of a process that is no more.
+    # The same place, with the lock of a process that has ended.
     (lock,) = (project / "build" / "me_project_one_1.0").glob("*.lock")
     core = project / "one.core"
     core.write_text(core.read_text().replace("act: stay", "act: nothing"))
@@ -248,7 +248,7 @@ def test_killed_it_leaves_nothing_behind_that_hinders(project: Path, staying: su
 
 @pytest.fixture
 def calls(tmp_path: Path) -> Path:
-    """A folder with a `python3` that notes in `calls` which script it is started with."""
+    """A folder with a `python3` that records in `calls` the script with which it is started."""
     folder = tmp_path / "bin"
     folder.mkdir()
     python = folder / "python3"
@@ -268,11 +268,11 @@ def test_what_the_store_has_is_answered_in_the_process_of_fusesoc(project: Path,
         assert [line.rpartition(" in ")[0] for line in lines] == [
             f"firm: one-{name} {made}" for name in ("pose", "twist")
         ]
-        # The actor is none of ours.
+        # The actor is not one of our generators.
         expected = ["actor.py"] + ["firm_generator.py"] * (2 if made == "generated" else 0)
         assert sorted(calls.read_text().split()) == expected
         calls.write_text("")
-    # Another Python is asked to answer.
+    # Another Python is to answer.
     assert build(project, *arguments, PATH=path, FUSESOC_FIRM_PYTHON=str(calls.parent / "python3"))[0] == 0
     assert calls.read_text().split().count("firm_generator.py") >= 2
     assert hasattr(edalizer, "Launcher") and hasattr(edalizer, "Core2Parser")

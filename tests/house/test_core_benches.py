@@ -1,4 +1,4 @@
-"""A reusable core has a target for each of its test benches, and all of them pass as FuseSoC runs them."""
+"""Each reusable core has a target for each of its test benches, and all of them pass in FuseSoC."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_no_bench_is_without_a_core() -> None:
 def test_all_of_them_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "fusesoc.conf").write_text(f"[library.cores]\nlocation = {CORES}\n")
     monkeypatch.chdir(tmp_path)
-    # What a launcher does is tested elsewhere.
+    # The launcher is tested elsewhere.
     monkeypatch.setenv("EDALIZE_LAUNCHER", "")
     wanted = [(core, name) for core, targets in benches().items() for name in targets if name.startswith("sim")]
     plan = make_plan([core for core, name in wanted if name == "sim"], ["sim"])

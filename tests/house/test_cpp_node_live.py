@@ -1,4 +1,4 @@
-"""The node's engine in C++ and the simulator of a system, as `firm simulator` builds it."""
+"""The node's C++ engine with the simulator of a system, as built by `firm simulator`."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def quaternions(count: int) -> list[bytes]:
 
 
 def test_a_node_gets_the_simulator_s_answers(driver: Driver, built: BuiltSimulator) -> None:
-    """In lock-step by Python and as they come by the node, with stalls: the same bytes."""
+    """The same bytes in lock-step with Python and asynchronously with the node, with stalls."""
     payloads = quaternions(20)
     outcome = run(
         driver,
@@ -70,12 +70,12 @@ def test_a_payload_that_is_too_short_is_an_error_and_the_rest_goes_on(driver: Dr
 def test_a_simulator_that_is_killed_ends_the_node_or_is_started_again(
     driver: Driver, built: BuiltSimulator, tmp_path: Path
 ) -> None:
-    """When it has reported some frames and has others, as two are on their way all the time. The next one lives."""
+    """The simulator is killed after some reports, while other frames are in flight. The next one survives."""
     paths = (built.script(), tmp_path / "mark", tmp_path / "reports")
     script, mark, reports = (shlex.quote(str(path)) for path in paths)
     command = (
         f"if test -e {mark}; then exec {script}; fi; touch {mark}; rm -f {reports}; mkfifo {reports}; exec 2>/dev/null;"
-        # Byte by byte, since the node asks for no more before it has what was reported.
+        # Byte by byte, since the node sends more only after it has read the reports.
         f" {script} 4>{reports} & child=$!; {{ dd bs=1 count=600; kill -9 $child; cat; }} <{reports} 3<&- >&4 4>&- &"
         " wait $child; status=$?; wait; exit $status"
     )

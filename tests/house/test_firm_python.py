@@ -1,4 +1,4 @@
-"""The generators find a Python that has the package, whatever `python3` FuseSoC starts them with."""
+"""The generators find a Python with the package, whatever `python3` FuseSoC uses to start them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import pytest
 from fusesoc_firm import __version__
 
 GENERATORS = Path(__file__).resolve().parents[2] / "generators"
-# Stands in for the package: it says who answers, and with what.
+# Replaces the package: prints which Python answers, and the arguments.
 ANSWER = "import sys\ndef main(command, argv):\n    print(command, *argv, 'in', sys.prefix)\n    return 3\n"
 
 
 def make_environment(folder: Path, *, has_package: bool) -> Path:
-    """A virtual environment; its Python."""
+    """Create a virtual environment, and return its Python."""
     venv.create(folder, symlinks=True)
     site_packages = folder / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
     if has_package:
@@ -33,7 +33,7 @@ def make_environment(folder: Path, *, has_package: bool) -> Path:
 
 @pytest.fixture
 def bare(tmp_path: Path) -> Path:
-    """The `python3` of somebody who activated nothing."""
+    """The `python3` of a user who has not activated an environment."""
     return make_environment(tmp_path / "bare", has_package=False)
 
 
@@ -44,13 +44,13 @@ def owner(tmp_path: Path) -> Path:
 
 
 def put_generators(folder: Path) -> Path:
-    """Copy the commands into `folder`; the one of `far`."""
+    """Copy the generator scripts to `folder`; return that of `far`."""
     shutil.copytree(GENERATORS, folder, ignore=shutil.ignore_patterns("__pycache__"))
     return folder / "far_generator.py"
 
 
 def call(*command: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a command from a shell, with nothing around it that could lead to the package."""
+    """Run a command like a shell, without variables that could lead to the package."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "FUSESOC", "VIRTUAL_"))}
     return subprocess.run(
         ["sh", "-c", '"$@"; exit $?', "sh", *map(str, command)],
@@ -62,7 +62,7 @@ def call(*command: str | Path, **environment: str) -> subprocess.CompletedProces
 
 
 def answer(environment: Path) -> tuple[str, int]:
-    """What the stand-in prints and exits with, run by the Python of an environment."""
+    """The output and exit status of the replacement package in an environment's Python."""
     return f"far input.yml in {environment.parents[1]}\n", 3
 
 
@@ -87,7 +87,7 @@ def test_the_environment_of_the_checkout(tmp_path: Path, bare: Path) -> None:
     assert (done.stdout, done.returncode) == answer(python)
 
 
-# As FuseSoC does: start a generator as a child and hand its exit status on.
+# Like FuseSoC: starts a generator as a child and exits with its status.
 PARENT = "import subprocess, sys\nsys.exit(subprocess.run(sys.argv[1:]).returncode)\n"
 
 
@@ -154,7 +154,7 @@ MAKEFILE = "python := $(shell python3 {})\nall:\n\t@echo found: $(python)\n"
 def test_a_makefile_finds_the_python_of_the_fusesoc_that_started_make(
     tmp_path: Path, bare: Path, owner: Path, shell: str
 ) -> None:
-    """Bash takes the place of a single command, Debian's sh may stay above it."""
+    """Bash replaces itself by a single command; Debian's sh may remain above it."""
     (tmp_path / "fusesoc").write_text(PARENT)
     generator = put_generators(tmp_path / "generators")
     command = f"{generator.with_name('firm_python.py')} || true"

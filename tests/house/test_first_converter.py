@@ -1,4 +1,4 @@
-"""docs/tutorials/first-converter.md, followed to the letter in a workspace of the shape that it describes."""
+"""docs/tutorials/first-converter.md, followed to the letter in a workspace like the one it describes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ needs_tools = pytest.mark.skipif(
     not all(map(shutil.which, ("ghdl", "verilator"))), reason="GHDL or Verilator is not installed"
 )
 
-# A library in SERV's shape that is none of SERV.
+# A library with the structure of SERV, without its content.
 LIBRARY = {
     "serv.core": """\
 CAPI=2:
@@ -69,18 +69,18 @@ def workspace(tmp_path: Path) -> Path:
 
 
 def blocks(page: str) -> Iterator[tuple[str, str]]:
-    """Each indented block with the sentence before it, the indentation taken off."""
+    """Yield each indented block without its indentation, after the sentence before it."""
     for found in re.finditer(r"([^\n]+)\n\n((?:    [^\n]*\n|\n(?=    ))+)", page):
         yield found[1], re.sub(r"^    ", "", found[2], flags=re.MULTILINE).rstrip("\n") + "\n"
 
 
 def follow(page: str, workspace: Path) -> dict[str, subprocess.CompletedProcess[str]]:
-    """Write its files and run its commands, in its order; what each command came to."""
+    """Write the page's files and run its commands in order; return the result of each command."""
     done = {}
     for sentence, block in blocks(page):
         if name := re.search(r"Write `([^`]+)`:$", sentence):
             path = workspace / name[1]
-            # As its reader would, for whom only the library is there.
+            # The reader can rely only on the library's folders.
             assert path.parent.is_dir() or path.parent.parent.is_dir()
             path.parent.mkdir(exist_ok=True)
             path.write_text(block)
@@ -99,7 +99,7 @@ def run(command: str, workspace: Path) -> subprocess.CompletedProcess[str]:
         "PYTHONPATH": str(REPOSITORY),
         "FUSESOC_FIRM_CACHE": str(workspace.parent / "store"),
         "XDG_CACHE_HOME": str(workspace.parent / "cache"),
-        # Nobody answers there.
+        # There is no server.
         "http_proxy": "http://127.0.0.1:9",
         "https_proxy": "http://127.0.0.1:9",
     }

@@ -1,6 +1,6 @@
-"""A project whose every text is hostile: all that is made of it is read by its target's own tool, and runs nothing.
+"""A project in which every text is hostile: each target's own tool reads its output, and nothing is executed.
 
-What no tool could be given safely, such as a part's name with brackets, is refused where it was written.
+Text that no tool could receive safely, such as a part's name with brackets, is rejected at its place.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from fusesoc_firm.system.boards.board import read_board
 from fusesoc_firm.text.diagnostics import InputError
 
 CANARY = "hostile_canary"
-# Printable, so legal; each means something to one language or another.
+# Printable, therefore legal; each has a special meaning in some language.
 HOSTILE = (
     f"[exec touch {CANARY}]",
     f"$(touch {CANARY}) `touch {CANARY}`",
@@ -80,7 +80,7 @@ def sides(message: str, ros: str = "ROS") -> dict[str, list[dict[str, str]]]:
 
 
 def chain(names: Sequence[str], message: str, type_: str = "", ros: str = "ROS", **keys: str) -> list[dict[str, Any]]:
-    """A subscriber, a block of `type_` if there is one, and a publisher."""
+    """A subscriber, a block of `type_` if given, and a publisher."""
     ends = {"middleware": ros, "message": message}
     blocks: list[dict[str, Any]] = [{"name": names[0], "mode": "subscriber", **ends}]
     if type_:
@@ -93,14 +93,14 @@ def chain(names: Sequence[str], message: str, type_: str = "", ros: str = "ROS",
 
 @dataclass(frozen=True)
 class Project:
-    """The folder, and the specifications in it."""
+    """The folder, and its specifications."""
 
     folder: Path
     ros_1: Path
     ros_2: Path
 
     def generated(self, generator: str = "far", **parameters: Any) -> dict[str, bytes]:
-        """The files of a generator call, with the parameters that are given in place of defaults."""
+        """The files of a generator call; the given parameters replace defaults."""
         names = ("spec", "product", "board", "paths", "distro", "stimuli", "model", "environment", "files", "messages")
         defaults = dict.fromkeys(names) | {"product": "system", "simulator": "ghdl", "seed": 1, "stall_percent": 0}
         given = {**defaults, "paths": ["odd_msgs_1" if parameters["spec"] == self.ros_1.name else "odd_msgs_2"]}
@@ -194,7 +194,7 @@ def output(*arguments: str | Path) -> str:
 
 
 def test_vhdl(project: Project, tmp_path: Path) -> None:
-    """Systems, constants, a live test bench and its kernels, and a first version of an accelerator, by GHDL."""
+    """Systems, constants, a live test bench and its kernels, and an accelerator's skeleton, in GHDL."""
     found = []
     for path in (project.ros_1, project.ros_2):
         for product in ("system", "live"):
@@ -205,7 +205,7 @@ def test_vhdl(project: Project, tmp_path: Path) -> None:
             ]
     for path in found:
         assert path.read_bytes().isascii(), path
-    # It parses each file, and says what is wrong without a status.
+    # This parses each file, and reports faults without an exit status.
     done = subprocess.run(["ghdl", "-f", "--std=93", *found], capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (0, "") and "entity robot_sign_system" in done.stdout
     (constants,) = tmp_path.glob("second/system/odd_msgs_odd_pkg.vhd")
@@ -229,7 +229,7 @@ interp eval box [read stdin]
 
 
 def tcl_calls(script: bytes, folder: Path) -> list[str]:
-    """The commands that a script calls, with what they get."""
+    """The commands that a script calls, with their arguments."""
     (folder / "sandbox.tcl").write_text(SANDBOX, encoding="ascii")
     done = subprocess.run(
         ["tclsh", "sandbox.tcl"], cwd=folder, input=script, capture_output=True, check=False, timeout=60
@@ -245,7 +245,7 @@ def tcl_calls(script: bytes, folder: Path) -> list[str]:
 
 @pytest.mark.skipif(not shutil.which("tclsh"), reason="tclsh is not installed")
 def test_tcl(project: Project, tmp_path: Path) -> None:
-    """The block design and constraints of Vivado, the script of Vitis HLS, and the constraints of Quartus."""
+    """The block design and constraints for Vivado, the script for Vitis HLS, and the constraints for Quartus."""
     files = project.generated(spec=project.ros_1.name, board="vivado.yaml")
     scripts = {name: data for name, data in files.items() if name.endswith((".tcl", ".xdc"))}
     assert {name.rpartition(".")[2] for name in scripts} == {"tcl", "xdc"} and len(scripts) == 3
@@ -258,7 +258,7 @@ def test_tcl(project: Project, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not shutil.which("tclsh"), reason="tclsh is not installed")
 def test_constraints_of_quartus(project: Project, tmp_path: Path) -> None:
-    # No accelerator in C++ there.
+    # This system has no accelerators in C++.
     files = project.generated(spec=project.ros_2.name, board="quartus.yaml")
     (script,) = (data for name, data in files.items() if name.endswith(".sdc"))
     assert [call.split()[0] for call in tcl_calls(script, tmp_path)] == [
@@ -270,7 +270,7 @@ def test_constraints_of_quartus(project: Project, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("flow", "mark"), [("trellis", "#"), ("icestorm", "#"), ("apicula", "//")])
 def test_constraints_of_pins(project: Project, flow: str, mark: str) -> None:
-    """None of these formats has a tool to read it alone: a line of comment, and no word that was not a board's word."""
+    """These formats have no stand-alone reader: check comment lines, and allow only words of the board file."""
     pins = [
         {"port": port, "site": site} for port, site in (("clk", "A1"), ("uart_rxd", "IOB 2/3"), ("uart_txd", "10,11"))
     ]
@@ -285,7 +285,7 @@ def test_constraints_of_pins(project: Project, flow: str, mark: str) -> None:
 
 @pytest.mark.parametrize("which", ["ros_1", "ros_2"])
 def test_cpp(project: Project, tmp_path: Path, which: str) -> None:
-    """The node's table, compiled with stand-ins for its headers that print it."""
+    """The node's table, compiled with replacement headers that print it."""
     path = getattr(project, which)
     files = {n: d for n, d in project.generated(spec=path.name).items() if n.startswith("node/")}
     node = write(tmp_path, files) / "node"
@@ -297,7 +297,7 @@ def test_cpp(project: Project, tmp_path: Path, which: str) -> None:
     (stand_in / "ros_node.hpp").write_text(STAND_IN, encoding="ascii")
     run(["g++", "-std=c++17", "-Wall", "-Werror", f"-I{stand_in.parent}", "-o", "table", source], tmp_path)
     shown = run([tmp_path / "table"], tmp_path)
-    # Only ROS 1 is told definitions.
+    # Only ROS 1 requires definitions.
     told = [text.replace("=", " = ") for text in (*ODD_1.split("\n")[:2], ODD_1.split("\n")[2].replace("\f ", ""))]
     assert [text in re.sub(" +", " ", shown) for text in told] == [which == "ros_1"] * 3
     ET.fromstring((node / "package.xml").read_text(encoding="utf-8"))
@@ -329,14 +329,14 @@ int run(const System& system, int, char**) {
 
 
 def test_python(project: Project, tmp_path: Path) -> None:
-    """The node's table and the first versions of software, whose defaults are those of the message."""
+    """The node's table and the skeletons of software, whose defaults are those of the message."""
     for path, number in ((project.ros_1, 1), (project.ros_2, 2)):
         folder = tmp_path / f"node_{number}"
         options = ("--language", "python", "--path", project.folder / f"odd_msgs_{number}", "-o", folder)
         assert main([*map(str, ("system", "node", path, *options))]) == 0
         (node,) = folder.glob("*.py")
         tree = ast.parse(node.read_text(encoding="utf-8"))
-        # Nothing but the table, and its use.
+        # Only the table and its use are allowed.
         kinds = {type(statement).__name__ for statement in tree.body}
         assert kinds <= {"Expr", "ImportFrom", "Assign", "If"} and "Import" not in kinds
         constants = {value.value for value in ast.walk(tree) if isinstance(value, ast.Constant)}
@@ -353,7 +353,7 @@ def test_python(project: Project, tmp_path: Path) -> None:
 
 
 def test_yaml(project: Project, tmp_path: Path) -> None:
-    """A core that is written for a specification, and what FuseSoC is told of generated ones."""
+    """A core written for a specification, and the YAML of generated cores for FuseSoC."""
     core = tmp_path / "robot.core"
     described = ("--description", DESCRIPTION, "--depend", "me:x:[a, b]", "--stimuli", "a: b # c.yaml")
     paths = ("--path", project.folder / "odd_msgs_1", "--environment", "in #1, [2].vhd")
@@ -365,7 +365,7 @@ def test_yaml(project: Project, tmp_path: Path) -> None:
         parameters = content["generate"]["simulation"]["parameters"]
         assert parameters["stimuli"] == "a: b # c.yaml" and parameters["environment"] == ["in #1, [2].vhd"]
         assert Path(parameters["spec"]).name == project.ros_1.name
-        # Its targets are written anew.
+        # This rewrites its targets.
         output("system", "core", project.ros_1, *paths[:2], "-o", core)
     shown = yaml.safe_load(output("system", "show", project.ros_1, *paths[:2]))
     assert shown["System"]["fpgaPart"] == HOSTILE[0]
@@ -373,7 +373,7 @@ def test_yaml(project: Project, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not shutil.which("dot"), reason="no dot; make test installs Graphviz")
 def test_pictures(project: Project) -> None:
-    """Each block has its name as it was written, and connections lead to it."""
+    """Each block has its unchanged name, and connections lead to it."""
     svg = ET.fromstring(output("system", "diagram", project.ros_1, "--path", project.folder / "odd_msgs_1"))
     shown = {(item.text or "").replace("\xa0", " ") for item in svg.iter("{http://www.w3.org/2000/svg}text")}
     blocks = [block["name"] for block in yaml.safe_load(project.ros_1.read_text(encoding="utf-8"))["blocks"]]
@@ -455,7 +455,7 @@ def test_a_source_that_tools_do_not_take(tmp_path: Path, capsys: pytest.CaptureF
     path.write_text(yaml.safe_dump(content, allow_unicode=True, sort_keys=False), encoding="utf-8")
     shown = faults(capsys, "system", "skeleton", path)
     assert "error: 'sources' cannot be '" in shown and "legal are letters, digits, '_', '.', '+' and '-'" in shown
-    # The good one is not named.
+    # The valid one is not named.
     assert shown.count("error:") == 1
 
 
@@ -504,7 +504,7 @@ def test_a_file_name_that_no_file_system_takes() -> None:
 
 
 def test_a_simulator_is_built_in_a_folder_that_tools_take(tmp_path: Path) -> None:
-    """The folder is called after the specification's file, which may be called anything."""
+    """The folder is named after the specification's file, which may have any name."""
     folder = _build_folder(tmp_path / f"-{HOSTILE[0]} für {'x' * 200}.yaml", "ghdl", tmp_path)
     assert re.fullmatch(r"_exec_touch_hostile_canary__f_r_x+-[0-9a-f]{12}-ghdl", folder.name) and len(folder.name) < 100
     assert folder.is_dir()

@@ -1,6 +1,6 @@
-"""Input that is huge, endless or nonsense: one sentence at its place, soon, and never a traceback.
+"""Input that is huge, endless or nonsensical: one message at its place, soon, and never a traceback.
 
-What must not take long runs in a child of limited processor time, since a fault of this kind never ends by itself.
+Each test that must end soon runs in a child with limited processor time, since such a fault would never end by itself.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.yaml_text import yaml_data
 
-# Seconds of the processor that a child has; each takes one or two. One that waits for ever is ended, too.
+# The limit of a child's processor time in seconds; each takes one or two. A child that waits forever is ended, too.
 _TIME = 20
 
 
 def limited(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Python, of limited processor time."""
+    """Run Python with limited processor time."""
     return subprocess.run(
         [sys.executable, *arguments],
         capture_output=True,
@@ -51,7 +51,7 @@ def limited(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def write_chain(folder: Path, levels: int, text: str, leaf: str) -> None:
-    """The messages `L0` to `L<levels - 1>`; X in `text` is the message of the level below."""
+    """Write the messages `L0` to `L<levels - 1>`; X in `text` is the message of the level below."""
     folder.mkdir(parents=True)
     for level in range(levels):
         lines = text.replace("X", f"L{level - 1}") if level else leaf
@@ -88,7 +88,7 @@ for ros in (ROS1, ROS2):
 
 def test_messages_of_60_levels_are_generated(tmp_path: Path) -> None:
     for name, text in DEEP.items():
-        # Where all is bounded, so is the whole, and its greatest length is known.
+        # If all parts are bounded, so is the whole, and its maximum length is known.
         bound = "<=9" if name == "bounded" else ""
         write_chain(tmp_path / name, 60, text, f"uint8 a\nstring{bound} s\nfloat64 d\n")
     done = limited("-c", _GENERATE, str(tmp_path), *(f"{name}/L59" for name in DEEP))
@@ -169,7 +169,7 @@ def test_what_is_no_file_is_not_read(make: Callable[[Path], None], reason: str, 
     folder = tmp_path / "odd"
     folder.mkdir()
     make(folder / "A.msg")
-    # A manifest of this kind names no package.
+    # A manifest of this kind does not name the package.
     make(folder / "package.xml")
     done = limited("-m", "fusesoc_firm.cli", "message", "show", "odd/A", "--path", str(tmp_path))
     assert (done.returncode, done.stderr) == (1, f"{folder}/A.msg:1:1: error: cannot read {folder}/A.msg: {reason}\n")
@@ -204,7 +204,7 @@ blocks:
 
 
 def shown(text: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """What `firm system show` has to say of a wrong specification."""
+    """The output of `firm system show` for a faulty specification."""
     (folder / "a.vhd").write_text("entity\n", encoding="utf-8")
     (folder / "spec.yaml").write_text(text, encoding="utf-8")
     assert main(["system", "show", str(folder / "spec.yaml")]) == 1
@@ -271,13 +271,13 @@ def test_400_accelerators_are_shown(tmp_path: Path) -> None:
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = limited("-m", "fusesoc_firm.cli", "system", "show", str(tmp_path / "spec.yaml"))
     assert (done.returncode, done.stdout.count("entity: ")) == (0, count)
-    # It takes 2 s; where every accelerator asked for all names of the top level it took 12 and more.
+    # It takes 2 s; it took 12 s and more when every accelerator requested all names of the top level.
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < 8
 
 
 # --- nonsense ------------------------------------------------------------------------------------------------------
 
-# What readers may trip over, among letters that mean something to them.
+# Words and letters that are special to the readers.
 _WORDS = st.sampled_from(
     [
         *"project blocks name messages cores : - { } [ ] &a *a !!int !!binary 2001-99-99 1:59:59 0x ' # | >".split(),

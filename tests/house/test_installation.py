@@ -1,4 +1,4 @@
-"""Another project adds the library and calls the generators, from a wheel and from a checkout, nothing activated."""
+"""Another project adds the library and calls the generators, from a wheel and a checkout, with nothing activated."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fusesoc_firm import __version__
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOT = Path(__file__).parent / "data" / "robot"
-# One worker does them all, so that each kind is installed once.
+# One worker runs them all, so that each kind is installed once.
 pytestmark = [pytest.mark.check, pytest.mark.xdist_group("installation")]
 
 
@@ -44,7 +44,7 @@ targets:
     flow: generic
     flow_options: {{tool: ghdl}}
 """
-# A core as a build leaves it behind.
+# A core as left behind by a build.
 LEFT_BEHIND = "CAPI=2:\nname: robot:sys:left-behind:0\ntargets: {default: {}}\n"
 
 
@@ -69,7 +69,7 @@ class Installation:
 
     def _run(self, *command: str | Path, cwd: Path, check: bool = True) -> subprocess.CompletedProcess[str]:
         home = self.environment.parent / "home"
-        # Nothing is activated: `python3` is the system's, and knows no package of ours.
+        # Nothing is activated: `python3` is the system's, without our package.
         environment = {"PATH": "/usr/bin:/bin", "HOME": str(home), "LANG": "C.UTF-8"}
         return subprocess.run(command, cwd=cwd, env=environment, text=True, capture_output=True, check=check)
 
@@ -77,7 +77,7 @@ class Installation:
 def copy_source(destination: Path) -> None:
     ignored = shutil.ignore_patterns(".git", ".venv", "*.egg-info", "__pycache__", ".*_cache", ".hypothesis")
     shutil.copytree(ROOT, destination, symlinks=True, ignore=ignored)
-    # A checkout in which somebody works: builds, and an environment, that hold cores.
+    # A checkout in use, with builds and an environment that contain cores.
     for folder in ("build/robot_sys_x_0/sim/generator_cache/y", "build/lib/fusesoc_firm"):
         (destination / folder).mkdir(parents=True)
         (destination / folder / "left-behind.core").write_text(LEFT_BEHIND)
@@ -91,7 +91,7 @@ def pip(*arguments: str | Path) -> None:
 
 
 def lend_packages(environment: Path) -> None:
-    """Let an environment import what the tests' one has, so that nothing is downloaded."""
+    """Let an environment import the packages of the tests' environment, so that nothing is downloaded."""
     (site_packages,) = environment.glob("lib/python3*/site-packages")
     (site_packages / "lent.pth").write_text(sysconfig.get_path("purelib") + "\n")
     script = environment / "bin" / "fusesoc"
@@ -126,7 +126,7 @@ def installation(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
 
 @pytest.fixture
 def project(installation: Installation, tmp_path: Path) -> Path:
-    """Another project, which has added the library as docs/how-to/add-the-library.md says."""
+    """Another project, which has added the library as in docs/how-to/add-the-library.md."""
     (tmp_path / "robot").mkdir()
     (tmp_path / "fusesoc.conf").write_text("")
     for name, location in (("firm", installation.library()), ("own", tmp_path / "robot")):
@@ -154,7 +154,7 @@ def test_the_library_is_installed_whole(installation: Installation) -> None:
 
 
 def test_the_description_names_pages_that_are_installed(installation: Installation) -> None:
-    """Its links work wherever it is shown: there are none but to the web."""
+    """Its links work wherever it is shown: all lead to the web."""
     text = installation.python(
         "-c", "from importlib.metadata import metadata as m; print(m('fusesoc-firm').get_payload())"
     )
@@ -171,7 +171,7 @@ def test_another_project_sees_each_core_once(installation: Installation, project
     assert "left-behind" not in done.stdout
     assert "Replacing" not in done.stderr
     assert "Parse error" not in done.stderr
-    # Of its own cores, and those it may use.
+    # Only its own cores, and those that it may use.
     assert "robot:sys:" not in done.stdout
     shown = installation.fusesoc("gen", "show", "far", cwd=project)
     assert "spec (str): " in shown.stdout
@@ -234,7 +234,7 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
     for name in ("axis_to_geometry_msgs_quaternion.vhd", "geometry_msgs_quaternion_to_axis.vhd"):
         assert files[name]["file_type"] == "vhdlSource-93"
         assert files[name]["core"] == "me:proj:robot-pose:1.0"
-    # A converter brings what it instantiates: no Manager, no schedulers, no links, no launcher.
+    # A converter brings only its own dependencies: no Manager, no schedulers, no links, no launcher.
     assert {file["core"] for file in files.values()} == {
         "me:proj:robot-pose:1.0",
         f"robot:axis:firm_axis:{__version__}",
@@ -244,7 +244,7 @@ def test_another_projects_core_calls_a_generator(installation: Installation, pro
 
 @pytest.mark.skipif(shutil.which("verilator") is None, reason="Verilator is not installed")
 def test_another_projects_core_becomes_a_netlist(installation: Installation, project: Path) -> None:
-    """Edalize finds the tool `ghdlsynth` where this package is installed, and runs it there."""
+    """Edalize finds and runs the tool `ghdlsynth` in the environment of this package."""
     text = PROJECT_CORE.format(ros="ros: 1").replace("flow: generic", "flow: lint")
     text = text.replace("{tool: ghdl}", "{tool: verilator, frontends: [ghdlsynth]}")
     (project / "robot" / "robot.core").write_text(text)
@@ -257,11 +257,11 @@ def test_another_projects_core_becomes_a_netlist(installation: Installation, pro
 def test_another_projects_core_simulates_converters_of_a_message_and_of_a_configuration(
     installation: Installation, project: Path
 ) -> None:
-    """Listing 5.1's road: `robot/grip.yaml` names the interfaces, `robot/loop_tb.vhd` instantiates them."""
+    """The method of listing 5.1: `robot/grip.yaml` names the interfaces, `robot/loop_tb.vhd` instantiates them."""
     shutil.copytree(ROBOT, project / "robot", dirs_exist_ok=True)
     done = installation.fusesoc("run", "me:robots:loop", cwd=project)
     assert done.returncode == 0, done.stdout + done.stderr
-    # The MD5 sum of geometry_msgs/Twist is the one that ROS 1 prints.
+    # The MD5 sum of geometry_msgs/Twist matches ROS 1's.
     assert "PASS 9f195f881246fdfa2798d1d3eebca84a RIHS01_" in done.stdout
     (description,) = project.glob("build/me_robots_loop_1.0/default/*.eda.yml")
     files = [Path(file["name"]).name for file in yaml.safe_load(description.read_text())["files"]]

@@ -1,4 +1,4 @@
-"""docs/reference/licences.md, by `make licences`: what pyproject.toml asks for, and the programs that builds call."""
+"""docs/reference/licences.md, as `make licences` writes it: pyproject.toml's requirements, and programs of builds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PAGE = ROOT / "docs" / "reference" / "licences.md"
 
 
 def rows(section: str) -> list[list[str]]:
-    """The cells of each row of the first table in a section, without the head."""
+    """The cells of each row of the first table in a section, without the header."""
     text = PAGE.read_text(encoding="utf-8").partition(f"\n## {section}\n")[2]
     found = re.search(r"^\|.*\n\| --- .*\n((?:\|.*\n)+)", text, re.MULTILINE)
     assert found, f"no table in {section}"

@@ -1,4 +1,4 @@
-"""A live simulator of a system answers frames as the bench that reads them from files does, byte for byte."""
+"""A live simulator of a system sends the same response bytes as the bench that reads frames from files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fusesoc_firm.tools.simulators import fitting
 from tests.house.test_main_job import ROOT, run
 
 SPECS = ROOT / "specs"
-# The publishers and the width of each: one message; bursts of three types and rates; images.
+# The number of publishers and the width of each: one message; bursts of three types and rates; images.
 SYSTEMS = {"quat2euler": (1, 8), "multi_type": (3, 64), "image_pipeline": (1, 128)}
 STALL_PERCENT = 25  # the default of the bench that reads files
 
@@ -42,7 +42,7 @@ def recorded(request: pytest.FixtureRequest, build_root: Path) -> tuple[str, Pat
 
 
 def frames_of(file: Path) -> list[bytes]:
-    """The frames of a stimulus file, or of what the bench received."""
+    """The frames in a stimulus file, or in a file of received frames."""
     frames: list[bytearray] = []
     for line in file.read_text().splitlines():
         if line.startswith((">", "<")):
@@ -60,7 +60,7 @@ def by_id(frames: Iterable[bytes]) -> dict[int, list[bytes]]:
 
 
 def answers(built: BuiltSimulator, frames: list[bytes], shape: tuple[int, int]) -> tuple[list[bytes], int]:
-    """The frames that a system answers with, in order, and the cycle of the last beat."""
+    """The frames of a system's responses, in order, and the cycle of the last beat."""
     joiner, joined, last = BurstJoiner(*shape), [], 0
     with Simulator(built.command(seed=1, stall_percent=STALL_PERCENT), built.folder) as simulator:
         for frame in frames:
@@ -105,7 +105,7 @@ def test_a_second_build_builds_nothing(build_root: Path) -> None:
 
 
 def copy_of(application: str, folder: Path, *, has_core: bool) -> Path:
-    """A specification in a folder that nobody knows."""
+    """A copy of a specification in a new folder."""
     copy = folder / "some place" / application
     shutil.copytree(SPECS / application, copy)
     if not has_core:
@@ -121,7 +121,7 @@ def test_a_specification_without_a_core(tmp_path: Path) -> None:
     built = build_simulator(spec, build_root=tmp_path / "build", sources=sources)
     frame = quaternion()
     assert len(answers(built, [frame], (1, 8))[0]) == 1
-    # It leaves nothing beside the specification.
+    # It leaves nothing next to the specification.
     assert not [*spec.parent.glob("*.core")]
 
 
@@ -150,7 +150,7 @@ def test_links_and_further_clocks(tmp_path: Path, changes: dict[str, str]) -> No
     spec.write_text(text)
     built = build_simulator(spec, build_root=tmp_path / "build")
     found, _ = answers(built, [quaternion()] * 3, (1, 8))
-    # Roll, pitch and yaw of no rotation.
+    # Roll, pitch and yaw of the identity rotation.
     assert found == [b"\x00\x18\x00\x00\x00" + bytes(24)] * 3
 
 
@@ -199,7 +199,7 @@ def test_the_command_prints_a_program(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main(["simulator", str(spec), *options]) == 0
     printed = capsys.readouterr().out
     assert printed.count("\n") == 1
-    # As a shell and another program take it.
+    # As a shell and another program read it.
     echoed = subprocess.run(["/bin/sh", "-c", f"echo {printed}"], capture_output=True, text=True, check=True)
     assert shlex.split(printed) == [echoed.stdout.rstrip("\n")]
     with Simulator(shlex.split(printed)) as simulator:

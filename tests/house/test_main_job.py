@@ -1,4 +1,4 @@
-"""The main job as a newcomer does it: `fusesoc run --target=sim robot:sys:quat2euler`, and what must hold for it."""
+"""The main job of a new user: `fusesoc run --target=sim robot:sys:quat2euler`, and its guarantees."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fusesoc_firm.tools import manifest
 ROOT = Path(__file__).resolve().parents[2]
 FUSESOC = Path(sys.executable).parent / "fusesoc"
 CORES = ("quat2euler", "quat2euler_hls")
-# Tests of one core share a store and a build folder, so one worker has to do them.
+# Tests of one core share a store and a build folder, so one worker must run them.
 shared = [pytest.param(core, marks=pytest.mark.xdist_group(f"main_job_{core}")) for core in CORES]
 
 
@@ -31,9 +31,9 @@ def run(
     environment: Mapping[str, str] = MappingProxyType({}),
     target: str = "sim",
 ) -> subprocess.CompletedProcess[str]:
-    """FuseSoC in the folder of `project`, with the store beside `build_root`."""
+    """Run FuseSoC in the folder of `project`, with the store next to `build_root`."""
     variables = {
-        # This checkout's package, also where another one is installed.
+        # The package of this checkout, even if another is installed.
         "PYTHONPATH": str(project),
         "PATH": f"{FUSESOC.parent}:/usr/bin:/bin" if is_activated else "/usr/bin:/bin",
         "HOME": str(build_root.parent),
@@ -44,7 +44,7 @@ def run(
     }
     command = ["fusesoc" if is_activated else str(FUSESOC), "run", f"--build-root={build_root}", f"--target={target}"]
     return subprocess.run(
-        # The command is looked up on the PATH of the child, by env.
+        # env looks up the command on the PATH of the child.
         ["/usr/bin/env", *command, f"robot:sys:{core}", *options],
         cwd=project,
         env=variables,
@@ -89,7 +89,7 @@ def build_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def project(tmp_path: Path) -> Path:
-    """A copy of what the main job needs, to change something in it."""
+    """A copy of the files for the main job, which tests may change."""
     return copy_project(tmp_path / "project")
 
 
@@ -164,7 +164,7 @@ def test_a_bad_specification_ends_the_run_with_its_place(project: Path) -> None:
 
 
 def generated_files(build_root: Path) -> dict[str, bytes]:
-    """All that generators wrote, by core and path, but for FuseSoC's calls, which hold paths, and names of runs."""
+    """All generated files by core and path, except FuseSoC's calls, which contain paths, and names of runs."""
     found = {}
     for path in build_root.rglob("generator_cache/*/**/*"):
         if path.is_file() and not path.name.endswith(("_input.yml", ".run")):

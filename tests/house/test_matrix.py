@@ -1,4 +1,4 @@
-"""What `make matrix` does before it needs an index of packages: find Pythons, tell what is missing and what fails."""
+"""`make matrix` before it needs a package index: finds Pythons, and reports missing and failing ones."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from tests import matrix
 
-# Builds the wheel, and then has nothing to install.
+# Builds the wheel, and then finds no packages to install.
 UV = """
 PATH=/bin
 [ "$1" = build ] || { echo "there is no index"; exit 2; }
@@ -21,7 +21,7 @@ touch "$2/firm.whl"
 
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder that is the whole PATH, of a machine without pyenv."""
+    """A folder that is the whole PATH of a machine without pyenv."""
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("PYENV_ROOT", str(tmp_path / "pyenv"))
     return tmp_path
@@ -44,7 +44,7 @@ def test_every_version_that_can_be_installed_is_supported() -> None:
 
 def test_pythons_are_found(machine: Path) -> None:
     on_path = add(machine / "python3.11", "echo 3.11")
-    # As pyenv's shims answer for a version that is not chosen.
+    # The answer of pyenv's shims for a version that is not selected.
     add(machine / "python3.12", "exit 127")
     of_pyenv = add(machine / "pyenv" / "versions" / "3.12.1" / "bin" / "python3.12", "echo 3.12")
     add(machine / "pyenv" / "versions" / "3.11.9" / "bin" / "python3.11", "echo 3.11")

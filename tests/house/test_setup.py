@@ -1,4 +1,4 @@
-"""Set-up installs what is missing, does nothing twice, and says what to do where it may not install."""
+"""Set-up installs missing programs, repeats nothing, and gives instructions if it may not install."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 
 
 class Machine:
-    """A folder of programs, which is all that the set-up finds on PATH."""
+    """A folder of programs, which is the set-up's whole PATH."""
 
     def __init__(self, folder: Path) -> None:
         self.programs = folder / "bin"
@@ -29,13 +29,13 @@ class Machine:
         self.programs.mkdir()
 
     def add(self, name: str, script: str = "") -> None:
-        # Only a new file: nothing is ever written through what lies there.
+        # Only new files: nothing is written through existing ones.
         with (self.programs / name).open("x") as file:
             file.write(f"#!/bin/bash\n{script}\n")
         (self.programs / name).chmod(0o755)
 
     def add_apt(self, *brings: str) -> None:
-        """Add an apt-get that notes how it is called, and whose `install` brings programs."""
+        """Add an apt-get that records its calls, and whose `install` adds programs."""
         copies = [f'[ "$1" = update ] || /bin/cp "$0" {self.programs}/{name}' for name in brings]
         self.add("apt-get", "\n".join([f'echo "$DEBIAN_FRONTEND $*" >> {self.log}', 'echo "apt talks"', *copies]))
 
@@ -52,7 +52,7 @@ class Machine:
 @pytest.fixture
 def machine(tmp_path: Path) -> Machine:
     machine = Machine(tmp_path)
-    # A Python that has what is asked for: the script asks by its exit status.
+    # This Python has all requested packages: the script checks its exit status.
     machine.add("python3", "exit 0")
     return machine
 
@@ -70,7 +70,7 @@ def test_what_is_missing_is_installed(machine: Machine) -> None:
     machine.add("id", "echo 0")
     machine.add_apt("ghdl", "g++")
     done = machine.install()
-    # Only the Python to use goes to stdout; make reads it.
+    # stdout contains only the Python to use, for make.
     assert (done.stdout, done.returncode) == ("python3\n", 0), done.stderr
     assert machine.log.read_text() == (
         "noninteractive update -q\nnoninteractive install -q -y --no-install-recommends ghdl g++\n"
@@ -144,7 +144,7 @@ def test_make_sim_passes_its_variables_on(variables: list[str], arguments: str) 
 
 @pytest.mark.parametrize("status", [0, 1])
 def test_make_sim_prints_the_path_of_its_waves(tmp_path: Path, status: int) -> None:
-    """Of a run that fails, too; programs that do nothing stand in for ours."""
+    """Also of a failed run; programs that do nothing replace ours."""
     shutil.copy(ROOT / "Makefile", tmp_path)
     waves = "build/a_b_c_1/sim/waves.ghw"
     programs = {
@@ -167,7 +167,7 @@ def test_make_sim_prints_the_path_of_its_waves(tmp_path: Path, status: int) -> N
 
 
 def make_corpus(corpus: Path) -> list[str]:
-    """What `make corpus` would do, line by line."""
+    """The commands of `make corpus`, line by line."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     command = ["make", "--dry-run", "corpus", f"CORPUS={corpus}", "VERIFY_OPTIONS=--width 64"]
     return subprocess.run(
@@ -191,7 +191,7 @@ def test_make_corpus_without_a_corpus_is_one_line(tmp_path: Path) -> None:
 
 
 class Checkout:
-    """This checkout with an environment in which pip and FuseSoC only note how they are called."""
+    """This checkout with an environment in which pip and FuseSoC only record their calls."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -221,7 +221,7 @@ class Checkout:
         )
 
     def calls(self, program: str) -> list[str]:
-        """How a program was called."""
+        """The recorded calls of a program."""
         noted = self.folder / program
         return noted.read_text().splitlines() if noted.exists() else []
 
@@ -276,7 +276,7 @@ def test_each_family_of_boards_has_an_extra_that_can_be_installed() -> None:
     assert {board["flow"] for board in boards} - {"quartus", "vivado"} == programs.keys()
     for flow, program in programs.items():
         assert extras[flow] == {PROGRAMS[program].pypi}
-    # nextpnr for Gowin asks for a certain version of it; a bound of ours can only contradict.
+    # nextpnr for Gowin requires a certain version of it; a limit of ours could only conflict.
     assert not any("apycula" in name.lower() for names in extras.values() for name in names)
 
 
@@ -288,11 +288,11 @@ def extras_of_project() -> dict[str, list[str]]:
 @pytest.mark.parametrize(
     ("package", "version"),
     [
-        # Their cores have no `get_data`.
+        # Cores in this version have no `get_data`.
         ("fusesoc", "2.4.6"),
-        # Its tool ghdl ends in a NameError.
+        # The tool ghdl of this version ends in a NameError.
         ("edalize", "0.6.5"),
-        # They append what changes to a tool's configuration, so a second build has both.
+        # These versions append changes to a tool's configuration, so a second build has both.
         ("edalize", "0.6.6"),
         ("edalize", "0.6.7"),
     ],

@@ -1,4 +1,4 @@
-"""By its target's name alone a system runs in any simulator, and each receives the same bytes in the same cycles."""
+"""A target's name is enough to run a system in any simulator, and all receive the same bytes in the same cycles."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ pytestmark = pytest.mark.skipif(
 )
 TARGETS = ("sim", "sim_icarus", "sim_verilator")
 PROGRAMS = {"sim": {"ghdl"}, "sim_icarus": {"ghdl", "iverilog", "vvp"}, "sim_verilator": {"ghdl", "verilator", "g++"}}
-# With the messages of each: variable size and bursts, pins with motors, accelerators in Verilog.
+# With their numbers of messages: variable size and bursts, pins with motors, accelerators in Verilog.
 SYSTEMS = {"quat2euler": 100, "image_pipeline": 7, "multi_type": 19, "mobile_robot": 40, "multi_type_verilog": 19}
 
 
 def report(done: subprocess.CompletedProcess[str]) -> list[str]:
-    """The lines of the host, but for how it is started again."""
+    """The host's lines, except the command for starting it again."""
     lines = done.stdout.splitlines()
     start = next(number for number, line in enumerate(lines) if line.startswith("seed "))
     end = next(number for number, line in enumerate(lines) if re.match("PASS|FAIL", line))

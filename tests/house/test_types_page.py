@@ -1,4 +1,4 @@
-"""docs/reference/data-types.md: all features of the dissertation's Table 5.1 with its marks, and tests that exist."""
+"""docs/reference/data-types.md: all features of the dissertation's Table 5.1 with its marks, and existing tests."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reference" / "data-types.md"
 
-# Number, ROS 1, ROS 2 and FIRM as the dissertation's Table 5.1 has them.
+# Number, ROS 1, ROS 2 and FIRM in the dissertation's Table 5.1.
 TABLE_5_1 = """
     1 ✓ ✓ ✓|2 ✓ ✓ ✓|3 ✓ ✓ ✓|4 ✓ ✓ ✓|5 ✗ ✗ ✓|6 ✓ ✓ ✓|7 ✓ ✓ ✓|8 ✓ ✓ ✓|9 ✗ ✗ +|10 ✓ ✓ ✓|11 ✗ ✗ +|12 ✗ ✗ +|13 ✗ ✓ ✓
     |14 ✗ ✗ +|15 ✓ ✓ ✓|16 ✗ ✗ ✗|17 ✓ ✓ ✓|18 ✗ ✗ +|19 ✗ ✗ +

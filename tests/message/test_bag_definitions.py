@@ -1,4 +1,4 @@
-"""Messages that only a bag defines: by `--path`, by a generator's `paths`, and what of the bag counts for the store."""
+"""Messages that only a bag defines: found by `--path` and a generator's `paths`, and their part in the store's key."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def version(kind: str) -> Middleware:
 def record(
     folder: Path, kind: str, texts: dict[str, str], *, name: str = "drive", count: int = 1, size: int = 9
 ) -> Path:
-    """A bag with a topic for each type, of the same type after a blank, with payloads that are none."""
+    """Write a bag with a topic for each type and invalid payloads; a blank at the end makes a type distinct."""
     path = folder / (f"{name}.bag" if kind == "ros1" else name)
     shutil.rmtree(path, ignore_errors=True)
     path.unlink(missing_ok=True)
@@ -69,7 +69,7 @@ def test_a_bag_defines_what_no_store_has(tmp_path: Path, kind: str) -> None:
     assert library.origin(ODD) == str(bag)
     assert library.get(ODD).fields[0].source.file == f"<{bag}>/odd_msgs/Odd"
     assert library.files([ODD]) == [Part(bag, "odd_msgs/Odd", library.content(ODD))]
-    # It goes before the distribution, and is nothing to the other version of ROS.
+    # The bag precedes the distribution, and does not affect the other version of ROS.
     assert library.origin(parse_name("geometry_msgs/Point")) == str(bag)
     other = ROS2 if ros is ROS1 else ROS1
     assert ODD not in MessageLibrary(other, [bag]).names()
@@ -86,7 +86,7 @@ def test_on_the_command_line(tmp_path: Path, kind: str, capsys: pytest.CaptureFi
 def test_definitions_that_differ_are_refused_when_asked_for(tmp_path: Path, kind: str) -> None:
     texts = {"odd_msgs/msg/Odd": "uint8 a # one\n", "odd_msgs/msg/Odd ": "uint8 a # two\n"}
     library = MessageLibrary(version(kind), [record(tmp_path, kind, texts)])
-    # A comment is no difference. ROS 2 holds one definition of a type anyway.
+    # Comments do not count as a difference. ROS 2 stores only one definition of a type anyway.
     assert [field.name for field in library.get(ODD).fields] == ["a"]
     outer = {
         "odd_msgs/msg/A": f"Odd o\n{LINE}\nMSG: odd_msgs/Odd\nuint8 a\n",
@@ -118,7 +118,7 @@ FIRM = GENERATORS["firm"]
 
 
 class Calls:
-    """Calls of the generator `firm` for a message that a bag beside the core defines."""
+    """Calls of the generator `firm` for a message that a bag next to the core defines."""
 
     def __init__(self, root: Path, kind: str) -> None:
         self.root = root
@@ -142,7 +142,7 @@ def test_the_key_covers_the_definitions_alone(tmp_path: Path, kind: str, monkeyp
     calls = Calls(tmp_path / "project", kind)
     assert not calls.is_stored()
     assert calls.is_stored()
-    # More messages, and others, of the same definitions, those of messages that are not asked for included.
+    # More messages with the same definitions, and definitions of unused messages.
     record(calls.root, kind, {"odd_msgs/msg/Odd": TEXT + POINT, "odd_msgs/msg/Other": "uint8 a\n"}, count=3)
     assert calls.is_stored()
     record(calls.root, kind, {"odd_msgs/msg/Odd": TEXT.replace("uint16[2]", "uint16[3]") + POINT})

@@ -1,4 +1,4 @@
-"""A message and all within it as one text: as bags hold it, judged by rosbags, and back."""
+"""Joint texts of a message and its nested messages, in both directions; rosbags is the reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where definitions come from, in which order, and what a library says about the ones it cannot deliver."""
+"""The sources of definitions, their precedence, and the library's messages about missing or faulty ones."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def field_names(library: MessageLibrary, name: MessageName) -> list[str]:
 
 
 def own_names(library: MessageLibrary) -> list[str]:
-    """The names that come from files."""
+    """The names of messages from files."""
     return [str(name) for name in library.names() if library.files([name])]
 
 
@@ -264,5 +264,5 @@ def test_messages_may_be_called_like_what_msg_has_not(tmp_path: Path, ros: Middl
 def test_the_transforms_of_ros1_are_known_by_both_names(name: str) -> None:
     message = parse_name(name)
     closure = MessageLibrary(ROS1).closure(message)
-    assert signature(message, closure) == "94810edda583a504dfda3829e70d7eec"  # as rosmsg md5 prints it
+    assert signature(message, closure) == "94810edda583a504dfda3829e70d7eec"  # printed by rosmsg md5
     assert [str(field.type) for field in closure[message].fields] == ["geometry_msgs/TransformStamped[]"]

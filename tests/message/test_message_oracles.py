@@ -1,7 +1,7 @@
-"""Our parser against others: rosbags, genmsg (the reference of ROS 1) and rosidl_adapter (that of ROS 2).
+"""Compares our parser with others: rosbags, genmsg (the reference for ROS 1) and rosidl_adapter (for ROS 2).
 
-genmsg and rosidl_adapter are compared where they can be imported; the environment variable CORPUS names a folder with
-`ros1/<package>/msg/*.msg` and `ros2/...` for the comparison of whole corpora.
+The comparisons with genmsg and rosidl_adapter run if these can be imported. For the comparison of whole corpora, the
+environment variable CORPUS names a folder with `ros1/<package>/msg/*.msg` and `ros2/...`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from tests.typestores import typestore
 CORPUS = os.environ.get("CORPUS", "")
 needs_corpus = pytest.mark.skipif(not CORPUS, reason="CORPUS names no folder")
 
-# What is compared: fields (name, type, default) and constants (name, type, value). None is a refused text.
+# The compared content: fields (name, type, default) and constants (name, type, value). None is a rejected text.
 Content = tuple[list[tuple[str, FieldType, DefaultValue | None]], list[tuple[str, str, Scalar]]]
 
 
@@ -63,7 +63,7 @@ def ours(text: str, name: MessageName, ros: Middleware) -> Content | None:
 
 
 def of_rosbags(kind: Any, ros: Middleware) -> FieldType:
-    """A type in rosbags' model, which keeps ROS 1's `time` as a message and 0 for no bound."""
+    """A type in our model from rosbags' model, which treats ROS 1's `time` as a message and 0 as no bound."""
     tag, argument = kind
     if tag == Nodetype.ARRAY:
         return ArrayType(element_of_rosbags(argument[0], ros), argument[1])
@@ -84,7 +84,7 @@ def element_of_rosbags(kind: Any, ros: Middleware) -> ElementType:
 
 def content_of_rosbags(entry: Any, ros: Middleware) -> Content:
     constants, fields = entry
-    # rosbags adds the member that an empty struct has on ROS 2's wire; the definition does not name it.
+    # rosbags adds the member of an empty struct on ROS 2's wire, which is not in the definition.
     named = [(name, kind) for name, kind in fields if name != "structure_needs_at_least_one_member"]
     return [(name, of_rosbags(kind, ros), None) for name, kind in named], list(constants)
 
@@ -108,11 +108,11 @@ def test_every_message_of_a_distribution_keeps_all_that_rosbags_knows(ros: Middl
 
 
 def genmsg_content(text: str, name: MessageName) -> Content | None:
-    """What genmsg reads; it refuses by exceptions of many types."""
+    """The content that genmsg reads, or None; it raises exceptions of many types."""
     loader = pytest.importorskip("genmsg.msg_loader")
     try:
         spec = loader.load_msg_from_string(loader.MsgContext.create_default(), text, str(name))
-    except Exception:  # noqa: BLE001 - whatever it raises is a refusal
+    except Exception:  # noqa: BLE001 - any exception is a rejection
         return None
     fields: Any = [(field.name, of_genmsg(field), None) for field in spec.parsed_fields()]
     return fields, [(constant.name, constant.type, constant.val) for constant in spec.constants]
@@ -128,12 +128,12 @@ def of_genmsg(field: Any) -> FieldType:
 
 
 def rosidl_content(text: str, name: MessageName) -> Content | None:
-    """What rosidl_adapter reads; it refuses by exceptions of many types, and prints."""
+    """The content that rosidl_adapter reads, or None; it prints, and raises exceptions of many types."""
     parser = pytest.importorskip("rosidl_adapter.parser")
     with contextlib.redirect_stderr(io.StringIO()):
         try:
             spec = parser.parse_message_string(name.package, name.name, text)
-        except Exception:  # noqa: BLE001 - whatever it raises is a refusal
+        except Exception:  # noqa: BLE001 - any exception is a rejection
             return None
     fields = [(field.name, of_rosidl(field.type), as_default(field.default_value)) for field in spec.fields]
     return fields, [(constant.name, constant.type, constant.value) for constant in spec.constants]
@@ -147,7 +147,7 @@ def of_rosidl(kind: Any) -> FieldType:
     element: ElementType = PrimitiveType(kind.type)
     if kind.pkg_name:
         element = MessageType(MessageName(kind.pkg_name, kind.type))
-    elif kind.type in ("time", "duration"):  # it parses these for compatibility, but can translate neither
+    elif kind.type in ("time", "duration"):  # it parses these for compatibility, but cannot translate them
         element = MessageType(MessageName("builtin_interfaces", kind.type.capitalize()))
     elif kind.type in ("string", "wstring"):
         element = StringType(kind.type == "wstring", kind.string_upper_bound)
@@ -162,7 +162,7 @@ REFERENCES = [pytest.param(ROS1, genmsg_content, id="genmsg"), pytest.param(ROS2
 
 _TYPES = ["uint8", "int8", "byte", "char", "bool", "float32", "float64", "int64", "uint64", "string", "wstring"]
 _TYPES += ["string<=3", "wstring<=2", "string<=0", "Foo", "pkg/Foo", "a/b/Foo", "time", "duration", "Header", "foo"]
-# What other languages have (`unsupported`): the references may take the words for messages, but no other form.
+# Features of other languages (`unsupported`): the references may read the words as messages, but reject other forms.
 _TYPES += ["any", "map", "optional", "union", "typedef", "int8?", "map<int8,int8>", "@optional"]
 _SIZES = ["", "", "", "", "", "[]", "[3]", "[0]", "[<=2]", "[-1]", "[<=0]", "[2][3]", "[x]", "["]
 _FIELDS = ["x", "x9", "foo_bar", "a__b", "a_", "_a", "1a", "Foo", "a-b", ""]
@@ -176,7 +176,7 @@ _VALUES = _NUMBERS + _STRINGS + _ARRAYS
 
 
 def random_line(chance: random.Random) -> str:
-    """A declaration that is often right, or nearly so."""
+    """A random declaration that is often valid or nearly so."""
     blank = chance.choice([" ", " ", " ", " ", "  ", " \t", "\t", ""])
     rest = chance.choice(_FIELDS)
     if (kind := chance.random()) < 0.4:
@@ -190,20 +190,20 @@ def random_line(chance: random.Random) -> str:
 
 
 def is_wider(line: str, ros: Middleware) -> bool:
-    """Whether we mean to take the line though the reference does not; docs/reference/messages.md has the list."""
+    """Whether we deliberately accept a line that the reference rejects; docs/reference/messages.md lists these."""
     if ros is ROS1:
         return "\t" in line
     return line[0].isspace() or "[ ]" in line
 
 
 def is_narrower(line: str, ros: Middleware) -> bool:
-    """Whether we mean to refuse the line though the reference takes it; docs/reference/messages.md has the list."""
+    """Whether we deliberately reject a line that the reference accepts; docs/reference/messages.md lists these."""
     code = line.partition("#")[0].strip()
     if "float32" in code and "1e39" in code:
         return True
     if ros is ROS2:
         return code.startswith(("time", "duration")) or '["a" "b"]' in code or "[1,]" in code
-    # genmsg takes any Python value for a bool, any text for a constant's name, and 2**64 for a uint64.
+    # genmsg accepts any Python value for a bool, any text as a constant's name, and 2**64 for a uint64.
     declared, is_constant, value = code.partition("=")
     kind, _, name = declared.partition(" ")
     is_odd_constant = (
@@ -222,16 +222,16 @@ def test_random_lines(ros: Middleware, reference: Reference) -> None:
     for _ in range(8000):
         line = random_line(chance)
         mine, theirs = ours(line, name, ros), reference(line, name)
-        if repr(mine) == repr(theirs):  # NaN equals itself only in print
+        if repr(mine) == repr(theirs):  # the text, since NaN is not equal to itself
             taken += mine is not None
         elif theirs is None:
             assert is_wider(line, ros), line
         elif mine is None:
             assert is_narrower(line, ros), line
-        else:  # genmsg takes the type of an indented string constant for a part of its name
+        else:  # genmsg reads the type of an indented string constant as part of its name
             assert ros is ROS1, line
             assert line.lstrip().startswith("string") and line[0].isspace(), line
-    assert taken > 200  # else the lines say nothing
+    assert taken > 200  # with fewer lines, the test would prove little
 
 
 # --- the corpus --------------------------------------------------------------------------------------------------
@@ -249,7 +249,7 @@ def test_corpus_against_the_reference(ros: Middleware, reference: Reference) -> 
     different, taken = [], 0
     for name, text in corpus(ros):
         mine = ours(text, name, ros)
-        # The feedback messages of actions exist in ROS 2, but rosidl_adapter refuses a file of such a name.
+        # ROS 2 has the feedback messages of actions, but rosidl_adapter rejects a file with such a name.
         asked = MessageName(name.package, name.name.removesuffix("_FeedbackMessage"))
         different += [str(name)] if mine != reference(text, asked) else []
         taken += mine is not None
@@ -259,7 +259,7 @@ def test_corpus_against_the_reference(ros: Middleware, reference: Reference) -> 
 
 
 def rosbags_cannot_read(text: str, name: MessageName, ros: Middleware) -> bool:
-    """Known deviations of rosbags' parser, told by how the text looks to ours."""
+    """Whether rosbags' parser is known to fail on a text, judged by our parser's result."""
     mine = ours(text, name, ros)
     if mine is None:
         return True
@@ -267,7 +267,7 @@ def rosbags_cannot_read(text: str, name: MessageName, ros: Middleware) -> bool:
     has_mixed_case = any(constant != constant.upper() for constant, _, _ in mine[1])
     has_strings = any(kind in ("string", "wstring") for _, kind, _ in mine[1])  # quotes, comments, empty ones
     has_wide = any(isinstance(kind, StringType) and kind.is_wide for kind in types)
-    # It takes these for shorthands in both versions, and ROS 1's `time` is its `builtin_interfaces/Time`.
+    # It expands these shorthands in both versions, and treats ROS 1's `time` as its `builtin_interfaces/Time`.
     is_short = re.search(r"^\s*(Header|time|duration)\b" if ros is ROS2 else "builtin_interfaces", text, re.MULTILINE)
     return has_mixed_case or has_strings or has_wide or is_short is not None or "\r" in text
 
@@ -283,7 +283,7 @@ def test_corpus_against_rosbags(ros: Middleware) -> None:
         compared += 1
         mine = ours(text, name, ros)
         assert mine is not None
-        fields = [(field, kind, None) for field, kind, _ in mine[0]]  # it drops default values
+        fields = [(field, kind, None) for field, kind, _ in mine[0]]  # rosbags drops default values
         full_name = f"{name.package}/msg/{name.name}"
         try:
             theirs = content_of_rosbags(get_types_from_msg(text, full_name)[full_name], ros)

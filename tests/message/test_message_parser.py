@@ -1,4 +1,4 @@
-"""Each rule of the `.msg` grammar, in both versions; the expected results are genmsg's and rosidl_adapter's."""
+"""Each rule of the `.msg` grammar, in both versions; the expected results are those of genmsg and rosidl_adapter."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_types_of_both_versions(text: str, expected: FieldType, ros: Middleware)
         ("time", ROS1, primitive("time")),
         ("duration[]", ROS1, SequenceType(primitive("duration"))),
         ("Header", ROS1, message("std_msgs", "Header")),
-        ("Header[]", ROS1, SequenceType(message("my_msgs", "Header"))),  # genmsg expands the bare word only
+        ("Header[]", ROS1, SequenceType(message("my_msgs", "Header"))),  # genmsg expands only the bare word
         ("lower", ROS1, message("my_msgs", "lower")),
         ("uint8[0]", ROS1, ArrayType(primitive("uint8"), 0)),
         ("wstring", ROS1, message("my_msgs", "wstring")),
@@ -186,7 +186,7 @@ def test_faults(line: str, ros: Middleware, fault: str) -> None:
         ("string S=", ROS1, ""),
         ('string S="quoted"', ROS1, '"quoted"'),
         ("string S=plain text # comment", ROS2, "plain text"),
-        ('string S="a # b"', ROS2, '"a'),  # `#` ends it even within quotes, which are then none
+        ('string S="a # b"', ROS2, '"a'),  # `#` begins a comment even within quotes, so the string is not quoted
         ("string S=' a '", ROS2, " a "),
         ('string S="say \\"no\\""', ROS2, 'say "no"'),
         ("string S='it\\'s'", ROS2, "it's"),

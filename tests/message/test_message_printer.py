@@ -1,4 +1,4 @@
-"""The canonical text of a message, and that it reads back as the same message."""
+"""The canonical text of a message, which reads back as the same message."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def parse(text: str, ros: Middleware) -> MessageDefinition:
 
 
 def without_places(definition: MessageDefinition) -> MessageDefinition:
-    """Without sources, and without how a constant is written where that means nothing."""
+    """The definition without sources, and without a constant's spelling if it does not matter."""
     fields = tuple(replace(field, source=NOWHERE) for field in definition.fields)
     constants = tuple(
         replace(c, source=NOWHERE, text=c.text if definition.ros is ROS1 else "") for c in definition.constants
@@ -101,7 +101,7 @@ SIZES = st.integers(1, 2**32 - 1)
 
 
 def texts(dialect: Dialect, largest: int | None) -> st.SearchStrategy[str]:
-    """Strings that the version can write: one line, and in ROS 2 no `#`, with `=` too in no default."""
+    """Strings that the version can express: one line, in ROS 2 without `#`, and in its defaults without `=`."""
     forbidden = "" if dialect.title == ROS1.title else "#="
     characters = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc", "Zl", "Zp"), exclude_characters=forbidden)
     text = st.text(characters, max_size=min(12, largest) if largest else 12)
@@ -141,7 +141,7 @@ def field_types(dialect: Dialect) -> st.SearchStrategy[FieldType]:
 
 
 def is_array_element(value: Scalar) -> bool:
-    """Whether an array can hold it: a string that ends in a backslash must do without quotes there."""
+    """Whether an array can contain the value: within an array, a string that ends in a backslash cannot be quoted."""
     if not isinstance(value, str) or not value.endswith("\\"):
         return True
     return value == value.strip() and value[0] not in "\"'" and "," not in value

@@ -1,4 +1,4 @@
-"""The door for FuseSoC: requests read and checked, cores written whole, once, and the same every time."""
+"""FuseSoC's calls: requests are read and checked, and cores are written whole, once, and identically every time."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ generate:
 
 
 class Echo:
-    """A generator that writes its input into a file, and counts how often it is asked to."""
+    """A generator that writes its input into a file, and counts its calls."""
 
     def __init__(self) -> None:
         self.calls = 0
@@ -203,7 +203,7 @@ def test_a_fault_of_the_input_is_printed_without_traceback(bench: Bench, capsys:
     assert bench.run(spec="nothing.yaml") == 1
     assert capsys.readouterr().err == "error: no file nothing.yaml\n"
     assert not list(bench.work.glob("*.core"))
-    # It is looked at again, not remembered as failed.
+    # The file is checked again; the failure is not cached.
     (bench.project / "nothing.yaml").write_text("now")
     assert bench.run(spec="nothing.yaml") == 0
 

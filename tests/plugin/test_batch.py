@@ -1,4 +1,4 @@
-"""What a batch leaves in the store is what FuseSoC's own calls find there, and depends on no more than theirs."""
+"""A batch stores the same results, with the same dependencies, as FuseSoC's own calls."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fusesoc_firm.plugin.batch import prepare
 from fusesoc_firm.request.request import GeneratorCall
 from tests.hdl.ghdl import REPOSITORY
 
-# Of variable and of fixed size, which use other templates.
+# Messages of variable and of fixed size, which use different templates.
 MESSAGES = ("std_msgs/String", "geometry_msgs/Pose", "sensor_msgs/Image", "std_msgs/Byte")
 
 
@@ -25,12 +25,12 @@ def call(message: str, **parameters: object) -> GeneratorCall:
 
 
 def keys(store: Path) -> list[str]:
-    """Of all that is stored."""
+    """The keys of all entries."""
     return sorted(path.stem for path in store.rglob("*.entry"))
 
 
 def answer(item: GeneratorCall, folder: Path, environment: Mapping[str, str]) -> str:
-    """What FuseSoC's call of the generator prints."""
+    """The output of FuseSoC's call of the generator."""
     folder.mkdir()
     (folder / "call.yml").write_text(yaml.safe_dump({**vars(item), "gapi": "1.0"}))
     command = [sys.executable, str(REPOSITORY / "generators" / "firm_generator.py"), "call.yml"]
@@ -44,7 +44,7 @@ def test_a_batch_does_what_the_calls_would(tmp_path: Path, monkeypatch: pytest.M
     for number, item in enumerate(calls):
         assert "generated" in answer(item, tmp_path / f"alone{number}", environment)
 
-    # One process does them all.
+    # One process handles all calls.
     monkeypatch.setenv("PYTHONPATH", str(REPOSITORY))
     monkeypatch.setenv("FUSESOC_FIRM_CACHE", str(tmp_path / "together"))
     assert len(list(prepare(calls, 1))) == len(calls)

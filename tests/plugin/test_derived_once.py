@@ -33,7 +33,7 @@ CALLS: dict[str, tuple[str, dict[str, object]]] = {
 
 @pytest.fixture
 def counts(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
-    """How often something was done."""
+    """The number of calls of each function."""
     found: Counter[str] = Counter()
 
     def counted(what: str, done: Callable[..., Any], *arguments: Any, **more: Any) -> Any:
@@ -69,7 +69,7 @@ def test_a_call_is_derived_once(
         monkeypatch.setenv("FUSESOC_FIRM_LOCKED", str(Path("a.lock").absolute()))
         counts.clear()
     once = {"libraries": 1} | ({"read_specification": 1, "derive": 1} if command == "far" else {})
-    # Made, then found by its key.
+    # First generated, then found by its key.
     for _ in range(2):
         assert main(command, ["call.yml"]) == 0
         assert counts == once

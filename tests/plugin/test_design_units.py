@@ -1,4 +1,4 @@
-"""Two generated cores of a design define no unit in two ways, as FuseSoC and `firm build` run them."""
+"""Two generated cores of a design never define a unit differently, with FuseSoC and with `firm build`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ BIN = Path(sys.executable).parent
 
 
 class Project:
-    """A design of two cores that generate a message each."""
+    """A design of two cores, each of which generates a converter."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -46,7 +46,7 @@ class Project:
             (self.root / f"{name}.core").write_text(CORE.format(name=name, parameters=parameters))
 
     def set_up(self, *command: str | Path) -> subprocess.CompletedProcess[str]:
-        """Set it up by FuseSoC, or by another command; both streams as one."""
+        """Set up the design with FuseSoC or another command; standard error is merged into the output."""
         fusesoc = shutil.which("fusesoc", path=str(BIN))
         assert fusesoc
         build = str(self.root.parent / "build")
@@ -90,7 +90,7 @@ def project(tmp_path: Path) -> Project:
 )
 def test_a_unit_in_two_ways_is_refused_naming_both_cores(project: Project, right: str, unit: str) -> None:
     project.write("ros: 2", right)
-    # Made, then from the store with everything read, then as it was answered before.
+    # First generated, then from the store by its key, then recalled.
     for _ in range(3):
         said = project.refuse()
         assert "right.core:4:" in said
@@ -112,7 +112,7 @@ def test_what_is_legal_is_accepted_whatever_earlier_runs_left(project: Project) 
     project.accept()
     project.write("ros: 2", "ros: 1, width: 32, name: right")
     project.accept()
-    # The folders of width 8 stay, with the same names of cores and units.
+    # The folders of width 8 remain, with the same names of cores and units.
     project.write("ros: 2, width: 64", "ros: 1, width: 16, name: right")
     project.accept()
     project.write("ros: 2, width: 64, name: right", "ros: 1, width: 16, name: right")

@@ -1,7 +1,7 @@
-"""Generator calls as FuseSoC makes them, each a process: many at once, killed, without room, with a damaged store.
+"""Generator calls as FuseSoC's processes: many at once, killed, without disk space, with a damaged store.
 
-Whatever happens, a call that succeeds has written just what a first, undisturbed call writes; one that does not has
-written no `.core`, without which FuseSoC takes nothing.
+In each case, a successful call has written exactly the files of an undisturbed first call; a failed one has not written
+a `.core`, without which FuseSoC uses nothing.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if os.environ.get("HANG"):
     print("in the middle", flush=True)
     time.sleep(600)
 """
-# Root may read and write whatever the rights of a file say, unless it gives that up.
+# Root may read and write files regardless of their rights, unless it drops this capability.
 UNPRIVILEGED = ["setpriv", "--bounding-set=-dac_override,-dac_read_search,-fowner"] if os.geteuid() == 0 else []
 IS_NAMESPACE_ALLOWED = subprocess.run(["unshare", "-rmpu", "--fork", "true"], check=False).returncode == 0
 needs_namespaces = pytest.mark.skipif(not IS_NAMESPACE_ALLOWED, reason="this user may not make namespaces")
@@ -51,7 +51,7 @@ class Calls:
         return self.folder / "store"
 
     def work(self, name: str) -> Path:
-        """A folder with FuseSoC's call in it."""
+        """Create a folder with FuseSoC's call."""
         work = self.folder / name
         work.mkdir(exist_ok=True)
         files = {"spec": "quat2euler.yaml", "stimuli": "stimuli.yaml", "model": "model.py"}
@@ -75,7 +75,7 @@ class Calls:
         )
 
     def run(self, name: str, *around: str, environment: Mapping[str, str] | None = None) -> tuple[int, str, str]:
-        """Exit status, the word behind the core's name ("generated" or "from") or all of stdout, and stderr."""
+        """Exit status, the word after the core's name ("generated" or "from") or all of stdout, and stderr."""
         process = self.start(name, *around, environment=environment)
         output, errors = process.communicate()
         words = output.split()
@@ -103,7 +103,7 @@ def calls(tmp_path: Path) -> Calls:
 
 @pytest.fixture(scope="module")
 def right(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """What an undisturbed call writes."""
+    """The files of an undisturbed call."""
     calls = _calls(tmp_path_factory.mktemp("undisturbed"))
     assert calls.run("work") == (0, "generated", "")
     return calls.written("work")
@@ -113,7 +113,7 @@ def right(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 def test_an_interrupted_call_leaves_nothing(
     calls: Calls, right: dict[str, bytes], number: signal.Signals, status: int
 ) -> None:
-    # Whatever whoever starts FuseSoC ignores.
+    # The parent process may ignore SIGINT.
     process = calls.start("work", *IGNORING_INTERRUPTS, environment={"HANG": "1"})
     assert process.stdout is not None
     assert process.stdout.readline() == "in the middle\n"
@@ -192,10 +192,10 @@ def test_a_damaged_store(calls: Calls, right: dict[str, bytes], damage: Callable
     damage(path)
     status, origin, errors = calls.run("second", *UNPRIVILEGED)
     assert (status, errors) == (0, "")
-    # Without the call, its key leads to the entry.
+    # Without the call's note, its key still leads to the entry.
     assert origin == ("generated" if suffix == ENTRY else "from")
     assert calls.written("second") == right
-    # It is whole again.
+    # The entry is repaired.
     assert calls.run("third", *UNPRIVILEGED) == (0, "from", "")
     assert calls.written("third") == right
 
@@ -220,7 +220,7 @@ def test_a_store_that_may_only_be_read(calls: Calls, right: dict[str, bytes]) ->
         model = calls.folder / "project" / "model.py"
         model.write_text(model.read_text() + "\n")
         status, origin, errors = calls.run("third", *UNPRIVILEGED)
-        # Its readers are not told on every run that it is not theirs.
+        # Users of a read-only store are not warned on every run.
         assert (status, origin, errors) == (0, "generated", "")
         show = [*UNPRIVILEGED, sys.executable, "-m", "fusesoc_firm.cli", "cache", "show"]
         environment = os.environ | {"PYTHONPATH": str(ROOT), "FUSESOC_FIRM_CACHE": str(calls.store)}
@@ -235,7 +235,7 @@ def test_a_store_that_may_only_be_read(calls: Calls, right: dict[str, bytes]) ->
 
 @pytest.mark.parametrize("is_stored", [False, True])
 def test_no_file_may_be_large(calls: Calls, is_stored: bool) -> None:
-    """The system ends the write of a file in its middle; a store that has the answer does not help."""
+    """The system stops writing in the middle of a file; a hit in the store does not help."""
     if is_stored:
         calls.run("first")
     status, _, errors = calls.run("work", "prlimit", "--fsize=2000")
@@ -249,7 +249,7 @@ def test_no_file_may_be_large(calls: Calls, is_stored: bool) -> None:
 @needs_namespaces
 @pytest.mark.parametrize("full", ["store", "work"])
 def test_a_full_disk(calls: Calls, right: dict[str, bytes], full: str) -> None:
-    """A disk of four pages, which holds neither the files nor an entry."""
+    """A disk of four pages, too small for the files and for an entry."""
     (calls.folder / full).mkdir()
     call = calls.work("work") / "call.yml"
     place = calls.folder / full
@@ -267,7 +267,7 @@ def test_a_full_disk(calls: Calls, right: dict[str, bytes], full: str) -> None:
         assert ".core" not in errors.partition("device\n")[2]
 
 
-# Locks of a folder on another machine may be refused, or mean nothing.
+# Locks on another machine's folder may be refused, or have no effect.
 NO_LOCKS = """
 import fcntl
 def flock(*_):
@@ -279,7 +279,7 @@ fcntl.flock = flock
 @needs_namespaces
 @pytest.mark.parametrize("refusal", ["raise OSError(37, 'No locks available')", "return None"])
 def test_machines_that_share_a_store(calls: Calls, right: dict[str, bytes], refusal: str) -> None:
-    """Each has its own host name and processes, whose numbers are the same; locks do not hold between them."""
+    """Each has its own host name and processes with the same numbers; locks do not work between them."""
     site = calls.folder / "site"
     site.mkdir()
     (site / "sitecustomize.py").write_text(NO_LOCKS.format(refusal=refusal))
@@ -290,7 +290,7 @@ def test_machines_that_share_a_store(calls: Calls, right: dict[str, bytes], refu
         for machine in range(3):
             script = f'hostname machine{machine}; "$@"'
             around = ("unshare", "-rmpu", "--fork", "--mount-proc", "sh", "-c", script, "sh")
-            # In turn each in a folder of its own, and all in one that they share, too.
+            # First each in a folder of its own, then all in a shared one.
             name = "shared" if turn else f"work{machine}"
             processes.append(calls.start(name, *around, environment={"PYTHONPATH": path}))
         outputs = [process.communicate() for process in processes]

@@ -1,6 +1,7 @@
-"""What is generated follows from what was declared: nothing else is read, nothing of place, time or machine gets in.
+"""Generated output depends only on declared inputs, never on other files, the place, the time or the machine.
 
-All applications of `specs/`, both products, one of them for every simulator and board; and some converters.
+The calls cover all applications of `specs/` with both products, one of them for every simulator and board, and some
+converters.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ CONVERTERS: tuple[Mapping[str, object], ...] = (
     {"message": "sensor_msgs/JointState", "ros": 1, "width": 512},
     {"message": "std_msgs/Empty", "ros": 2, "direction": "publisher"},
 )
-# What is answered first may leave something behind in the process.
+# The first call may leave state behind in the process.
 GENERATE = """
 import json, os, sys
 from fusesoc_firm.plugin.answer import main
@@ -46,8 +47,8 @@ for folder, command in json.load(sys.stdin):
     if main(command, ["call.yml"]):
         sys.exit(f"{folder} failed")
 """
-# They differ in all that an environment can do: folder, date (there are 25 hours between them), language and encoding,
-# order of sets, name of the user.
+# The environments differ in everything that could matter: folder, date (they are 25 hours apart), language and
+# encoding, order of sets, user name.
 HERE = {"TZ": "Pacific/Kiritimati", "LC_ALL": "C.UTF-8", "PYTHONHASHSEED": "1", "USER": "here", "HOME": "/"}
 THERE = {
     "TZ": "Pacific/Pago_Pago",
@@ -58,19 +59,19 @@ THERE = {
     "USER": "there",
     "HOME": "/tmp",
 }
-# What all compare with is made once.
+# The result for comparison is generated once.
 pytestmark = pytest.mark.xdist_group("hermetic")
 IS_NAMESPACE_ALLOWED = subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode == 0
 
 
 @dataclass(frozen=True)
 class Generated:
-    """A folder with a call in each of its numbered folders, answered with a store of its own."""
+    """A folder with a call in each of its numbered subfolders, answered with a store of its own."""
 
     folder: Path
 
     def files(self) -> dict[str, bytes]:
-        """All that was written, by name."""
+        """All written files, by name."""
         paths = [path for path in sorted((self.folder / "work").rglob("*")) if path.is_file()]
         return {
             path.relative_to(self.folder / "work").as_posix(): path.read_bytes()
@@ -79,7 +80,7 @@ class Generated:
         }
 
     def inputs(self, number: int) -> list[Path]:
-        """The user's files that the answer to a call depends on."""
+        """The user's files on which the result of a call depends."""
         said = (self.folder / "work" / str(number) / "call.yml").read_text()
         notes = [json.loads(path.read_text().partition("\n")[2]) for path in self.folder.rglob(f"*{CALL}")]
         name = str(yaml.safe_load(said)["vlnv"]).split(":")[2]
@@ -98,7 +99,7 @@ def calls_here() -> Iterator[GeneratorCall]:
 
 
 def _is_taken(application: str, parameters: Mapping[str, object]) -> bool:
-    # GHDL simulates no Verilog.
+    # GHDL cannot simulate Verilog.
     if application == "multi_type_verilog" and "product" in parameters:
         return parameters.get("simulator") == "icarus"
     return application == "quat2euler" or not {"board", "simulator"} & parameters.keys()
@@ -107,7 +108,7 @@ def _is_taken(application: str, parameters: Mapping[str, object]) -> bool:
 def generate(
     folder: Path, asked: list[GeneratorCall], roots: list[Path], environment: Mapping[str, str], *around: str
 ) -> Generated:
-    """Answer all calls, each with its own root in place of `specs/`, in one process; its store is empty."""
+    """Answer all calls in one process, each with its own root in place of `specs/`; the store is empty at first."""
     calls = []
     for number, (item, root) in enumerate(zip(asked, roots, strict=True)):
         work = folder / "work" / str(number)
@@ -115,7 +116,7 @@ def generate(
         vendor, library, name, version = item.vlnv.split(":")
         call = {
             "files_root": str(root / Path(item.files_root).relative_to(SPECS)),
-            # Each has a name of its own, by which its note is found.
+            # Each has a unique name, by which its note is found.
             "vlnv": f"{vendor}:{library}:{name}{number}:{version}",
             "parameters": dict(item.parameters),
         }
@@ -195,7 +196,7 @@ def test_what_it_reads_need_not_be_writable(
     mounts = [f"mount --bind '{path}' '{path}' && mount -o remount,ro,bind '{path}'" for path in frozen]
     script = " && ".join([*mounts, f"! touch '{specs}/x' 2>/dev/null", 'exec "$@"'])
     made = generate(folder, first, [specs] * len(first), HERE, "unshare", "-rm", "sh", "-c", script, "sh")
-    # They are numbered otherwise than among all.
+    # Their numbers differ from those among all calls.
     contents = set(here.files().values())
     written = {name: content for name, content in made.files().items() if not name.endswith(".core")}
     assert written
@@ -203,7 +204,7 @@ def test_what_it_reads_need_not_be_writable(
 
 
 def test_what_is_installed_is_no_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A module by itself, too, in whatever folder of packages; but not one that merely lies on Python's path."""
+    """A single module is not an input, either, in any package folder; but a file elsewhere on Python's path is."""
     for name in ("dist-packages/alone.py", "elsewhere/whole/__init__.py", "elsewhere/own.py", "text.txt"):
         path = tmp_path / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -237,7 +238,7 @@ def respond(subscriber, message):
         "import pathlib; pathlib.Path(r'{table}').read_bytes()",
         "import os; os.read(os.open(r'{table}', os.O_RDONLY), 9)",
         "import sqlite3; sqlite3.connect(r'{table}').close()",
-        # The model that goes on without it reads it all the same.
+        # A model that ignores the failure has read the file nevertheless.
         "try:\n    open(r'{table}')\nexcept BaseException:\n    pass",
     ],
 )

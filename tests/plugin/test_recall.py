@@ -1,4 +1,4 @@
-"""A call that was answered is answered again at once, and never once anything is different that decided the answer."""
+"""A repeated call is a hit at once, but never after a change of any fact that determined the result."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Calls:
         path.write_text(text)
 
     def call(self, name: str, **parameters: object) -> list[str]:
-        """A folder to answer a call in, which is entered; the arguments of the generator."""
+        """Create and enter a folder for a call; return the generator's arguments."""
         work = self.folder / "work" / name
         work.mkdir(parents=True, exist_ok=True)
         self.monkeypatch.chdir(work)
@@ -69,7 +69,7 @@ def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calls:
 
 
 def written() -> dict[str, bytes]:
-    """What lies in the current folder, but for the call."""
+    """The files in the current folder, except the call."""
     paths = [path for path in Path().rglob("*") if path.is_file() and path.name != "call.yml"]
     return {str(path): path.read_bytes() for path in sorted(paths)}
 
@@ -95,7 +95,7 @@ def test_a_call_is_answered_as_it_was(calls: Calls, command: str, capsys: pytest
 
 
 def test_what_the_store_has_of_another_call_is_noted(calls: Calls) -> None:
-    """A copy of a project elsewhere finds the entry by its key, and then by its call."""
+    """A copy of a project elsewhere finds the entry first by its key, and then by its call."""
     main("firm", calls.converter())
     calls.project = calls.project.rename(calls.project.with_name("moved"))
     calls.monkeypatch.setenv("AMENT_PREFIX_PATH", str(calls.project / "ros"))
@@ -109,7 +109,7 @@ def test_what_the_store_has_of_another_call_is_noted(calls: Calls) -> None:
     "name",
     [
         "msgs/second/my_msgs/msg/Size.msg",
-        # It goes before the other one.
+        # It takes precedence over the other one.
         "msgs/first/my_msgs/msg/Size.msg",
         "msgs/second/my_msgs/package.xml",
         "ros/share/my_msgs/msg/New.msg",
@@ -233,7 +233,7 @@ def test_nothing_is_answered_that_may_be_another(calls: Calls, change: Callable[
 
 @pytest.mark.parametrize("is_stored", [False, True])
 def test_what_is_edited_once_it_was_read_is_not_noted(calls: Calls, is_stored: bool) -> None:
-    """The state in a note must be that which the key was made of."""
+    """The state in a note must be the one from which the key was computed."""
     arguments = calls.converter()
     if is_stored:
         main("firm", arguments)
@@ -241,7 +241,7 @@ def test_what_is_edited_once_it_was_read_is_not_noted(calls: Calls, is_stored: b
     key_of = answer_module._key
 
     def edited(*arguments: Any) -> Key:
-        # After the request was loaded.
+        # This is after the request was loaded.
         calls.write("msgs/second/my_msgs/msg/Size.msg", "uint16 a\n")
         return key_of(*arguments)
 
@@ -250,7 +250,7 @@ def test_what_is_edited_once_it_was_read_is_not_noted(calls: Calls, is_stored: b
         assert main("firm", arguments) == 0
     assert not answer("firm", arguments)
     assert [*calls.store.rglob(f"*{CALL}")] == []
-    # Nor is what was made of the former definition stored by the key of the present one.
+    # The result of the old definition must not be stored by the key of the new one, either.
     assert main("firm", arguments) == 0
     assert re.search(r"\ba +: out std_logic_vector\(15 downto 0\)", Path("axis_to_my_msgs_size.vhd").read_text())
 
@@ -269,7 +269,7 @@ def test_what_is_edited_once_it_was_read_is_not_noted(calls: Calls, is_stored: b
     ],
 )
 def test_facts_that_others_made_up_are_harmless(calls: Calls, kind: str, name: str) -> None:
-    """They can be written into a store that is shared: none is waited for, or ends in a traceback."""
+    """A shared store may contain forged facts: none blocks the process, or ends in a traceback."""
     arguments = calls.converter()
     main("firm", arguments)
     os.mkfifo("pipe")
@@ -288,7 +288,7 @@ def test_what_is_no_call_is_not_answered(calls: Calls, arguments: list[str]) -> 
 
 
 def test_next_to_nothing_is_imported(calls: Calls) -> None:
-    """Time is lost with imports: those that an answer cannot do without are all there are."""
+    """Imports take time, so only those that a recall requires are allowed."""
     main("firm", calls.converter())
     script = (
         "import sys; before = {*sys.modules}; from fusesoc_firm.plugin.recall import answer; "
@@ -306,7 +306,7 @@ def test_next_to_nothing_is_imported(calls: Calls) -> None:
 
 
 def test_a_call_is_recalled_whose_folder_is_searched_for_messages(calls: Calls) -> None:
-    """As in a project that names its root, which builds lie below."""
+    """As in a project that lists its root folder, which contains the builds."""
     calls.folder = calls.project / "build"
     arguments = calls.call("size", message="my_msgs/Size", ros=2, paths=["."])
     assert main("firm", arguments) == 0

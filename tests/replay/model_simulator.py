@@ -1,20 +1,20 @@
 """A simulator without a system (docs/reference/transports.md): `model_simulator.py WIDTH KIND...`.
 
-What the system does with a frame for subscriber k is the k-th of these kinds:
+The k-th of these kinds determines the response to a frame for subscriber k:
 
-    echo      publisher k sends the payload, 20 cycles behind the last beat in
-    across    publisher 1 - k does so
-    twice     it does so again 300 cycles later
-    late      it does so after 5000 cycles
-    broken    it does so unless the payload begins with 0xee: that is a pulse of the converter's frame_error
-    parts     publishers k and k + 1 send the payload as two bursts each, one between the other's
-    garbled   publisher k sends more than it announces, and then a frame of an id that there is not
+    echo      publisher k sends the payload, 20 cycles after the last input beat
+    across    publisher 1 - k sends it
+    twice     publisher k sends it again 300 cycles later
+    late      publisher k sends it after 5000 cycles
+    broken    as echo, unless the payload begins with 0xee: then the converter's frame_error pulses
+    parts     publishers k and k + 1 send the payload as two interleaved bursts each
+    garbled   publisher k sends more than it announces, and then a frame with an unknown id
     beginning only the first of these bursts is sent
-    stuck     only the first frame is ever taken
-    unknown   the pulse of an id_error
-    grumpy    as echo, but the end of the simulation has status 4
-    dies      it ends with status 3
-    silent    nothing
+    stuck     only the first frame is accepted
+    unknown   id_error pulses
+    grumpy    as echo, but the simulator exits with status 4
+    dies      the simulator exits with status 3 at once
+    silent    no response
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def le(value: int, size: int) -> bytes:
 
 
 class Model:
-    """`queue` are the reports to come, by the cycle of their event and the order in which they were made."""
+    """The model; `queue` holds pending reports, by the cycle of their event and the order of creation."""
 
     def __init__(self, width: int, kinds: list[str]) -> None:
         self.lanes = width // 8
@@ -52,7 +52,7 @@ class Model:
         heappush(self.queue, (cycle, self.made, data))
 
     def send(self, publisher: int, data: bytes, first: int) -> int:
-        """A burst from `first` on; its last cycle."""
+        """Send a burst from cycle `first` on; return its last cycle."""
         last = first + -(-len(data) // self.lanes) - 1
         self.report(last, b"B" + le(publisher, 1) + le(first, 8) + le(last, 8) + le(len(data), 4) + data)
         return last
@@ -99,7 +99,7 @@ class Model:
             self.report(last, b"E" + le(65535, 2) + le(last, 8))
 
     def run(self, cycles: int) -> bytes:
-        """Until the end of so many cycles, or of one with reports; these reports, and that it stands."""
+        """Run to the end of `cycles`, or of a cycle with reports; return these reports and the report of standstill."""
         while self.frames and not self.is_stuck:
             self.take(self.frames.popleft())
         end = self.cycle + cycles

@@ -25,7 +25,7 @@ FORMS = ("ros1", "sqlite3", "mcap")
 STORES = {"ros1": Stores.ROS1_NOETIC, "sqlite3": Stores.ROS2_JAZZY, "mcap": Stores.ROS2_JAZZY}
 POINT, STRING = "geometry_msgs/msg/Point", "std_msgs/msg/String"
 
-# Topic, type, when it was recorded (ns), and the payload.
+# Topic, type, time of recording (ns), and payload.
 Item = tuple[str, str, int, bytes]
 
 
@@ -48,7 +48,7 @@ def open_writer(path: Path, form: str) -> Rosbag1Writer | Rosbag2Writer:
 
 
 def write(path: Path, form: str, items: Iterable[Item], store: Typestore | None = None) -> Path:
-    """A bag as rosbags writes it."""
+    """Write a bag with rosbags."""
     with open_writer(path, form) as writer:
         connections: dict[tuple[str, str], Any] = {}
         for topic, type_, stamp, data in items:
@@ -60,14 +60,14 @@ def write(path: Path, form: str, items: Iterable[Item], store: Typestore | None 
 
 
 def points(form: str, count: int, topic: str = "/p", step: int = 10**7) -> list[Item]:
-    """So many points with x counting up, `step` ns apart."""
+    """`count` points with x counting up, `step` ns apart."""
     return [
         (topic, POINT, 10**18 + step * number, payload(form, POINT, float(number), 0.0, 0.0)) for number in range(count)
     ]
 
 
 def read(path: Path) -> list[Item]:
-    """All messages of a bag, as rosbags reads it, in the order of time."""
+    """All messages of a bag in order of time, read with rosbags."""
     is_ros1 = path.is_file() and path.suffix not in (".mcap", ".db3")
     with Rosbag1Reader(path) if is_ros1 else Rosbag2Reader(path) as reader:
         return [(item.topic, item.msgtype, stamp, bytes(data)) for item, stamp, data in reader.messages()]
@@ -81,7 +81,7 @@ def specification(folder: Path, blocks: Sequence[str], more: str = "", project: 
 
 
 def passing(name: str, message: str, ros: int = 1, more: str = "") -> list[str]:
-    """A subscriber, and a publisher `<name>_out` that its messages go to."""
+    """A subscriber, and a publisher `<name>_out` to which its messages go."""
     kind = f"middleware: ROS{ros}, message: {message}"
     return [
         f"name: {name}, mode: subscriber, {kind}, outgoing: [{{name: {name}_out}}]{more}",

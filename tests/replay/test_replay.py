@@ -1,4 +1,4 @@
-"""A bag through a model of a system: what goes where, when it is stamped, and what is said of what does not go."""
+"""A bag sent through a model of a system: routes, stamps, and the reports of messages that are rejected."""
 
 from __future__ import annotations
 
@@ -174,7 +174,7 @@ def test_a_simulator_that_does_not_end_well(tmp_path: Path, capsys: Captured) ->
 
 
 def test_an_answer_has_the_stamp_of_the_last_message_on_its_way(tmp_path: Path) -> None:
-    # What 'b' sends late comes while the hardware works on 'a', which does not lead there.
+    # The late response of 'b' arrives while the hardware processes 'a', which is not its cause.
     blocks = passing("a", "geometry_msgs/Point", 2) + passing("b", "geometry_msgs/Vector3", 2)
     vector = "geometry_msgs/msg/Vector3"
     items = [
@@ -183,7 +183,7 @@ def test_an_answer_has_the_stamp_of_the_last_message_on_its_way(tmp_path: Path) 
     ]
     loaded = load(specification(tmp_path, blocks))
     run(loaded, bag(tmp_path, "mcap", items), tmp_path / "out", "echo", "late")
-    # ids count in the order of blocks: a is 0, b is 1
+    # ids follow the order of blocks: a is 0, b is 1
     assert [(topic, stamp) for topic, _, stamp, _ in read(tmp_path / "out")] == [
         ("/b_out", 100),
         *(("/a_out", 200 + n) for n in range(5)),
@@ -202,7 +202,7 @@ def test_the_latency_is_that_of_the_hardware(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 1), project=project))
     items = points("ros1", 3)
     run(loaded, bag(tmp_path, "ros1", items), tmp_path / "o.bag", "echo", has_latency=True)
-    # Frames of 29 bytes are 4 beats: the last beat out is 3 + 20 + 3 cycles behind the first one in.
+    # Frames of 29 bytes are 4 beats: the last output beat is 3 + 20 + 3 cycles after the first input beat.
     assert read(tmp_path / "o.bag") == [("/p_out", type_, stamp + 26 * 20, data) for _, type_, stamp, data in items]
 
 
@@ -296,7 +296,7 @@ def test_the_summary(tmp_path: Path, capsys: Captured) -> None:
         "out p_out /p_out geometry_msgs/msg/Point 12",
         f"nobody takes /s of {STRING}: 1",
     ]
-    # A message takes 4 + 19 + 4 cycles and 100 of rest.
+    # A message takes 4 + 19 + 4 cycles, and 100 cycles of rest.
     assert lines[3] == f"{tmp_path}/o.bag: 12 in, 12 out, 1 dropped, 0 errors, {12 * 127} cycles"
 
 
@@ -304,7 +304,7 @@ def test_the_summary(tmp_path: Path, capsys: Captured) -> None:
 
 
 def replayed(tmp_path: Path, form: str, items: list[Item], capsys: Captured, kind: str = "broken") -> list[str]:
-    """Replay what has faults: the lines that say so, without the bag's path."""
+    """Replay faulty messages, and return the lines that report them, without the bag's path."""
     blocks = passing("p", "geometry_msgs/Point", version(form))
     source = bag(tmp_path, form, items)
     with pytest.raises(InputError) as raised:
@@ -490,7 +490,7 @@ def test_the_latency_through_software_begins_with_the_message(tmp_path: Path) ->
     items = points("ros1", 1)
     loaded = software(tmp_path, project="width: 64, clock: 1 GHz")
     run(loaded, bag(tmp_path, "ros1", items), tmp_path / "o.bag", "across", "across", has_latency=True)
-    # Twice as long as without software, and a cycle between.
+    # Twice the time without software, and one cycle in between.
     assert [stamp for topic, _, stamp, _ in read(tmp_path / "o.bag") if topic == "/far"] == [items[0][2] + 26 + 27]
 
 

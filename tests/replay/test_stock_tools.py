@@ -1,4 +1,4 @@
-"""What is recorded, in the eyes of tools that others wrote: ROS 1's rosbag, mcap with its decoder of ROS 2, rosbags."""
+"""Recorded bags in independent tools: ROS 1's rosbag, mcap with its decoder for ROS 2, rosbags."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.replay.replays import Item, load, passing, payload, read, run, specif
 PYTHON = "/usr/bin/python3"
 HAS_ROSBAG = not subprocess.run([PYTHON, "-c", "import rosbag"], capture_output=True, check=False).returncode
 
-# Messages that only the specification's paths have: constants, bounds, arrays, a message within, and that twice.
+# Messages that only the specification's paths define: constants, bounds, arrays, and nesting at two levels.
 OWN = {
     1: {
         "Plan": "# A way.\nuint8 FAST = 2  # m/s\nstring NAME = to # there\nHeader header\nown_msgs/Step[] steps\n"
@@ -43,7 +43,7 @@ POINT, HEADER = "geometry_msgs/msg/Point", "std_msgs/msg/Header"
 def own_store(ros: int) -> Typestore:
     store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_JAZZY)
     for name in ("Step", "Plan"):
-        # Constants with capitals and no blanks, so that rosbags reads them right.
+        # Constants with capitals and without blanks, which rosbags reads correctly.
         text = (
             OWN[ros][name].replace("Header header", "std_msgs/Header header").replace("std_msgs/std_msgs", "std_msgs")
         )
@@ -57,7 +57,7 @@ def value(store: Typestore, type_: str, **fields: Any) -> Any:
 
 
 def plan(store: Typestore, ros: int) -> bytes:
-    """A message with something in every field."""
+    """A message with a value in every field."""
     import numpy as np
 
     time, duration = "builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"
@@ -83,7 +83,7 @@ def plan(store: Typestore, ros: int) -> bytes:
 
 
 def recorded(folder: Path, ros: int, form: Form) -> tuple[Path, Typestore, list[Item]]:
-    """A bag that replay wrote of plans and points, rosbags' types, and what must be in it."""
+    """A bag of plans and points written by replay, rosbags' types, and the expected messages."""
     package = folder / "own_msgs" / "msg"
     package.mkdir(parents=True)
     for name, text in OWN[ros].items():
@@ -122,7 +122,7 @@ def test_rosbag_of_ros1(tmp_path: Path) -> None:
         ("/plan_out", "own_msgs/Plan", 5),
         ("/p_out", "geometry_msgs/Point", 5),
     }
-    # genpy makes classes of the definitions in the bag, and warns if their sum is another than the bag's.
+    # genpy creates classes from the definitions in the bag, and warns if their sum differs from the bag's.
     script = (
         "import sys, rosbag\n"
         "for topic, message, time in rosbag.Bag(sys.argv[1]).read_messages():\n"
@@ -155,7 +155,7 @@ def test_mcap_and_its_decoder_of_ros2(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("form", [Form.SQLITE3, Form.MCAP, Form.ROS1])
 def test_rosbags(tmp_path: Path, form: Form) -> None:
-    """Its reader makes types of the definitions, and refuses a bag whose hashes are others than those of the types."""
+    """Its reader creates types from the definitions, and rejects a bag whose hashes differ from theirs."""
     path, _, expected = recorded(tmp_path, form.ros.number, form)
     with AnyReader([path]) as reader:
         assert {(item.topic, item.msgtype, item.msgcount) for item in reader.connections} == {

@@ -1,4 +1,4 @@
-"""Our own code decides what is generated: an edit of it is noticed, and nothing else is."""
+"""Our own code determines the generated output: its edits are noticed, and no others."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_modules_templates_and_data_count_but_not_the_library(tmp_path: Path, to
 
 
 def aged(folder: Path) -> Path:
-    """A module that was written long before this process started, and a link that an editor left beside it."""
+    """A module written long before this process started, and a link that an editor left next to it."""
     path = folder / "old.py"
     path.write_text("a")
     os.utime(path, ns=(10**18, 10**18))
@@ -52,7 +52,7 @@ def aged(folder: Path) -> Path:
 
 
 def test_an_edit_of_the_same_size_and_time_is_noticed(tmp_path: Path) -> None:
-    """No program can set the time at which a file's state changed, and a new file counts by its content."""
+    """No program can set the time of a file's status change, and a new file counts by its content."""
     path = aged(tmp_path)
     before = digest(tmp_path), state(tmp_path)
     path.write_text("b")
@@ -88,7 +88,7 @@ def test_a_copy_has_the_same_digest(tmp_path: Path) -> None:
 
 
 class Project:
-    """A copy of the package, and a core with two instances of the generator that runs in it."""
+    """A copy of the package, and a core with two instances of the generator in that copy."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -100,7 +100,7 @@ class Project:
         self.message.write_text("uint8 a\n")
 
     def origin(self, message: str) -> str:
-        """Run the generator: whether what it wrote was `generated` or `from store`."""
+        """Run the generator, and return the origin of its output: `generated` or `from store`."""
         work = self.folder / "work"
         shutil.rmtree(work, ignore_errors=True)
         work.mkdir()
@@ -119,7 +119,7 @@ class Project:
         return "from store" if " from store in " in done.stdout else "generated"
 
     def origins(self) -> list[str]:
-        """Of a message of fixed size, of the user's, and of one of variable size."""
+        """The origins for a message of fixed size, one of the user's, and one of variable size."""
         return [self.origin(name) for name in ("geometry_msgs/Point", "my_msgs/Size", "std_msgs/String")]
 
     def edit(self, name: str) -> None:

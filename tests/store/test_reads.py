@@ -1,4 +1,4 @@
-"""Noting what is read."""
+"""The record of files that are read."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 from fusesoc_firm.store.own_code import PACKAGE
 
-# A process of its own, so that nothing has asked for Python's paths yet. Since Python 3.13, `sysconfig` opens files to
-# answer; here it does so in every version.
+# A separate process, in which Python's paths have not been requested yet. Since Python 3.13, `sysconfig` opens files
+# for this; here it does so in every version.
 PROGRAM = """
 import sys
 import sysconfig

@@ -1,4 +1,4 @@
-"""A store that others may write to: none of what they can put there harms its readers, or anything outside of it."""
+"""A shared store: nothing that other users put there harms its readers, or anything outside it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def root(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def victim(tmp_path: Path) -> Path:
-    """A folder outside of the store, with files that the store might take for its own."""
+    """A folder outside the store, with files that the store might take for its own."""
     folder = tmp_path / "victim"
     folder.mkdir()
     for name in ("file", f"old{ENTRY}", ".new-old"):
@@ -46,7 +46,7 @@ def is_unharmed(victim: Path) -> bool:
 
 
 def obtain(root: Path, limit: int = 2**30) -> bool:
-    """Ask for the files; whether the store had them."""
+    """Request the files; return whether they were in the store."""
     entry = Store(root, limit).obtain(Key(REQUEST), lambda: FILES)
     assert entry.files == FILES
     return entry.is_from_store
@@ -58,12 +58,12 @@ def kept(root: Path, suffix: str) -> Path:
 
 
 def signed(data: bytes) -> bytes:
-    """Data as the store keeps it."""
+    """Data in the store's format."""
     return hashlib.sha256(data).hexdigest().encode() + b"\n" + data
 
 
 def _socket(path: Path, _: Path) -> None:
-    # The name of one is short.
+    # Socket names must be short.
     with socket.socket(socket.AF_UNIX) as made:
         before = Path.cwd()
         os.chdir(path.parent)
@@ -77,7 +77,7 @@ def _huge(path: Path, _: Path) -> None:
     os.truncate(path, 2**40)
 
 
-# What may be where a file of the store should be.
+# Objects that may be found in place of a stored file.
 OBSTACLES: dict[str, Callable[[Path, Path], object]] = {
     "link": lambda path, victim: path.symlink_to(victim / "file"),
     "link to nothing": lambda path, victim: path.symlink_to(victim / "new"),
@@ -93,7 +93,7 @@ OBSTACLES: dict[str, Callable[[Path, Path], object]] = {
 @pytest.mark.parametrize("suffix", [ENTRY, LOCK])
 @pytest.mark.parametrize("obstacle", OBSTACLES)
 def test_what_is_no_file_of_the_store(root: Path, victim: Path, obstacle: str, suffix: str) -> None:
-    """It is neither waited for nor followed nor emptied; it is replaced, or else removed by `firm cache verify`."""
+    """It is not waited for, followed or emptied; it is replaced, or removed by `firm cache verify`."""
     obtain(root)
     path = kept(root, ENTRY).with_suffix(suffix)
     path.unlink(missing_ok=True)
@@ -145,7 +145,7 @@ def test_clean_of_folders_without_end(root: Path) -> None:
     os.close(handle)
     with pytest.raises(OSError, match=r"Too many open files|too many"):
         Store(root, 0).clean()
-    # What tests leave is removed by means that do not care.
+    # The test's files are removed by an independent tool.
     assert shutil.which("rm") is None or os.spawnlp(os.P_WAIT, "rm", "rm", "-rf", str(root)) == 0
 
 
@@ -156,7 +156,7 @@ def header(*files: object, about: object = ABOUT) -> bytes:
     return json.dumps({"about": about, "files": files}).encode()
 
 
-# Each before a content of eight bytes.
+# Each is followed by a content of eight bytes.
 FORGED: dict[str, bytes] = {
     "outside": header(["../../x", 8]),
     "outside later": header(["a/../../x", 8]),

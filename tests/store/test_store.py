@@ -1,4 +1,4 @@
-"""The store: found or made, whole or not there, with any number of processes, and no larger than it may be."""
+"""The store: hits and misses, atomic entries, any number of processes, and the size limit."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def obtain(root: Path, files: Files = FILES, request: str = REQUEST, limit: int 
 
 
 def find(root: Path, request: str = REQUEST) -> Files | None:
-    """What the store has; it is not written to."""
+    """The files of a hit; nothing is written to the store."""
     return Store(root, LARGE)._find(Key(request))
 
 
@@ -92,7 +92,7 @@ def test_what_was_edited_while_it_was_read_is_not_kept(tmp_path: Path) -> None:
 
 
 def test_a_store_that_cannot_be_written_is_done_without(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    # A file in the way, since the rights of a folder do not stop root.
+    # A file blocks the way, since the rights of a folder do not stop root.
     (tmp_path / "file").write_text("")
     root = tmp_path / "file" / "store"
     assert obtain(root) == Entry(FILES, False)
@@ -116,7 +116,7 @@ def test_a_store_that_can_only_be_read_gives_what_it_has(
     assert stored(tmp_path) == before
 
 
-# The system stops the write in the middle of a file, as it does when a disk is full.
+# The system stops the write in the middle of a file, as on a full disk.
 FULL = """
 import resource, sys
 from pathlib import Path
@@ -232,19 +232,19 @@ def test_one_that_is_stopped_is_not_waited_for_without_end(tmp_path: Path, monke
     process.send_signal(signal.SIGSTOP)
     monkeypatch.setattr(store_module, "_LONGEST_WAIT_SECONDS", 0.2)
     begin = time.monotonic()
-    # What the other process asked for.
+    # The files that the other process requested.
     made = Store(tmp_path, LARGE).obtain(Key(REQUEST), lambda: FILES)
     assert time.monotonic() - begin >= 0.2
     assert made == Entry(FILES, False)
     assert find(tmp_path) == FILES
-    # Its lock is its own to remove.
+    # Only the other process may remove its lock.
     assert len([*tmp_path.rglob("*.lock")]) == 1
     process.kill()
     process.communicate()
 
 
 class Gone(io.FileIO):
-    """A file that was opened, and removed on another machine before it was read."""
+    """A file that was removed on another machine after it was opened and before it was read."""
 
     def read(self, _: int | None = None) -> bytes:
         raise OSError(errno.ESTALE, "Stale file handle")
@@ -304,7 +304,7 @@ def test_readers_while_entries_are_removed(tmp_path: Path) -> None:
 
 
 def age(root: Path, request: str, seconds: float) -> None:
-    """Let what belongs to a request have been used long ago."""
+    """Set the last use of a request's entry to long ago."""
     entry = next(
         root / file.name
         for file in Store(root, LARGE).entries()
@@ -319,7 +319,7 @@ def test_what_was_not_used_for_longest_goes_first(tmp_path: Path) -> None:
         obtain(tmp_path, {"x": bytes(10_000)}, request)
     for request, seconds in ((a, 300), (b, 200), (c, 100)):
         age(tmp_path, request, seconds)
-    # A use makes the oldest the newest.
+    # A use makes the oldest entry the newest.
     assert find(tmp_path, a) is not None
     obtain(tmp_path, {"x": bytes(10_000)}, d, limit=35_000)
     assert [request for request in (a, b, c, d) if find(tmp_path, request) is not None] == [a, d]
@@ -363,7 +363,7 @@ def test_clean_removes_all_of_it_and_nothing_else(tmp_path: Path) -> None:
 
 
 def test_files_have_the_rights_that_others_of_the_user_have(tmp_path: Path) -> None:
-    """In a folder for several people, what one made the others can read."""
+    """In a folder for several people, each can read the files of the others."""
     mask = os.umask(0o022)
     try:
         obtain(tmp_path)

@@ -1,4 +1,4 @@
-"""Messages as a user sees them."""
+"""Messages as printed for a user."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lock that the system frees: one holder at a time, of a file or of a folder."""
+"""The system's lock on a file or a folder: one holder at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names are legal in every HDL and distinct, whatever ROS calls its fields."""
+"""Names are legal and distinct in every HDL, whatever names ROS gives its fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Questions: the same rules for an answer from a pipe and from a terminal."""
+"""Questions: the same rules for answers from a pipe and from a terminal."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_wrong_answer_from_a_pipe_ends_it(question: Question, answers: list[st
 @pytest.mark.parametrize(
     ("question", "typed", "answer"),
     [
-        # Enter with a wrong answer does nothing; Ctrl-U empties the line.
+        # Enter after an invalid answer does nothing; Ctrl-U empties the line.
         (COLOUR, "blue\r\x15green\r", "green"),
         (NAME, "\rBarbara\r\x15Bob\r", "Bob"),
         (COLOUR, "\r", "red"),

@@ -1,4 +1,4 @@
-"""Each way of quoting gives back the text, as the language's own tool reads it, and nothing is run."""
+"""Quoted text reads back unchanged in each language's own tool, and nothing in it is executed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import yaml
 from fusesoc_firm.text import quoting
 from fusesoc_firm.text.render import TEMPLATES, TemplateError, render
 
-# Text that means something in one language or another, and characters that end a line somewhere.
+# Text with a meaning in one of the languages, and characters that end a line in some.
 PIECES = (
     *(
         '"',
@@ -98,7 +98,7 @@ def test_a_scalar_and_a_list_of_yaml() -> None:
 
 
 def test_a_string_of_c(tmp_path: Path) -> None:
-    """With trigraphs, as a compiler for C of an older standard has them."""
+    """With trigraphs, as in compilers for older standards of C."""
     found = [text for text in texts(3, (*PIECES, *LINE_ENDS)) if "\0" not in text]
     strings = "".join(f'    puts({quoting.c_string(text)}); puts("=");\n' for text in found)
     (tmp_path / "strings.c").write_text(
@@ -110,7 +110,7 @@ def test_a_string_of_c(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not shutil.which("tclsh"), reason="tclsh is not installed")
 def test_a_word_of_tcl(tmp_path: Path) -> None:
-    """Alone, and where the script up to the brace that closes is one word."""
+    """As a word of its own, and within a brace-quoted script."""
     found = texts(4, (*PIECES, *LINE_ENDS[:-3]))
     words = "".join(f"puts {quoting.tcl_word(text)}\nputs =\n" for text in found)
     script = f"fconfigure stdout -encoding utf-8 -translation lf\n{words}if {{1}} {{\n{words}}}\n"
@@ -119,7 +119,7 @@ def test_a_word_of_tcl(tmp_path: Path) -> None:
 
 
 def comments(mark: str, line: str) -> str:
-    """A line behind each comment; were one of them swallowed, it would be missing."""
+    """A line after each comment, which would be missing if a comment swallowed it."""
     return "".join(f"{mark} {quoting.comment(text)}\n{line}\n" for text in texts(5, (*PIECES, *LINE_ENDS)))
 
 
@@ -137,7 +137,7 @@ def test_a_comment_of_tcl(tmp_path: Path) -> None:
 
 
 def test_a_comment_of_vhdl(tmp_path: Path) -> None:
-    """Also in VHDL-93, whose comments have no UTF-8."""
+    """Also in VHDL-93, whose comments must not contain UTF-8."""
     lines = comments("  --", "  signal s : bit;").split("\n")
     numbered = "\n".join(line.replace("signal s", f"signal s{number}") for number, line in enumerate(lines))
     text = f"entity e is\nend entity;\narchitecture a of e is\n{numbered}\nbegin\nend architecture;\n"
@@ -147,7 +147,7 @@ def test_a_comment_of_vhdl(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not shutil.which("dot"), reason="no dot; make test installs Graphviz")
 def test_a_text_of_graphviz(tmp_path: Path) -> None:
-    # An entity of HTML is one in a picture, too.
+    # Graphviz replaces HTML entities.
     found = [text for text in texts(6) if "&" not in text and text.strip() == text and "  " not in text]
     nodes = "".join(f'  n{number} [label="{quoting.dot_text(text)}"]\n' for number, text in enumerate(found))
     svg = ET.fromstring(run(["dot", "-Tsvg"], tmp_path, f"digraph {{\n{nodes}}}\n"))
@@ -164,7 +164,7 @@ def test_a_text_of_markup() -> None:
 
 def test_files_and_arguments_of_make(tmp_path: Path) -> None:
     found = [text for text in dict.fromkeys(texts(8)) if "/" not in text and "\\" not in text and len(text) < 100]
-    # What Make expands, as in a shell, before it knows files; none of ours is called so.
+    # Make expands these characters like a shell before it looks for files; none of our names contains them.
     found = [
         text for text in found if not {*text} & {*"?*[]~;|=&'\"`<>()!"} and text.strip() == text and text[0] not in "-#"
     ]
@@ -190,7 +190,7 @@ def test_templates_name_ways_that_their_language_has(tmp_path: Path) -> None:
 
 
 def test_no_template_puts_quotes_around_text_that_is_not_quoted() -> None:
-    """In languages that have a way to quote strings, it is that one which sets the quotes."""
+    """If a language has a function for quoting strings, only this function writes the quotes."""
     for path in sorted(TEMPLATES.rglob("*.mustache")):
         language = path.name.removesuffix(".mustache").rpartition(".")[2]
         if "string" in quoting.QUOTES.get(language, {}):

@@ -1,4 +1,4 @@
-"""The strict mustache: what it prints, and everything it refuses."""
+"""The strict mustache: its output, and every template and context that it rejects."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def expand(tmp_path: Path) -> Expand:
     """Render a template given as text; partials are keyword arguments."""
 
     def render_text(template: str, context: dict[str, object], **partials: str) -> str:
-        # A folder of its own for each call: parsed templates are kept by path.
+        # Each call has a folder of its own, since parsed templates are cached by path.
         folder = tmp_path / str(len(list(tmp_path.iterdir())))
         (folder / "partials").mkdir(parents=True)
         (folder / "t.vhd.mustache").write_text(template)
@@ -81,14 +81,14 @@ def test_a_partial_within_a_line_is_not_indented(expand: Expand) -> None:
         ("{{widht}}", {"width": 8}, "no 'widht' in the context; it has width"),
         ("{{a.c}}", {"a": {"b": 1}}, "no 'a.c' in a; it has b"),
         ("{{a.b}}", {"a": 3}, "no 'a.b' in a; it is of type int"),
-        # The outer `width` must not stand in for the one that the second port lacks.
+        # The outer `width` must not replace the one that the second port lacks.
         (
             "{{#ports}}{{width}}{{/ports}}",
             {"width": 8, "ports": [{"width": 1}, {"name": "b"}]},
             "no 'width' in ports[1]; it has name",
         ),
         ("{{#a}}{{#b}}{{x}}{{/b}}{{/a}}", {"x": 1, "a": {"b": [{"y": 1}]}}, "no 'x' in a.b[0]; it has y"),
-        # A part that is left out is checked too: its fault would show only with other data.
+        # An omitted section is checked, too: its fault would otherwise appear only with other data.
         ("{{#on}}{{x}}{{/on}}", {"on": False}, "no 'x' in the context; it has on"),
         ("{{^l}}{{x}}{{/l}}", {"l": [1]}, "no 'x' in the context; it has l"),
         ("{{x}}", {"x": True}, "'x' is of type bool; only a string or an integer can be printed"),
@@ -155,7 +155,7 @@ def test_what_is_there(expand: Expand) -> None:
 def test_the_first_and_the_last_turn(expand: Expand) -> None:
     template = "{{#l}}{{#@first}}({{/@first}}{{.}}{{^@last}}, {{/@last}}{{#@last}}){{/@last}}{{/l}}"
     assert expand(template, {"l": ["a", "b", "c"]}) == "(a, b, c)"
-    # A mapping within an item has no turns of its own.
+    # A mapping within an item has no iterations of its own.
     assert expand("{{#l}}{{#m}}{{x}}{{^@last}},{{/@last}}{{/m}}{{/l}}", {"l": [{"m": {"x": 1}}] * 2}) == "1,1"
 
 
@@ -177,7 +177,7 @@ def test_columns_end_where_a_line_has_none_or_begins_anew(expand: Expand) -> Non
 
 
 def test_a_traced_line_is_as_it_is_rendered() -> None:
-    """Columns are those of the text, not of the marks in it."""
+    """Columns align the text, not the marks in it."""
     context: dict[str, object] = {"ports": [{"formal": "a", "actual": "b"}, {"formal": "long", "actual": "c"}]}
     text = render("partials/port_map", context)
     assert text == "a    => b,\nlong => c\n"

@@ -1,4 +1,4 @@
-"""YAML with places: what is read, and how it is told that a text is no YAML."""
+"""YAML with places: the parsed nodes, and the reports of invalid YAML."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fusesoc_firm.text.yaml_text import Text, YamlText, is_null, items, kind, pa
 
 
 def parse(text: str) -> tuple[YamlText, str]:
-    """The text's nodes, and the faults as they are printed."""
+    """The text's nodes, and the faults as printed."""
     faults = Diagnostics()
     parsed = parse_yaml(text, "a.yaml", faults)
     return parsed, "\n".join(str(fault) for fault in faults.found)

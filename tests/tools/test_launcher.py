@@ -1,4 +1,4 @@
-"""The launcher of build programs: where it finds them, and what a failure leaves."""
+"""The launcher of build programs: how it finds them, and what it does after a failure."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def program(folder: Path, name: str, script: str) -> None:
 
 @pytest.fixture(autouse=True)
 def alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A path with nothing but one folder, and an interpreter with nothing beside it."""
+    """A PATH of a single folder, and an interpreter without other programs next to it."""
     folder = tmp_path / "bin"
     folder.mkdir()
     monkeypatch.setenv("PATH", str(folder))
@@ -135,7 +135,7 @@ def test_who_ends_the_launcher_while_it_starts_the_program_ends_both(
         signal.signal(signal.SIGTERM, before)
 
 
-# A Python that counts its starts, and hands a program to the launcher.
+# A Python that counts its starts, and starts the launcher for a program.
 PYTHON = """\
 echo "$*" >> starts
 if [ "$1" = firm_python.py ]; then echo "$0"; else shift 2; exec {python} -m fusesoc_firm.tools.launcher "$@"; fi
@@ -156,7 +156,7 @@ def build(alone: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def start(build: Path, *command: str) -> tuple[int, str, int]:
-    """Start a program as the makefile does: its status, what it printed, and how often Python was started."""
+    """Start a program like the makefile; return its status, its output, and the number of Python starts."""
     done = subprocess.run(
         ["/bin/sh", "firm_launcher.sh", *command], cwd=build, capture_output=True, text=True, check=False
     )
@@ -172,7 +172,7 @@ def test_python_is_started_for_the_first_run_of_a_program_in_a_build(alone: Path
     assert start(build, "icepack", "a b", "") == (5, "a b|\n", 2)
     assert "icepack" in manifest.read(build)
     assert start(build, "icepack", "c  d", "*") == (5, "c  d|*\n", 0)
-    # FuseSoC has written the makefile again, then the program is another one.
+    # FuseSoC has rewritten the makefile; then the program changes.
     os.utime(build / "Makefile", (time.time() + 60, time.time() + 60))
     assert start(build, "icepack")[2] == 2
     os.utime(build / "Makefile", (1, 1))

@@ -1,4 +1,4 @@
-"""What the cores of the library promise to the owner of another one."""
+"""The guarantees of the library's cores for a project with other cores."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fusesoc_firm.tools.library_path import library_root
 ROOT = Path(__file__).resolve().parents[2]
 GENERATORS = "robot:firm:generators"
 LICENSE = "Apache-2.0"
-# One core of ours that another one depends on, also under a condition.
+# A dependency on one of our cores, also under a condition.
 _OURS = re.compile(r"[^\s('\"]*robot:\w+:\w+[^\s)'\"]*")
 
 
@@ -39,13 +39,13 @@ CORES = {
 
 @pytest.mark.parametrize("name", CORES)
 def test_a_reusable_core_is_recognised_by_its_name(name: str) -> None:
-    """Somebody else's `cdc` is then the only one of that name."""
+    """Another project's `cdc` is then the only core of that name."""
     _, library, short = name.split(":")
     assert short.startswith("firm_") or library == "sys" or name == GENERATORS
 
 
 def test_the_last_part_of_a_name_is_enough() -> None:
-    """`fusesoc run firm_cdc` takes no library."""
+    """`fusesoc run firm_cdc` needs no library name."""
     assert max(Counter(name.rpartition(":")[2] for name in CORES).values()) == 1
 
 

@@ -1,4 +1,4 @@
-"""The manifest of a build: it says which tools have run, the same wherever they lie, whoever writes it at that time."""
+"""The manifest of a build: it lists the tools that ran, independent of their paths, even with concurrent writers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def install(folder: Path, name: str, release: str, status: int = 0) -> None:
 
 @pytest.fixture
 def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The work folder of a build, with a path of one folder beside it."""
+    """The work folder of a build, with a PATH of one folder next to it."""
     folder = tmp_path / "work"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -47,7 +47,7 @@ def test_a_program_is_noted_with_those_that_had_it_run(work: Path) -> None:
     }
     assert found["edalize"] == {"version": version("edalize")}
     assert set(found["fusesoc-firm"]) == {"sha256", "version"}
-    # Nobody else's files lie about.
+    # No other files are left over.
     assert [path.name for path in work.iterdir()] == [manifest.FILE]
 
 
@@ -77,7 +77,7 @@ def test_a_tool_that_changed_is_noted_when_it_runs_again(work: Path) -> None:
     launcher.launch("ghdl", [])
     found = manifest.read(work)
     assert "3.0" in found["ghdl"]["version"]
-    # What it made is still there.
+    # Its output still exists.
     assert found["yosys"]["sha256"] == hashlib.sha256(f"{SHOW.format('0.23', 0)}\n".encode()).hexdigest()
 
 

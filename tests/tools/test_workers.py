@@ -1,4 +1,4 @@
-"""Work on a Dask cluster on loopback: results are those of this machine, and faults end with a message, in time."""
+"""Work on a Dask cluster on loopback: results match those of this machine, and failures end with a message in time."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_every_task_comes_back_once(address: str) -> None:
 def test_an_address_where_nobody_answers(monkeypatch: pytest.MonkeyPatch, capsys: Captured) -> None:
     monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
     with socket.socket() as bound:
-        # Bound, not listening; free again behind it, and not given away soon.
+        # The port is bound, but not listening; it is released afterwards, and not reassigned soon.
         bound.bind(("127.0.0.1", 0))
         dead = f"tcp://127.0.0.1:{bound.getsockname()[1]}"
     assert main([*SMALL_BENCH, "--cluster", dead]) == 1
@@ -103,7 +103,7 @@ def test_workers_of_another_version(address: str, monkeypatch: pytest.MonkeyPatc
 
 
 def test_workers_that_die() -> None:
-    # The first time counts: starting another worker may take for ever on a busy machine.
+    # The first failure counts: restarting a worker may take very long on a busy machine.
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         _cluster(1) as cluster,
@@ -118,7 +118,7 @@ def test_a_scheduler_that_ends() -> None:
 
         def one_task() -> Iterator[float]:
             yield 300
-            # It has been handed out.
+            # The task has been submitted.
             threading.Thread(target=cluster.close).start()
 
         with (
@@ -130,7 +130,7 @@ def test_a_scheduler_that_ends() -> None:
 
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An authority, a certificate of it for all machines of a cluster, and another authority."""
+    """An authority, its certificate for all machines of a cluster, and another authority."""
     folder = tmp_path_factory.mktemp("certificates")
     new_key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1"]
     for name in ("ca", "other"):
@@ -167,7 +167,7 @@ def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _configuration(folder: Path, name: str, authority: str) -> Any:
-    """Dask's, as one file has it on every machine of a cluster."""
+    """Dask's configuration, from one file that is the same on every machine of a cluster."""
     tls = {"ca-file": str(folder / f"{authority}.pem")}
     for role in ("client", "scheduler", "worker"):
         tls |= {f"{role}.cert": str(folder / f"{name}.pem"), f"{role}.key": str(folder / f"{name}.key")}
@@ -204,7 +204,7 @@ def test_a_cluster_behind_tls(tls_address: str, certificates: Path, capsys: Capt
 def test_a_stranger_gets_and_gives_nothing(
     tls_address: str, certificates: Path, name: str, authority: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The cluster does not take the certificate, or is not taken itself."""
+    """The cluster rejects the certificate, or is itself rejected."""
     monkeypatch.setattr(workers, "_CONNECT_SECONDS", 1)
     with (
         _configuration(certificates, name, authority),
@@ -265,7 +265,7 @@ def test_a_cluster_that_anyone_may_read_is_warned_of(
 
 
 def test_ctrl_c_ends_it(address: str) -> None:
-    """In a process of its own, which is interrupted while its work is on the cluster."""
+    """A separate process is interrupted while its work is on the cluster."""
     command = [sys.executable, "-m", "fusesoc_firm.cli", "scheduler", "bench", "--policies", "lst", "--sets", "5"]
     running = subprocess.Popen(
         [*IGNORING_INTERRUPTS, *command, "--requesters", ",".join(map(str, range(2, 65))), "--cluster", address],
@@ -280,7 +280,7 @@ def test_ctrl_c_ends_it(address: str) -> None:
         out, err = running.communicate()
         assert (running.returncode, out) == (130, "")
         assert err.endswith("interrupted\n") and "Traceback" not in err
-        # What was handed out is taken back: the cluster is free for others.
+        # Submitted tasks are cancelled, so that the cluster is free for others.
         _wait_until(lambda: not any(client.processing().values()))
 
 

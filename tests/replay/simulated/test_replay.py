@@ -1,4 +1,4 @@
-"""`firm replay` with simulated hardware: whole bags in, whole bags out, judged by what is not ours."""
+"""`firm replay` with simulated hardware: whole bags in and out, compared with independent results."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ needs_verilator = pytest.mark.skipif(not shutil.which("verilator"), reason="no v
 
 @pytest.fixture(scope="module")
 def builds(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where simulators are built, each once."""
+    """The folder in which each simulator is built once."""
     return tmp_path_factory.mktemp("builds")
 
 
 def replay(spec: Path, source: Path, target: Path, builds: Path, *options: str) -> list[Item]:
-    """What the command records."""
+    """Replay a bag and return the recorded messages."""
     arguments = ["replay", str(spec), "--in", str(source), "--out", str(target), "--build-root", str(builds)]
     assert main([*arguments, *options]) == 0
     return read(target)
@@ -92,7 +92,7 @@ def test_every_message_passes_through_as_it_is(tmp_path: Path, distribution: str
 
 # --- bursts and software ---------------------------------------------------------------------------------------------
 
-# 'low' has begun when the accelerator gives its answer to 'high'.
+# 'low' is being sent when the accelerator responds to 'high'.
 FORKED = """\
 project: {name: forked, width: 8, scheduler: fixed_priority_preemptive, shortestRun: 2}
 accelerators:
@@ -147,7 +147,7 @@ def test_a_system_answers_the_same_wherever_a_block_is(tmp_path: Path, builds: P
 
 
 def test_messages_that_only_the_bag_defines(tmp_path: Path, builds: Path) -> None:
-    """The specification names the bag: simulator and replay find the same messages."""
+    """The specification lists the bag, so simulator and replay find the same messages."""
     bag = record(tmp_path, "ros1", {"odd_msgs/msg/Odd": TEXT + POINT}, count=3, size=28)
     message = "middleware: ROS, message: odd_msgs/Odd"
     blocks = f"""
