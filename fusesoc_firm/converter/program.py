@@ -184,7 +184,7 @@ class Program:
 
     @cached_property
     def _openings(self) -> dict[int, int]:
-        """The place of each part's `Open`, by the part's identity, since comparing two parts compares their whole contents."""
+        """The place of each part's `Open`, by the part's identity, since comparing parts compares their contents."""
         return {id(step.part): place for place, step in enumerate(self.steps) if isinstance(step, Open)}
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Names that a field's port must not have, since the templates declare or use them; they are read from the templates."""
+"""Names that no port of a field may have, since the templates declare or use them; they are read from the templates."""
 
 from __future__ import annotations
 

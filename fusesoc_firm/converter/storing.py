@@ -71,7 +71,7 @@ def store_names(stores: Sequence[Store]) -> list[str]:
 
 
 def store_data(register: str, store: Store, source: str) -> list[str]:
-    """The next value of a store's register at a beat, highest bits first: its lanes of `source`, then its older content."""
+    """The next value of a store's register at a beat, highest bits first: its lanes of `source`, then older content."""
     data = [bits(source, 8 * last + 7, 8 * first) for first, last in reversed(ranges(store.lanes))]
     return data if len(store.beats) == 1 else [*data, bits(register, store.bits - 1, store.beat_bits)]
 

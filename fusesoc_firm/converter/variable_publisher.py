@@ -164,7 +164,7 @@ class _Publisher:
     # --- what a place waits for, and how many bytes it has ------------------------------------------------------
 
     def _supplies(self) -> Iterator[tuple[int, Configuration]]:
-        """(last place, the inputs that the places up to it wait for); the last place of an element has its `valid` too."""
+        """(last place, the inputs that the places up to it wait for); an element's last place also has its `valid`."""
         yield 0, {"signal": "segment_valid(0)", "element": ""}
         for area in self.places.areas:
             signal = self._supply(area.step)
@@ -196,7 +196,7 @@ class _Publisher:
         return ports.valid if ports.segments is None else f"{ports.segment_valid}({segment.number})"
 
     def _sizes(self) -> Iterator[tuple[int, Configuration]]:
-        """(last place, bytes of each place up to it); streams and padding, which determine their own sizes, are left out."""
+        """(last place, bytes of each place up to it), without streams and padding, which determine their own sizes."""
         for area in self.places.areas:
             if isinstance(area.step, Stream | Padding):
                 continue

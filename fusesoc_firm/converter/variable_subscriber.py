@@ -208,7 +208,7 @@ class _Subscriber:
             }
 
     def _loop(self, place: int) -> Configuration:
-        """The end of a loop's element: with its last bytes, or in a separate cycle if a variable part or array ends it."""
+        """The end of a loop's element: with its last bytes, or in a separate cycle after a variable part or array."""
         step = self.steps[place]
         assert isinstance(step, Close)
         return {
