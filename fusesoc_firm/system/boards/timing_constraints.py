@@ -17,7 +17,7 @@ Configuration = dict[str, Any]
 
 
 def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Configuration:
-    """The configuration; `clock` is the frequency of clk in Hz. A processor has names of its own for its clocks."""
+    """The configuration; `clock` is the frequency of clk in Hz, and a processor names its clocks itself."""
     clocks = [("clk", clock), *((item.port, item.frequency) for item in system.clocks)]
     if board.processor:
         name = PROCESSORS[str(board.processor)].timing_clock

@@ -1,4 +1,4 @@
-"""A first version of an accelerator that has no source yet: the ports that its messages imply, and zeros as answers."""
+"""A first version of an accelerator without a source: the ports for its messages, and zeros as responses."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _FUNCTION_TEMPLATE = "hls/skeleton.cpp"
 _SOFTWARE_TEMPLATE = "python/skeleton.py"
 
 
-# What the architecture or module declares; a pin may have such a name.
+# Names that the architecture or module declares; a pin may have such a name.
 _SIGNALS = ("is_there", "is_sent", "sent_r", "done")
 
 
 @dataclass(frozen=True)
 class _Language:
-    """How a language of hardware declares ports."""
+    """The syntax of port declarations in a hardware language."""
 
     template: str
     directions: tuple[str, str]
@@ -62,11 +62,11 @@ _LANGUAGES = {
 
 
 def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
-    """A text for the first source of each accelerator none of whose sources is in `folder`."""
+    """A text for the first source of each accelerator that has no source file in `folder`."""
     texts = {}
     for type_ in (*system.accelerator_types, *system.software.types):
         paths = [folder / source for source in type_.accelerator.sources]
-        # Software elsewhere has none.
+        # Software in another program has no sources.
         if paths and not any(path.exists() for path in paths):
             texts[paths[0]] = skeleton(type_)
     return texts
@@ -126,7 +126,7 @@ def _entity(type_: AcceleratorType, language: _Language) -> Configuration:
 def _declarations(
     type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin], language: _Language
 ) -> list[Configuration]:
-    """The ports of each side, and the pins, as the entity or module declares them."""
+    """The port declarations of all sides and pins for the entity or module."""
     groups = [
         (
             f"{side.frame.message}",
@@ -159,7 +159,7 @@ def _declarations(
 
 
 def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Configuration:
-    """What an output does: its handshake with the message, the length of a message of zeros, zeros for the rest."""
+    """The assignments of an output: its handshake, the length of a message of zeros, and zeros elsewhere."""
     counts = _counts(side, number)
     by_name = {f"{side.prefix}{port.name}": port for port in ports}
     length = f"{side.prefix}{PAYLOAD_LENGTH}"
@@ -188,7 +188,7 @@ def _length(port: str, side: MessageSide) -> Configuration:
 
 
 def _counts(side: MessageSide, number: int) -> list[Configuration]:
-    """The arrays of fixed size that output `number` sends; their elements are counted, as the last one is marked."""
+    """The arrays of fixed size in output `number`; their elements are counted to mark the last one."""
     if side.frame.is_fixed_size:
         return []
     ports = message_side(side.frame)
@@ -211,7 +211,7 @@ def _counts(side: MessageSide, number: int) -> list[Configuration]:
 
 
 def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
-    """The arrays of fixed size that a message of zeros has elements of: no other array is around them."""
+    """The arrays of fixed size in a message of zeros; arrays of variable size are empty and are not searched."""
     for node in nodes:
         if isinstance(node, Loop) and node.is_used and node.count and has_bytes(node):
             yield node
@@ -219,7 +219,7 @@ def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
 
 
 def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> list[str]:
-    """The streams and elements of inputs, which must be taken to their ends."""
+    """The streams and elements of inputs, which must be read to their ends."""
     return [
         f"{side.prefix}{port.name}"
         for side in inputs
