@@ -96,7 +96,7 @@ class MessageSide:
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with its messages resolved; its streams have `width` bits, a generic of it if `has_width`."""
+    """An accelerator with its messages resolved; its streams have `width` bits, its WIDTH if `has_width` is set."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]

@@ -211,7 +211,7 @@ def _counts(side: MessageSide, number: int) -> list[Configuration]:
 
 
 def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
-    """The arrays of fixed size in a message of zeros; arrays of variable size are empty and are not searched."""
+    """The arrays of fixed size in a message of zeros; arrays of variable size are empty and need no search."""
     for node in nodes:
         if isinstance(node, Loop) and node.is_used and node.count and has_bytes(node):
             yield node
