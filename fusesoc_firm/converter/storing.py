@@ -11,13 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
-from typing import Any
 
 from fusesoc_firm.converter.slices import Slice
 from fusesoc_firm.converter.stream import Store, StoreMap, ranges
 from fusesoc_firm.converter.vhdl import bits, within
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 # A table takes less logic (45 LUTs and 1.3 a window, against 40 and 2.3 for comparisons at 8 bits) if both windows and
 # beats are many: with few beats, the comparisons reduce to a small function of the counter.
@@ -39,9 +37,9 @@ def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
     return used if len(parts) == 1 else f"{used} and {is_beat(store.beats[0], store.beats[-1])}"
 
 
-def store_configuration(stores: Sequence[Store]) -> Configuration:
+def store_configuration(stores: Sequence[Store]) -> Context:
     """The partials' configuration for `stores`, in the form of `stores_of`."""
-    tables: list[Configuration] = []
+    tables: list[Context] = []
     enables: list[list[str]] = []
     for _, group in groupby(stores, lambda store: store.lanes):
         parts = list(group)
@@ -76,7 +74,7 @@ def store_data(register: str, store: Store, source: str) -> list[str]:
     return data if len(store.beats) == 1 else [*data, bits(register, store.bits - 1, store.beat_bits)]
 
 
-def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> Iterator[Configuration]:
+def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> Iterator[Context]:
     """The pieces of a port's slice that are contiguous in a store, for the partial `stored_field`."""
     low = piece.low
     for stored in places.pieces(piece.offset, piece.bytes):
@@ -92,7 +90,7 @@ def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> I
         low += 8 * stored.count
 
 
-def _table(windows: Sequence[tuple[int, int]]) -> Configuration:
+def _table(windows: Sequence[tuple[int, int]]) -> Context:
     """The table of beats after which a window begins or ends, with a pointer to the next of them."""
     turns = [beat for first, last in windows for beat in (first - 1, last)]
     # A window that begins with the first beat is open from the start.

@@ -6,7 +6,8 @@ If the system's pins are connected to an environment, an entity contains both, s
 from __future__ import annotations
 
 from fusesoc_firm.system.derived.model import DerivedSystem
-from fusesoc_firm.system.hardware.configuration import Configuration, top_level_pins
+from fusesoc_firm.system.hardware.configuration import top_level_pins
+from fusesoc_firm.text.render import Context
 
 VERILOG_BENCH_TEMPLATE = "verilog/test_bench.v"
 ENVIRONMENT_TEMPLATE = "vhdl/in_environment.vhd"
@@ -21,8 +22,8 @@ def translated_unit(system: DerivedSystem, *, has_environment: bool) -> str:
 
 
 def verilog_bench_configuration(
-    bench: Configuration, system: DerivedSystem, frames: int = 0, beats: int = 0, *, has_environment: bool
-) -> Configuration:
+    bench: Context, system: DerivedSystem, frames: int = 0, beats: int = 0, *, has_environment: bool
+) -> Context:
     """The configuration of the test bench, which includes the configuration `bench` of the VHDL test bench.
 
     Each file has space for `frames`; `beats` limits the beats that wait for the ends of their frames.
@@ -36,7 +37,7 @@ def verilog_bench_configuration(
     }
 
 
-def _open_pins(system: DerivedSystem) -> list[Configuration]:
+def _open_pins(system: DerivedSystem) -> list[Context]:
     """The pins of a system without an environment; inputs are low."""
     names = top_level_pins(system)
     return [
