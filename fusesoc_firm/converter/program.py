@@ -6,7 +6,7 @@ steps:
     Header              the payload's length
     Block               bytes of known arrangement
     Padding             padding that depends on the position
-    Count, Guard, Open  a part's number of elements; a test whether its padding exists; its beginning
+    Count, Guard, Open  a part's number of elements; a skip of its padding if empty; its beginning
     Stream              the elements of a string or an array of numbers
     Close               the end of an element of an array of messages or strings
     Tail                the unused rest of the payload
@@ -257,7 +257,7 @@ class _Builder:
                 case Data() | Loop():
                     self._constant(node, node.default)
 
-    # --- what the message has -----------------------------------------------------------------------------------
+    # --- parts of the message -----------------------------------------------------------------------------------
 
     def _fixed(self, node: Fixed) -> None:
         start = self.block.size
@@ -315,7 +315,7 @@ class _Builder:
         if part.is_used:
             self._close_segment()
 
-    # --- what a publisher sends for what it has no ports for ----------------------------------------------------
+    # --- constants for unused parts -----------------------------------------------------------------------------
 
     def _constant(self, node: Data | Loop, value: Any) -> None:
         if isinstance(node, Data):

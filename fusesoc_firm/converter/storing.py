@@ -1,9 +1,9 @@
 """The configuration of stores, for the partials `store_signals`, `store_enables`, `store_beats` and `store_resets`.
 
 A template that includes these partials counts the beats in `position_r`, in the same way as the stores. Its signal
-`is_first` identifies beat 0, regardless of the count. It includes `store_beats` where it accepts a beat. Comparisons
-with the ends of its windows enable a store. If the windows are many, a table holds their ends instead, and a pointer
-advances through it.
+`is_first` identifies beat 0, regardless of the count. The template includes `store_beats` where it accepts a beat.
+Comparisons with the ends of its windows enable a store. If the windows are many, a table holds their ends instead, and
+a pointer advances through it.
 """
 
 from __future__ import annotations

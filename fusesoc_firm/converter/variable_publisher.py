@@ -159,7 +159,7 @@ class _Publisher:
         for piece in slices_of(FieldPort(port.name, port.width, leaf)):
             yield Slice(port, piece.low + leaf.first * leaf.type.bits, piece.width, piece.offset, piece.bytes)
 
-    # --- what a place waits for, and how many bytes it has ------------------------------------------------------
+    # --- inputs and sizes of places -----------------------------------------------------------------------------
 
     def _supplies(self) -> Iterator[tuple[int, Context]]:
         """(last place, the inputs that the places up to it wait for); an element's last place also has its `valid`."""
@@ -353,7 +353,7 @@ class _Publisher:
         }
 
 
-# --- what a step is --------------------------------------------------------------------------------------------------
+# --- properties of steps -------------------------------------------------------------------------------------------------
 
 
 def _part(area: Area) -> Data | Loop:

@@ -1,4 +1,4 @@
-"""Figures as pictures, drawn by matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
+"""Draws figures with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
 
 from __future__ import annotations
 

@@ -293,7 +293,7 @@ class _Analysis:
             )
 
     def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
-        """The topics of all converters, and of software elsewhere; `names` are the names of its messages."""
+        """The topics of all converters and of software in other programs; `names` are its messages' names."""
         for name, block in self.blocks.items():
             is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
             if block.type is not None and not is_elsewhere:
