@@ -11,7 +11,7 @@ SYSTEM ?= robot:sys:quat2euler
 # For make bitstream: a target of SYSTEM.
 BOARD ?= ulx3s
 FUSESOC_OPTIONS ?=
-# The test bench's seed of random stalls; empty is the one of the system's .core.
+# The seed of the test bench's random stalls; if empty, the seed in the system's .core applies.
 SEED ?=
 # WAVES=1 writes waves.ghw into the build folder and prints its path.
 WAVES ?=
@@ -19,42 +19,43 @@ WAVES ?=
 SIM_OPTIONS ?=
 # The system's target: sim, sim_icarus, sim_verilator.
 TARGET ?= sim
-# Pythons for make matrix, beside those on PATH and pyenv's, such as PYTHONS=/opt/python3.14/bin/python3
+# Pythons for make matrix, in addition to those on PATH and pyenv's, such as PYTHONS=/opt/python3.14/bin/python3
 PYTHONS ?=
-# Programs that a target needs beside those of all.
+# Programs that a target needs in addition to the common ones.
 TOOLS :=
-# Edalize's flows that end in a bitstream; what the open ones need from PyPI is an extra of the same name.
+# Edalize's flows that end in a bitstream; the PyPI packages of each open one are an extra of the same name.
 OPEN_FLOWS := apicula icestorm trellis
 BITSTREAM_FLOWS := $(OPEN_FLOWS) quartus vivado
-# Where `make corpus` finds message definitions, in the folders ros1 and ros2, and further options of its command.
+# The folder of message definitions for `make corpus`, with folders ros1 and ros2, and further options of its command.
 CORPUS ?= ../shared/corpus
 VERIFY_OPTIONS ?=
-# Parts of the bench, all if empty, such as BENCH='area cycles'; BENCH=--help lists them.
+# Parts of the bench, such as BENCH='area cycles'; if empty, all run. BENCH=--help lists them.
 BENCH ?=
-# Options and pages for make docs, such as DOCS=--update or DOCS=README.md; all pages if none is named.
+# Options and pages for make docs, such as DOCS=--update or DOCS=README.md; without pages, all are processed.
 DOCS ?=
 # Options for pytest, such as PYTEST_OPTIONS='-k store -x'.
 PYTEST_OPTIONS ?= -n auto --dist loadgroup
-# What tests run beside Python.
+# Programs other than Python that tests run.
 TEST_TOOLS := ccache iverilog verilator yosys dot:graphviz tclsh:tcl rosbag:python3-rosbag
 
-# With `=`, since the value begins with a dash. FuseSoC adds these to the sim_options of the core, which are GHDL's.
+# Option and value are joined by `=`, since the value begins with a dash. FuseSoC appends these options to the core's
+# sim_options, which are GHDL's.
 SIM_FLAGS = $(strip $(if $(SEED),-gSEED=$(SEED)) $(if $(WAVES),--wave=waves.ghw) $(SIM_OPTIONS))
-# Of a failed run, too.
+# The path of the waves is printed after a failed run, too.
 SAY_WAVES = $(if $(WAVES),trap 'ls -t build/*/sim/waves.ghw | sed -n "1s/^/waves: /p"' EXIT;)
 # A host in Verilog takes its seed from FuseSoC.
 RUN_FLAGS = $(if $(filter sim,$(TARGET)),$(if $(SIM_FLAGS),--sim_options="$(SIM_FLAGS)"),$(if $(WAVES),$(error WAVES=1 is for GHDL, TARGET=sim))$(if $(SEED),--SEED=$(SEED)) $(SIM_OPTIONS))
 
-# What a node and its peers need of ROS 1, as Debian has it: programs and libraries, and modules of its own Python.
+# ROS 1 for a node and its peers, from Debian: programs, libraries, and modules of Debian's own Python.
 DEBIAN_MODULES := /usr/lib/python3/dist-packages
 ROS1 := pkg-config rosmaster:python3-rosmaster /usr/include/ros/ros.h:libroscpp-dev \
   $(foreach name,rospy std_msgs geometry_msgs sensor_msgs,$(DEBIAN_MODULES)/$(name):python3-$(subst _,-,$(name)))
 
-# Designs of make fuzz-netlist, and further options, such as FUZZ_OPTIONS='--judges icarus'.
+# The number of designs for make fuzz-netlist, and further options, such as FUZZ_OPTIONS='--judges icarus'.
 DESIGNS ?= 10000
 FUZZ_OPTIONS ?=
 
-# Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip leaves out why it failed.
+# Install a package: pip install $(2), with the pip of an environment, $(1). With --quiet, pip would hide error messages.
 pip_install = $(1)/bin/pip install --disable-pip-version-check $(2) >$(1)/pip.log 2>&1 || \
   { cat $(1)/pip.log >&2; echo "pip could not install $(2); its message is above." >&2; exit 1; }
 
@@ -64,7 +65,7 @@ help: ## List the targets
 	@echo "Usage: make TARGET [VARIABLE=VALUE ...]"
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-# Without what make and Edalize say about folders, the result is the last line.
+# Without the messages of make and Edalize about folders, the last line is the result.
 sim: $(VENV)/.installed ## Simulate SYSTEM (robot:sys:quat2euler); TARGET=sim_verilator, SEED=N, WAVES=1, SIM_OPTIONS='...'
 	@$(BIN)/python .ci/check_target.py $(SYSTEM) $(TARGET) sim >/dev/null
 	@./.ci/install-tools $(subst icarus,iverilog,$(patsubst sim_%,%,$(filter sim_%,$(TARGET)))) >/dev/null
@@ -85,7 +86,7 @@ docs: tools $(VENV)/.extra-docs ## Run the commands of the pages, build their si
 	@$(BIN)/zensical build --clean --strict
 	@echo "The site: build/docs/index.html"
 
-# Both are there for some of the tests, which are skipped without them.
+# Some tests need both, and are skipped without them.
 ros: $(VENV)/.ros2
 	@./.ci/install-tools $(ROS1) >/dev/null || echo "No ROS 1: the tests with it are skipped" >&2
 
@@ -133,7 +134,7 @@ lint: setup $(VENV)/.extra-lint ## Check style and types: Python, and VHDL, also
 	@$(BIN)/mypy
 	@$(BIN)/python .ci/lint_vhdl.py
 
-# All extras, since all are listed.
+# All extras, since all of them are listed.
 licences: $(addprefix $(VENV)/.extra-,$(shell awk '/^\[/ { inside = /optional-dependencies/ } inside && /^[a-z]+ = / { print $$1 }' pyproject.toml))
 licences: TOOLS = $(TEST_TOOLS)
 licences: tools ros ## List what the project depends on and under which licences, in docs/reference/licences.md
@@ -144,8 +145,8 @@ setup: tools $(VENV)/.extra-test ## Install what the other targets need: program
 tools:
 	@./.ci/install-tools $(TOOLS) >/dev/null
 
-# Installed again when the dependencies change. FUSESOC_IGNORE: no folder of ours but the library is to be searched for
-# cores, even if somebody adds the whole checkout.
+# Installed again when the dependencies change. FUSESOC_IGNORE: even if a user adds the whole checkout, FuseSoC must
+# search only the library for cores.
 $(VENV)/.installed: pyproject.toml | tools
 	@test -x $(BIN)/pip || "$$(./.ci/install-tools)" -m venv --clear $(VENV)
 	@touch $(VENV)/FUSESOC_IGNORE
@@ -153,14 +154,14 @@ $(VENV)/.installed: pyproject.toml | tools
 	@$(call pip_install,$(VENV),--editable .)
 	@touch $@
 
-# What a target needs beside: an extra of pyproject.toml.
+# A target's further dependencies: an extra of pyproject.toml.
 $(VENV)/.extra-%: $(VENV)/.installed
 	@echo "Installing Python packages for '$*' into $(VENV)"
 	@$(call pip_install,$(VENV),--editable '.[$*]')
 	@touch $@
 
-# ROS 2 as wheels, and the libpython that some of their libraries expect in the process. They have a venv of their own, as
-# they fill it with libraries and headers.
+# ROS 2 as wheels, and the libpython that some of their libraries expect in the process. The wheels have a venv of
+# their own, since they fill it with libraries and headers.
 $(VENV)/.ros2: tests/ros/ros2.txt $(VENV)/.installed
 	@echo "Installing ROS 2 into $(VENV)/ros2"
 	@python=$$(./.ci/install-tools) && "$$python" -m venv --clear $(VENV)/ros2 && \

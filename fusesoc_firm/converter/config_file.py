@@ -1,6 +1,6 @@
 """FIRM's configuration file: the messages of a project and the names of their interfaces (dissertation, listing 5.1).
 
-This is the one source of its grammar. An interface is a converter under the name that its user gives it.
+This module is the single source of the file's grammar. An interface is a converter under a name that its user chooses.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 
 @dataclass(frozen=True)
 class Platform(Section):
-    """What the hardware is for; a converter is the same for all."""
+    """The target platform; it does not affect the converters."""
 
     board: Text | None = key("the board's name")
     fpga_part: Text | None = key("the FPGA's part number", name="FPGA", aliases=("fpgaPart",))
@@ -26,7 +26,7 @@ class Platform(Section):
 
 @dataclass(frozen=True)
 class Project(Section):
-    """What holds for all messages."""
+    """The settings of all messages."""
 
     name: Text = key("the project's name", is_required=True)
     platform: Platform | None = key("the target hardware", form="section", section=Platform)
@@ -36,7 +36,7 @@ class Project(Section):
 
 @dataclass(frozen=True)
 class MessageInterfaces(Section):
-    """A message and the converters that are wanted of it."""
+    """A message and its wanted converters."""
 
     type: Text = key("the middleware that defines the message", is_required=True, choices=tuple(MIDDLEWARES))
     name: Text = key("the message's type, such as sensor_msgs/Image", is_required=True)
@@ -55,9 +55,9 @@ class ConfigFile(Section):
 
 
 def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
-    """The configuration in a file, with all that is wrong in it noted.
+    """The configuration in a file, with all its faults noted.
 
-    Raises `InputError` if the file cannot be read, is empty, or is no YAML from the start.
+    Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
     text = read_yaml(path, str(path), faults)
     if text.root is None or is_null(text.root):
@@ -69,7 +69,7 @@ def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
 
 
 def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
-    """Every message has an interface, and every interface a name that an entity can have alone."""
+    """Check that each message has an interface, and each interface a unique name that is legal for an entity."""
     prefix = config.project.prefix
     if prefix is not None and not is_prefix(prefix):
         faults.error(f"no entity can be called '{prefix}_axis_to_...'", prefix.source, PREFIX_RULE)

@@ -1,7 +1,7 @@
-"""Frame -> template configuration: plain dictionaries that the VHDL templates only have to fill in.
+"""Frame -> template configuration: plain dictionaries that fill in the VHDL templates.
 
-All numbers that a converter needs are computed here (dissertation, listing 5.4): a template holds no
-arithmetic and no choice beyond 'is this there'.
+All numbers that a converter needs are computed here (dissertation, listing 5.4). A template has no arithmetic, and its
+only conditions test whether something is present.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ from fusesoc_firm.text.render import Context
 
 SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
-# VHDL counts the bits of a publisher's frame, and of up to three bytes in front of it, up to 2**31-1.
+# VHDL counts the bits of a publisher's frame, with up to three bytes before it, up to 2**31-1.
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
-# A position tells 2**3 states that are no beats; while a message waits, the next beat is the first one.
+# The position encodes 2**3 states that are not beats; while a message waits, the next beat is the first one.
 _STATE_BITS = 3
-# Bytes of a literal in a line.
+# Bytes of a literal on one line.
 _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
 
 
 def subscriber_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
-    """`<prefix>_axis_to_<pkg>_<type>`; a suffix tells converters of other fields apart, a prefix those of a core."""
+    """`<prefix>_axis_to_<pkg>_<type>`; a suffix identifies the selection of fields, a prefix the core."""
     return prefixed(prefix, f"axis_to_{entity_name(frame.message.package, frame.message.name)}{suffix}")
 
 
 def publisher_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
-    """`<prefix>_<pkg>_<type>_to_axis`; a suffix tells converters of other fields apart, a prefix those of a core."""
+    """`<prefix>_<pkg>_<type>_to_axis`; a suffix identifies the selection of fields, a prefix the core."""
     return prefixed(prefix, f"{entity_name(frame.message.package, frame.message.name)}_to_axis{suffix}")
 
 
 def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Context:
-    """The configuration of `entity`, or else `subscriber_entity`, for a stream of `width` bits."""
+    """The configuration of `entity` (default: `subscriber_entity`) for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -66,9 +66,9 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
 
 
 def _states(last_position: int) -> Context:
-    """The values of the position that are no beats: as few highest bits as can tell them are ones.
+    """The values of the position that are not beats; they share the shortest prefix of ones that no beat has.
 
-    Below these, bit 2 tells whether the frame has ended, bits 1 and 0 hold a code.
+    Below this prefix, bit 2 tells whether the frame has ended; bits 1 and 0 hold a code.
     """
     bits = max(_STATE_BITS + 1, (last_position + 2**_STATE_BITS).bit_length())
     ones = next(count for count in range(1, bits) if last_position < 2**bits - 2 ** (bits - count))
@@ -84,7 +84,7 @@ def _states(last_position: int) -> Context:
 
 
 def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Context:
-    """The configuration of `entity`, or else `publisher_entity`, for a stream of `width` bits."""
+    """The configuration of `entity` (default: `publisher_entity`) for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -95,7 +95,7 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
     return {
         **_common(frame, stream, entity or publisher_entity(frame), "in"),
         "first_position": start,
-        # What is in front of the frame.
+        # The bytes before the frame.
         "start_bits": start * width,
         "start_zeros": hexadecimal(bytes(start)) if start else "",
         "last_position": start + beats - 1,
@@ -108,15 +108,16 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
 
 
 def _first_position(stream: Stream) -> int:
-    """Where a publisher's position starts: at 8 bits so that the payload's bytes begin at a multiple of four.
+    """A publisher's first position; at 8 bits, it aligns the payload's first byte to a multiple of four.
 
-    Four of them share a LUT of the multiplexer, and the constant bytes in front need none; a third less in all.
+    Then four payload bytes share a LUT of the multiplexer, and the constant bytes before them need none. This saves a
+    third of the LUTs.
     """
     return -(ID_BYTES + LENGTH_BYTES) % 4 if stream.lanes == 1 else 0
 
 
 def check_width(width: int) -> None:
-    """Raise `InputError` for a stream of a width that converters do not have."""
+    """Raise `InputError` if converters do not support a stream of this width."""
     if width not in WIDTHS:
         fail(f"no converter is made for a stream of {width} bits", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
 
@@ -145,10 +146,10 @@ def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Contex
 
 
 def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
-    """The beats that carry the length, and for each legal length the bytes that it has there.
+    """The beats that carry the length, with the bytes of each legal length in them.
 
-    Legal are the payload's own length and, where writers append bytes, a few more. Bit k of `match` is high as long as
-    the length can be the one with k more.
+    The legal lengths are the payload's own length and, where writers append bytes, a few larger ones. Bit k of `match`
+    is high while the length can still be the payload's own length plus k.
     """
     places = range(stream.length_start, stream.length_start + LENGTH_BYTES)
     beats = sorted({stream.beat(byte) for byte in places})
@@ -166,7 +167,7 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
 
 
 def _length_checks(length: int, beat: int, stream: Stream) -> list[Context]:
-    """The bytes of a length on a beat; any that is there and another one rules the length out."""
+    """The checks of a length's bytes on a beat; a byte that is present and differs rules the length out."""
     return [
         _byte_check(stream, stream.length_start + index, byte)
         for index, byte in enumerate(length.to_bytes(LENGTH_BYTES, "little"))
@@ -179,7 +180,7 @@ def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
 
 
 def _byte_check(stream: Stream, byte: int, value: int) -> Context:
-    """That a byte of the stream has a value; it is there if its lane is kept."""
+    """The check that a byte of the stream has a value; the byte is present if its lane's `tkeep` is set."""
     lane = stream.lane(byte)
     return {
         "beat": is_beat(stream.beat(byte), stream.beat(byte)),
@@ -191,7 +192,7 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Context:
 
 
 def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
-    """Where a frame ends, of which bit `number` of `match` tells the length; None if there is but one length."""
+    """The end of a frame whose length sets bit `number` of `match`; None if there is only one legal length."""
     lane = stream.lane(last_byte)
     return {
         "number": number,
@@ -202,16 +203,16 @@ def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
 
 
 def _field_slices(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Context]:
-    """Every piece of a port that lies in one piece in a store."""
+    """The pieces of a port that are contiguous in a store."""
     places, registers = StoreMap(stream, stores), [f"fields{suffix}_r" for suffix in store_names(stores)]
     slices = (piece for port in field_ports(frame) for piece in slices_of(port))
     return [stored for piece in slices for stored in stored_slices(piece, places, registers)]
 
 
 def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Context]:
-    """The parts of a frame behind its id, and the value of each: bits are counted from `start` bytes before the frame.
+    """The parts of a frame after its id, with their values; bits count from `start` bytes before the frame.
 
-    These are header, constant bytes, fields, and zeros up to `size` bytes.
+    The parts are header, constant bytes, fields, and zeros up to `size` bytes.
     """
     header = ID_BYTES + LENGTH_BYTES
     constants = [
@@ -231,14 +232,15 @@ def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Context]:
 
 
 def _literal(data: bytes) -> str:
-    """Bytes as a VHDL literal, the first one lowest; many zeros in short."""
+    """Bytes as a VHDL literal, the first byte lowest; long runs of zeros are abbreviated."""
     return hexadecimal(data) if any(data) or len(data) <= _ROW else "(others => '0')"
 
 
 def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:
-    """The parts of the payload that no port drives, with what a publisher sends there.
+    """The parts of the payload that no port drives, with the bytes that a publisher sends there.
 
-    This is the prefix, the defaults of fields that are not used, else zeros; in rows, and long runs of zeros at once.
+    These bytes are the prefix, the defaults of unused fields, and zeros elsewhere. They are split into rows; a long run
+    of zeros is a single part.
     """
     payload = default_payload(frame)
     cursor = 0

@@ -1,7 +1,7 @@
-"""Message -> configuration of its VHDL package: the signature, and the constants as converters' ports have such values.
+"""Message -> configuration of its VHDL package: the signature, and the constants in the types of converters' ports.
 
-A message of ROS has no other enumerations than its constants. Those of the messages within it are in the package too,
-behind their message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
+ROS messages have no enumerations other than their constants. The package also has the constants of nested messages,
+prefixed with their message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
 """
 
 from __future__ import annotations
@@ -32,37 +32,37 @@ _QUOTE = '"'
 
 @dataclass(frozen=True)
 class _Placed:
-    """A constant and the message within the package's one that defines it, or None if that one does."""
+    """A constant with the nested message that defines it, or None if the package's own message does."""
 
     message: MessageName | None
     constant: Constant
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What its name in VHDL is made of."""
+        """The words of its name in VHDL."""
         return (self.constant.name,) if self.message is None else (self.message.name, self.constant.name)
 
     @property
     def comment(self) -> str:
-        """Its type and its name in ROS, and the value of a number: `uint8 sensor_msgs/PointField.INT8=1`."""
+        """Its type and ROS name, with the value of a number: `uint8 sensor_msgs/PointField.INT8=1`."""
         owner = "" if self.message is None else f"{self.message}."
         named = f"{self.constant.type} {owner}{self.constant.name}"
         return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
 
 
 def constants_package(name: MessageName, ros: Middleware | None = None, prefix: str = "") -> str:
-    """`<prefix>_<pkg>_<type>_pkg`, or `..._ros<N>_pkg` where packages of both versions lie side by side."""
+    """`<prefix>_<pkg>_<type>_pkg`, or `..._ros<N>_pkg` where packages of both ROS versions coexist."""
     version = [] if ros is None else [f"ros{ros.number}"]
     return prefixed(prefix, "_".join([entity_name(name.package, name.name), *version, "pkg"]))
 
 
 def constants_configuration(name: MessageName, definitions: Definitions, package: str) -> dict[str, Any]:
-    """The configuration of a message's package; `definitions` hold the message and all within it."""
+    """The configuration of a message's package; `definitions` hold the message and all nested messages."""
     placed = list(_placed(name, definitions))
     texts = [item for item in placed if isinstance(item.constant.type, StringType)]
     numbers = [item for item in placed if not isinstance(item.constant.type, StringType)]
     parts = [(*item.words, part) for item in texts for part in ("length", "bytes")]
-    # What a text adds gives way to what the definition names.
+    # Names from the definition take precedence over names added for texts.
     names = distinct_constants([*(item.words for item in (*numbers, *texts)), *parts], [SIGNATURE])
     values, heads = names[: len(numbers)], names[len(numbers) : len(placed)]
     lengths, contents = names[len(placed) :: 2], names[len(placed) + 1 :: 2]
@@ -81,7 +81,7 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
 
 
 def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
-    """The constants of a message, then of each one within it, once, in the order of the fields."""
+    """The constants of a message, then those of each nested message once, in the order of the fields."""
     messages: list[MessageName] = []
     _collect(name, definitions, messages)
     for message in messages:
@@ -90,7 +90,7 @@ def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
 
 
 def _collect(name: MessageName, definitions: Definitions, found: list[MessageName]) -> None:
-    """Add a message and all within it that were not found yet."""
+    """Add a message and all its nested messages, unless found before."""
     if name in found:
         return
     found.append(name)
@@ -100,7 +100,7 @@ def _collect(name: MessageName, definitions: Definitions, found: list[MessageNam
 
 
 def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
-    """A number or a bool, as the bits that it has at a port."""
+    """A number or a bool as the bits at a port."""
     wire = ros.rules.scalars[str(item.constant.type)]
     digits = struct.pack(f">{wire.code}", item.constant.value).hex()
     is_bit = wire.bits == 1
@@ -113,14 +113,14 @@ def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
 
 
 def _numbers(values: list[dict[str, Any]]) -> dict[str, Any]:
-    """The constants in columns; where a line would get too long, all comments stand above their constants."""
+    """The constants in columns; if a line would be too long, all comments go above their constants."""
     columns = {key: max((len(item[key]) for item in values), default=0) for key in ("name", "type", "value", "comment")}
     aligned = [{**item, **{key: item[key].ljust(columns[key]) for key in ("name", "type")}} for item in values]
     return {"values": aligned, "is_above": sum(columns.values()) + len("  constant  :  := ; -- ") > _LONGEST_LINE}
 
 
 def _text(item: _Placed, names: Sequence[str]) -> list[dict[str, Any]]:
-    """A text three times: as a string, its length, and its bytes as a converter's stream has them."""
+    """The three constants of a text: the string, its length, and its bytes as a converter's stream carries them."""
     characters = str(item.constant.value).encode()
     data = _wire_bytes(item)
     count = len(data) // (WIDE_CHARACTER.size if _is_wide(item) else CHARACTER.size)
@@ -129,7 +129,7 @@ def _text(item: _Placed, names: Sequence[str]) -> list[dict[str, Any]]:
         _declaration(head, f"string(1 to {len(characters)})", _characters(characters.decode("latin-1"))),
         _declaration(length, vhdl_type(8 * COUNT_BYTES), _bytes(count.to_bytes(COUNT_BYTES, "little"))),
     ]
-    if data:  # a vector without bits is more than some tools take
+    if data:  # Some tools reject a vector without bits.
         declarations.append(_declaration(content, vhdl_type(8 * len(data)), _bytes(data)))
     return declarations
 
@@ -139,7 +139,7 @@ def _is_wide(item: _Placed) -> bool:
 
 
 def _wire_bytes(item: _Placed) -> bytes:
-    """The text without what comes before and behind it on the wire."""
+    """The bytes of the text on the wire, without the length before it and the terminator after it."""
     text = str(item.constant.value)
     if not _is_wide(item):
         return text.encode()
@@ -148,7 +148,7 @@ def _wire_bytes(item: _Placed) -> bytes:
 
 
 def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
-    """A constant whose value is `pieces` joined with `&`, on its own line or on several."""
+    """A constant whose value is `pieces` joined with `&`, on one line or several."""
     lines = wrapped(pieces, "&", _LONGEST_EXPRESSION)
     length = len("  constant  :  := ;") + len(name) + len(type_) + len(lines[0])
     return {
@@ -160,10 +160,10 @@ def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
 
 
 def _characters(text: str) -> list[str]:
-    """Pieces that make up a string of Latin-1: `"printable"` and, for any other character, `character'val(10)`."""
+    """Pieces that form a string of Latin-1: `"printable"`, and `character'val(10)` for any other character."""
     runs = groupby(text, key=lambda character: character.isascii() and character.isprintable())
     pieces = [piece for is_printable, run in runs for piece in (_quoted("".join(run)) if is_printable else _codes(run))]
-    # Two characters make a string only with a string in front.
+    # Two characters joined with `&` are a string only if an operand is a string; so an empty one comes first.
     return pieces if pieces and pieces[0].startswith(_QUOTE) else ['""', *pieces]
 
 
@@ -177,7 +177,7 @@ def _codes(characters: Iterable[str]) -> Iterator[str]:
 
 
 def _bytes(data: bytes) -> list[str]:
-    """Pieces that make up a vector, the first byte lowest."""
+    """Pieces that form a vector, the first byte lowest."""
     digits, size = data[::-1].hex(), 2 * _BYTES_A_PIECE
     return [f'x"{digits[first : first + size]}"' for first in range(0, len(digits), size)]
 

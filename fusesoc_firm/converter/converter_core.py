@@ -1,4 +1,4 @@
-"""The generator `firm`: the converters of messages, and the packages of their constants, as a core."""
+"""The generator `firm`: a core with the converters of messages and the packages of their constants."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ VHDL = "vhdlSource-93"
 
 
 def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], str | None]:
-    """Where a request's messages come from, as `MessageLibrary` takes it: folders, environment, distribution."""
+    """The sources of a request's messages, as arguments of `MessageLibrary`: folders, environment, distribution."""
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
@@ -37,7 +37,7 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
 
 
 def load(request: Request) -> LoadedRequest:
-    """The converters that a request asks for. Raises `InputError`."""
+    """The order of a request; raises `InputError`."""
     order = order_of_request(request)
     return LoadedRequest(
         request,
@@ -48,7 +48,7 @@ def load(request: Request) -> LoadedRequest:
 
 
 def converters_core(order: Order) -> GeneratedCore:
-    """The core of an order, its files in the order in which a tool reads them. Raises `InputError`."""
+    """The core of an order, with its files in compilation order; raises `InputError`."""
     files = constants_files([(wanted.message, wanted.definitions) for wanted in order.messages], order.prefix)
     interfaces: dict[str, GeneratedFile] = {}
     for wanted in order.messages:
@@ -62,7 +62,7 @@ def converters_core(order: Order) -> GeneratedCore:
 
 
 def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix: str = "") -> dict[str, GeneratedFile]:
-    """The package of each message, of which none comes twice; the definitions are of it and all within it."""
+    """The package of each message, without duplicates; the definitions are those of the message and nested messages."""
     return {
         path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
         for path, configuration in constants_configurations(messages, prefix)
@@ -72,7 +72,7 @@ def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix:
 def constants_configurations(
     messages: Sequence[tuple[MessageName, Definitions]], prefix: str = ""
 ) -> Iterator[tuple[str, Context]]:
-    """The file of each message's package, and what it is rendered from."""
+    """The file name of each message's package, with the configuration to render it."""
     counts = Counter(name for name, _ in messages)
     for name, definitions in messages:
         package = constants_package(name, definitions[name].ros if counts[name] > 1 else None, prefix)
@@ -96,7 +96,7 @@ def _file(source: ConverterSource) -> GeneratedFile:
 
 
 def order_of_request(request: Request) -> Order:
-    """What the request asks for, be it a message or what a configuration file lists."""
+    """The order of a request, which names either a message or a configuration file."""
     config, ros, width = (request.parameters.get(name) for name in ("config", "ros", "width"))
     if config is not None:
         return order_of_config(request.files_root / str(config), libraries(*library_sources(request)))
@@ -109,7 +109,7 @@ def order_of_request(request: Request) -> Order:
 
 
 def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:
-    """`<name>.vhd` of each name of a converter, whose text is `vhdl`, that is not its own."""
+    """`<name>.vhd` for each further name of a converter; `vhdl` is the converter's text."""
     message = f"{frame.message} ({frame.ros.title})"
     return {
         f"{name}.vhd": GeneratedFile(

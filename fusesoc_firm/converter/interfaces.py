@@ -1,6 +1,6 @@
-"""An interface: a converter under the name that a configuration file gives it, as an entity that only instantiates it.
+"""An interface: an entity that only instantiates a converter, under the name that a configuration file gives it.
 
-Its ports are read from the converter's own text, so the two cannot differ. One converter serves any number of names.
+Its ports are read from the converter's text, so the two cannot differ. A converter can have any number of names.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from fusesoc_firm.text.naming import distinct_identifiers
 
 INTERFACE_TEMPLATE = "vhdl/interface.vhd"
 
-# The templates of converters close a list with `  );` on a line of its own, and declare one name a line.
+# The converters' templates close a list with ` );` on a separate line, and declare one name on each line.
 _LIST = r"^  {} \(\n(.*?)^  \);\n"
 _NAME = re.compile(r"^    (\w+) +: ", re.MULTILINE)
 
 
 def interface_configuration(name: str, converter: str, vhdl: str, message: str) -> dict[str, Any]:
-    """The configuration of the entity `name` around the entity `converter`, whose text is `vhdl`."""
+    """The configuration of the entity `name`, which wraps the entity `converter`; `vhdl` is the converter's text."""
     generics, ports = _declarations(vhdl, "generic"), _declarations(vhdl, "port")
     port_names = _NAME.findall(ports)
     (label,) = distinct_identifiers([("u_converter",)], reserved=port_names)
@@ -35,7 +35,7 @@ def interface_configuration(name: str, converter: str, vhdl: str, message: str) 
 
 
 def _declarations(vhdl: str, kind: str) -> str:
-    """The lines of an entity's list of generics or ports; "" if it has none."""
+    """The lines of an entity's list of generics or ports; "" if the entity has no such list."""
     entity = vhdl.partition("\nentity ")[2].partition("\nend entity;")[0] + "\n"
     found = re.search(_LIST.format(kind), entity, re.MULTILINE | re.DOTALL)
     return found[1] if found else ""

@@ -1,4 +1,4 @@
-"""What no converter is made for."""
+"""The limits of converters of fixed size."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 def check_fixed_size(frame: Frame) -> None:
-    """Raise `InputError` that names every field of variable size."""
+    """Raise `InputError` with all fields of variable size."""
     faults = Diagnostics()
     for part in _variable_parts(frame.nodes):
         faults.error(
@@ -21,7 +21,7 @@ def check_fixed_size(frame: Frame) -> None:
 
 
 def _variable_parts(nodes: Sequence[Node]) -> Iterator[Data | Loop]:
-    """The parts whose own length varies; a fixed array is one only by what it holds."""
+    """The parts of variable length; of a fixed array, the variable parts in its elements."""
     for node in nodes:
         if isinstance(node, Loop) and node.count is not None:
             yield from _variable_parts(node.body)

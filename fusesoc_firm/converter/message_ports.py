@@ -1,13 +1,13 @@
-"""The message side of a converter: every port of a message, of fixed or of variable size.
+"""The message side of a converter: all ports of a message of fixed or variable size.
 
-A subscriber and the publisher of a message have the same ports in opposite directions. Fields are as in `ports`; a
-message of variable size adds, besides its `payload_length`, by the name `f` of the part:
+The subscriber and the publisher of a message have the same ports, in opposite directions. Fields have the ports of
+`ports`. A message of variable size also has `payload_length`, and each part named `f` has these ports:
 
     string, array of numbers    f_length, f_axis_tdata/tkeep/tvalid/tlast/tready
     array of messages           f_length, the ports of an element, f_valid/last/ready
-                                and f_segment_valid where an element has segments of its own
+                                and f_segment_valid if an element has segments of its own
 
-In an array of strings `f` is the array, and `f_element` one of its strings.
+In an array of strings, `f` is the array and `f_element` is one of its strings.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from fusesoc_firm.text.naming import identifier
 LENGTH_BITS = 32
 
 _TEMPLATES = ("vhdl/variable_subscriber.vhd", "vhdl/variable_publisher.vhd")
-# What is numbered in the templates' configurations. With a number behind it no such name is another one.
+# The templates' configurations add numbers to these names; a numbered name never equals another name.
 _NUMBERED = re.compile(r".*_r|closing_\d+|elements_\d+(_[a-z]+)?", re.IGNORECASE)
 _TAKEN = reserved_names(*_TEMPLATES) | SET_NAMES | {"payload_length"}
 
 
 @dataclass(frozen=True)
 class MessagePort:
-    """A port of the message side; `is_reverse` marks what goes against the message: a `ready`."""
+    """A port of the message side; `is_reverse` marks a `ready`, which goes against the direction of the message."""
 
     name: str
     width: int | None
@@ -56,7 +56,7 @@ class StreamPorts:
 
     @property
     def length(self) -> str:
-        """Elements; bytes of a string and units of a wstring, without what closes it."""
+        """The number of elements: bytes of a string or units of a wstring, without its terminator."""
         return f"{self.name}_length"
 
     def axis(self, signal: str) -> str:
@@ -66,9 +66,9 @@ class StreamPorts:
 
 @dataclass(frozen=True)
 class ElementPorts:
-    """The ports of an array of messages or strings: `segments` is None where an element comes in one piece.
+    """The ports of an array of messages or strings; `segments` is None if an element has a single segment.
 
-    Where elements take no bytes there is the length alone.
+    If the elements take no bytes, the only port is the length.
     """
 
     loop: Loop
@@ -77,33 +77,33 @@ class ElementPorts:
 
     @property
     def length(self) -> str:
-        """Elements; an array of fixed size has no such port."""
+        """The number of elements; an array of fixed size has no such port."""
         return f"{self.name}_length"
 
     @property
     def valid(self) -> str:
-        """An element is there, the streams in it are over."""
+        """The element is complete and its streams have ended."""
         return f"{self.name}_valid"
 
     @property
     def last(self) -> str:
-        """It is the last one."""
+        """The element is the last one."""
         return f"{self.name}_last"
 
     @property
     def ready(self) -> str:
-        """It is taken."""
+        """The element is accepted."""
         return f"{self.name}_ready"
 
     @property
     def segment_valid(self) -> str:
-        """Which segments of the element are there."""
+        """One valid bit for each segment of the element."""
         return f"{self.name}_segment_valid"
 
 
 @dataclass(frozen=True)
 class MessageSide:
-    """The ports of the used fields and parts of a message of variable size, in wire order, and where each is found.
+    """The ports of the used fields and parts of a message of variable size, in wire order, with look-ups by node.
 
     `segments` is the width of `segment_valid`.
     """
@@ -113,7 +113,7 @@ class MessageSide:
     by_path: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(compare=False, repr=False)
 
     def field(self, leaf: FrameField) -> FieldPort:
-        """The port of a leaf, of any of its pieces."""
+        """The port of a leaf, or of any piece of it."""
         found = self.by_path["field", leaf.path]
         assert isinstance(found, FieldPort)
         return found
@@ -131,7 +131,7 @@ class MessageSide:
         return found
 
     def length(self, part: Data | Loop) -> str:
-        """The port with a part's number of elements."""
+        """The port that holds a part's number of elements."""
         return self.stream(part).length if isinstance(part, Data) else self.element(part).length
 
 
@@ -144,7 +144,7 @@ def message_side(frame: Frame) -> MessageSide:
 
 
 def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
-    """Every port of the message side but the handshake, in the order of declaration; streams are of `width` bits."""
+    """All ports of the message side except the handshake, in the order of declaration; streams have `width` bits."""
     if frame.is_fixed_size:
         return tuple(MessagePort(port.name, port.width, port.comment) for port in field_ports(frame))
     found = [MessagePort("payload_length", LENGTH_BITS, "bytes of the payload")]
@@ -154,7 +154,7 @@ def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
 
 
 def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[dict[str, str]]:
-    """The message side as port declarations, in `direction` but for those that are reverse."""
+    """The port declarations of the message side, in `direction`; reverse ports get the opposite direction."""
     opposite = {"in": "out", "out": "in"}[direction]
     return [
         {
@@ -174,14 +174,14 @@ def segment_count(frame: Frame) -> int:
 
 @dataclass
 class _Naming:
-    """Gives out names so that no two ports have the same one, in wire order."""
+    """Assigns unique names to ports, in wire order."""
 
     program: Program
     parts: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(default_factory=dict)
     taken: set[str] = field(default_factory=lambda: set(_TAKEN))
 
     def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
-        """Name all parts, also those that are not used: what else is used does not change a name."""
+        """Name all parts, including unused ones, so that a name does not depend on the selection of fields."""
         for node in nodes:
             match node:
                 case Fixed(fields=fields):
@@ -207,7 +207,7 @@ class _Naming:
             self.parts[key] = ports
 
     def name(self, names: Sequence[str], suffixes: Sequence[str]) -> str:
-        """The first of `a_b`, `a_b_2`, `a_b_3`, ... with which no port gets a name that is taken."""
+        """The first of `a_b`, `a_b_2`, `a_b_3`, ... for which no port gets a name that is taken."""
         base = identifier(*names)
         candidate, number = base, 2
         while any(self.is_taken(candidate + suffix) for suffix in suffixes):
@@ -249,7 +249,7 @@ def _words(part: Data | Loop) -> str:
 
 
 def _leaf_ports(side: MessageSide, node: Fixed, done: set[Path]) -> Iterator[MessagePort]:
-    """Each leaf once, though padding may part its elements."""
+    """Each leaf once, even if padding separates its elements."""
     for leaf in node.fields:
         if leaf.count and leaf.is_used and leaf.path not in done:
             port = side.field(leaf)

@@ -1,6 +1,6 @@
-"""What is asked of the generator `firm`: messages, which converters of them, and by what names.
+"""The order to the generator `firm`: messages, the converters wanted for each, and the names of these converters.
 
-It is asked by the parameters of a core, for a message, a service or an action, or by a configuration file.
+An order comes from the parameters of a core, for a message, a service or an action, or from a configuration file.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
-# The directions and the entity of a frame's converter in each.
+# The directions, with the function that names the converter's entity in each.
 ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A message's frame, with the definitions of it and all within it.
+    """A message's frame, with the definitions of the message and all nested messages.
 
-    `interfaces` has a key for each direction of which a converter is wanted, with further names for that converter.
+    `interfaces` has a key for each direction in which a converter is wanted; its value lists additional names for that
+    converter.
     """
 
     frame: Frame
@@ -40,21 +41,21 @@ class Wanted:
 
     @property
     def message(self) -> MessageName:
-        """Its name."""
+        """The name of the message."""
         return self.frame.message
 
     @property
     def ros(self) -> Middleware:
-        """Whose message it is."""
+        """The middleware of the message."""
         return self.frame.ros
 
 
 @dataclass(frozen=True)
 class Order:
-    """All that is wanted: each message once, streams of `width` bits, and the `files` that it was read from.
+    """All wanted messages, each once, with streams of `width` bits and the `files` that they were read from.
 
-    `libraries` are those that the messages were taken from.
-    `prefix` stands before the names of all design units that are not named by the user.
+    `libraries` are the libraries of the messages. `prefix` precedes the names of all design units except those that the
+    user named.
     """
 
     title: str
@@ -71,7 +72,7 @@ class Order:
 
 @dataclass(frozen=True)
 class Selection:
-    """The fields of a message that get ports, as `select` takes them."""
+    """The fields of a message that get ports, in the form that `select` expects."""
 
     include: Paths = field(default_factory=dict)
     exclude: Paths = field(default_factory=dict)
@@ -80,9 +81,10 @@ class Selection:
 def order_of_message(
     text: str, direction: str, width: int, library: MessageLibrary, selection: Selection | None = None
 ) -> Order:
-    """The converters of one message, or of those that the two ends of a service or an action exchange.
+    """The converters of one message, or of the messages that the two ends of a service or an action exchange.
 
-    `direction` is one of `ENTITIES`, or "both"; `selection` is of a single message's fields. Raises `InputError`.
+    `direction` is one of `ENTITIES`, or "both". `selection` selects fields, of a single message only. Raises
+    `InputError`.
     """
     selection = selection or Selection()
     kind, name = parse_full_name(text)
@@ -109,7 +111,7 @@ def _check_no_selection(selection: Selection, text: str) -> None:
 
 
 def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) -> Order:
-    """The converters that a configuration file lists. Raises `InputError` with all faults of the file."""
+    """The converters listed in a configuration file; raises `InputError` with all faults of the file."""
     faults = Diagnostics()
     config = read_config(path, faults)
     found = [(entry, wanted) for entry in config.messages if (wanted := _wanted(entry, libraries, faults))]
@@ -154,7 +156,7 @@ def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
 
 
 def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, faults: Diagnostics) -> None:
-    """A tool keeps one entity or package of each name, so none may be needed for two things."""
+    """Check that no name is needed twice, since a tool keeps one entity or package of each name."""
     owners: dict[str, tuple[str, Frame]] = {}
     for entry, wanted in found:
         package = constants_package(wanted.message, prefix=prefix)

@@ -1,8 +1,8 @@
 """Frame -> configuration of `<pkg>_<type>_length`, which computes a payload's length from the lengths of its parts.
 
-The dissertation's listing 6.5 as hardware, with ROS's own sizes: nothing is sent in front of a nested message, and CDR
-pads. What every element adds does not depend on where it lies, so it is a sum; padding only depends on positions modulo
-the largest alignment, so it is a chain of two or three bits beside that sum.
+This is the dissertation's listing 6.5 as hardware, with ROS's own sizes: nothing precedes a nested message, and CDR
+adds padding. The size of an element does not depend on its position, so the elements are a sum. Padding only depends on
+positions modulo the largest alignment, so it is a chain of two or three bits next to that sum.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _SIGNAL = re.compile(r"[a-z]+_\d+")
 
 @dataclass(frozen=True)
 class Statement:
-    """An assignment of a sum to an unsigned signal for values below `modulus`, called by a word and a number.
+    """An assignment of a sum to an unsigned signal for values below `modulus`; a word and a number name the signal.
 
-    The sum is that of `operands` and `constant`. If it is `counted`, it is zero where that operand is.
+    The sum consists of `operands` and `constant`. If `counted` is set, the sum is zero while that operand is zero.
     """
 
     word: str
@@ -46,28 +46,28 @@ class Statement:
 
     @property
     def bits(self) -> int:
-        """The signal's bits."""
+        """The width of the signal."""
         return self.modulus.bit_length() - 1
 
 
 def length_entity(frame: Frame, suffix: str = "") -> str:
-    """`<pkg>_<type>_length`, and what tells apart those of different parts."""
+    """`<pkg>_<type>_length`, with a suffix that identifies the selection of parts."""
     return f"{entity_name(frame.message.package, frame.message.name)}_length{suffix}"
 
 
 def length_ports(frame: Frame) -> tuple[str, ...]:
-    """The message side's ports that determine the payload's length, of a frame whose length is computed."""
+    """The message side's ports that determine the payload's length, for a frame with a computed length."""
     side = message_side(frame)
     return tuple(side.length(part) for part in _counted_parts(sent_length_of(frame).terms))
 
 
 def payload_length_configuration(frame: Frame, suffix: str = "") -> Context:
-    """The configuration of `<pkg>_<type>_length`, of a frame whose length is computed."""
+    """The configuration of `<pkg>_<type>_length`, for a frame with a computed length."""
     length = sent_length_of(frame)
     assert length.is_computed, f"the lengths at the ports of {frame.message} do not determine its payload's"
     parts = _counted_parts(length.terms)
     names = dict(zip((part.path for part in parts), length_ports(frame), strict=True))
-    # Positions count from behind the prefix.
+    # Positions count from the end of the prefix.
     total = _Sum(_modulus(length.terms), {path: _unsigned(name) for path, name in names.items()}, [])
     total.add(length.terms)
     total.add_bytes(length.prefix)
@@ -100,7 +100,7 @@ def payload_length_configuration(frame: Frame, suffix: str = "") -> Context:
 
 
 def _chain_length(statements: Sequence[Statement]) -> int:
-    """How many paddings follow from each other at most."""
+    """The largest number of paddings that depend on each other in a chain."""
     lengths: dict[str, int] = {}
     for item in statements:
         before = [lengths[name] for name in _SIGNAL.findall(" ".join(item.operands)) if name in lengths]
@@ -115,7 +115,7 @@ def _modulus(terms: Sequence[Term]) -> int:
 
 
 def _counted_parts(terms: Sequence[Term]) -> list[Data | Loop]:
-    """The parts of any number of elements that take bytes."""
+    """The parts with a variable number of elements that take bytes."""
     return [
         term.part
         for term in terms
@@ -125,10 +125,11 @@ def _counted_parts(terms: Sequence[Term]) -> list[Data | Loop]:
 
 @dataclass
 class _Sum:
-    """Terms added up, and the statements that this takes.
+    """A running sum of terms, with the statements that compute it.
 
-    The sum is that of the signals `elements` and `paddings` and of `constant`. The position behind it, modulo
-    `modulus`, is that of `origin`, signals of so many bits, and `offset`. `counts` has the number of elements by path.
+    The sum consists of the signals `elements` and `paddings` and of `constant`. The position after it, modulo
+    `modulus`, is the sum of `offset` and of `origin`, which lists signals with their widths. `counts` has the number of
+    elements by path.
     """
 
     modulus: int
@@ -142,11 +143,11 @@ class _Sum:
 
     @property
     def rest_bits(self) -> int:
-        """Bits of all but the elements."""
+        """The bits of the sum without the elements."""
         return max(1, (self.constant + len(self.paddings) * self.modulus).bit_length())
 
     def add(self, terms: Sequence[Term]) -> None:
-        """Add terms that are always there."""
+        """Add terms that are always present."""
         for term in terms:
             match term:
                 case Bytes(count):
@@ -163,7 +164,7 @@ class _Sum:
                     self._add_elements(term)
 
     def add_bytes(self, count: int) -> None:
-        """Add bytes whose number is known."""
+        """Add a known number of bytes."""
         self.constant += count
         self.offset += count
 
@@ -178,7 +179,7 @@ class _Sum:
         self.offset = 0
 
     def _add_elements(self, term: Repeat) -> None:
-        """Add any number of elements, of which the first may take more or less than each further one."""
+        """Add any number of elements; the first one may differ in size from the others."""
         assert term.stride is not None
         count = self.counts[term.part.path]
         first = replace(self, origin=[*self.origin], paddings=[], constant=-term.stride)
@@ -194,7 +195,7 @@ class _Sum:
             self.origin.append(_low(elements, self.modulus))
 
     def _state(self, statement: Statement) -> str:
-        """Add a statement with a number of its own; the signal that it assigns to."""
+        """Add a statement with a new number, and return the signal that it assigns."""
         number = sum(other.word == statement.word for other in self.statements)
         self.statements.append(replace(statement, number=number))
         return self.statements[-1].signal
@@ -214,7 +215,7 @@ def _unsigned(port: str) -> str:
 
 
 def _times(count: str, stride: int) -> str:
-    """`count` elements of `stride` bytes."""
+    """The size of `count` elements of `stride` bytes each."""
     if stride == 1:
         return count
     if stride.bit_count() == 1:

@@ -1,7 +1,7 @@
-"""The steps of a publisher as a row of places.
+"""The steps of a publisher as a sequence of places.
 
-A place is a word of up to a beat of bytes, or a moment of the program that has none of its own: the opening of a part,
-a stream, padding, the end of an element. A publisher goes from place to place and back to the first one.
+A place is a word of up to one beat of bytes, or a step without bytes of its own: the opening of a part, a stream,
+padding, or the end of an element. A publisher goes from place to place and returns to the first one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import pairwise
 from fusesoc_firm.converter.program import Block, Close, Count, Guard, Header, Open, Padding, Program, Step, Stream
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Loop
 
-# So many words of zeros in a row, and more, are one place that is sent as often.
+# A run of at least this many words of zeros becomes a single place that is sent repeatedly.
 _ROW = 4
 
 
@@ -23,7 +23,8 @@ _ROW = 4
 class Row:
     """Bytes `offset` to `offset + size - 1` of a step, in words from `place` on.
 
-    Where `times` is more than 1, the row is one word of zeros that is sent so often; it is of `size` bytes.
+    If `times` is more than 1, the row is one word of zeros that is sent `times` times; `size` is the total number of
+    bytes.
     """
 
     offset: int
@@ -34,7 +35,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Area:
-    """The places `first` to `last` of step number `number`; `rows` has its bytes, if it has some of its own."""
+    """The places `first` to `last` of step `number`; `rows` has the step's own bytes, if any."""
 
     number: int
     step: Step
@@ -45,14 +46,14 @@ class Area:
 
 @dataclass(frozen=True)
 class Places:
-    """Where the steps of a program are, in words of `lanes` bytes."""
+    """The places of a program's steps, in words of `lanes` bytes."""
 
     program: Program
     lanes: int
 
     @cached_property
     def areas(self) -> tuple[Area, ...]:
-        """Those of every step that has a place."""
+        """The areas of all steps that have a place."""
         areas: list[Area] = []
         place = 0
         for number, step in enumerate(self.program.steps):
@@ -65,12 +66,12 @@ class Places:
 
     @property
     def end(self) -> int:
-        """The place behind all others."""
+        """The place after all others."""
         return self.areas[-1].last + 1
 
     @cached_property
     def closings(self) -> tuple[tuple[Close, int], ...]:
-        """Every `Close`, with the place at which the element ends: the last word in front of it, or its own."""
+        """Each `Close` with the place at which the element ends: the last word before it, or its own place."""
         steps = self.program.steps
         return tuple(
             (step, self.areas[bisect_right(self._area_numbers, number) - 1].last)
@@ -80,18 +81,18 @@ class Places:
 
     @cached_property
     def jumps(self) -> tuple[tuple[int, int], ...]:
-        """(place, target) for each place that may lead elsewhere than to the next one, in order."""
+        """(place, target) for each place that may jump, in order."""
         found = [(area.last, self._place(self._behind(area))) for area in self.areas_of(Open, Guard)]
         for (_, place), number in zip(self.closings, self._closing_numbers, strict=True):
             found.append((place, self._place(self.program.body(number))))
         return tuple(sorted(found))
 
     def areas_of(self, *kinds: type[Step]) -> list[Area]:
-        """The areas of the steps of some kinds."""
+        """The areas of the steps of the given kinds."""
         return [area for area in self.areas if isinstance(area.step, kinds)]
 
     def closed_by(self, area: Area) -> Close | None:
-        """What ends an element with the area's last word."""
+        """The `Close` of the element that ends with the area's last word, if any."""
         following = self.program.steps[area.number + 1]
         return following if isinstance(area.step, Block) and isinstance(following, Close) else None
 
@@ -100,7 +101,7 @@ class Places:
         return [number for number, step in enumerate(self.program.steps) if isinstance(step, Close)]
 
     def _place(self, number: int) -> int:
-        """Where step `number` begins, or the next one that has a place."""
+        """The first place of step `number`, or of the next step that has a place."""
         index = bisect_left(self._area_numbers, number)
         return self.areas[index].first if index < len(self.areas) else self.end
 
@@ -113,12 +114,12 @@ class Places:
         return self.program.behind(number)
 
     def _moments(self, number: int) -> int:
-        """How many places a step without bytes of its own has: none where another one does its work."""
+        """The number of places of a step without bytes of its own; 0 if another step does its work."""
         match self.program.steps[number]:
             case Guard() | Stream() | Padding():
                 return 1
             case Open(part=part):
-                # A guard opens the part in front of its padding; an array without a body has nothing to go through.
+                # A guard opens the part before its padding; an array without a body has nothing to iterate over.
                 return int(not self._is_guarded(part) and (isinstance(part, Data) or bool(part.body)))
             case Close():
                 return int(not isinstance(self.program.steps[number - 1], Block))
@@ -133,7 +134,7 @@ class Places:
         return frozenset(id(step.part) for step in self.program.steps if isinstance(step, Guard))
 
     def _rows(self, step: Step, place: int) -> Iterator[Row]:
-        """The bytes of a step in words, many of zeros in one word."""
+        """The bytes of a step in words; a long run of zeros takes a single word."""
         done = 0
         for first, end in _gaps(step):
             begin = -(-first // self.lanes)
@@ -154,7 +155,7 @@ class Places:
 
 
 def size_of(step: Step) -> int:
-    """The bytes of a step that are as many whenever it is reached."""
+    """The size of a step in bytes, if it is the same each time the step is reached."""
     match step:
         case Header():
             return ID_BYTES + LENGTH_BYTES
@@ -166,7 +167,7 @@ def size_of(step: Step) -> int:
 
 
 def _gaps(step: Step) -> Sequence[tuple[int, int]]:
-    """The (first, end) of each run of zeros in a step."""
+    """(first, end) of each run of zeros in a step."""
     if not isinstance(step, Block):
         return []
     held = [

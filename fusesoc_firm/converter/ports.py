@@ -1,4 +1,4 @@
-"""The message side of a converter: one port a leaf of the message."""
+"""The message side of a converter: one port for each leaf of the message."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Frame, FrameField, Path
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
-# What the templates declare or use by name: a field of that name gets another port name.
+# Names that the templates declare or use; a field with such a name gets another port name.
 _TAKEN = """
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
@@ -20,13 +20,13 @@ _TAKEN = """
     u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
     std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
 """.split()
-# Those of one store of several.
+# The names of each store if there are several.
 _NUMBERED = re.compile(r"(store|fields|turns?|used)_\d+(_\w+)?", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class FieldPort:
-    """A port and the leaf it carries; `width` is None for a `std_logic`."""
+    """A port and its leaf; `width` is None for a `std_logic`."""
 
     name: str
     width: int | None
@@ -39,12 +39,12 @@ class FieldPort:
 
     @property
     def comment(self) -> str:
-        """The ROS name and type, so that a port can be traced back: `pose.position.x: float64`."""
+        """The ROS name and type of the leaf, to trace the port back: `pose.position.x: float64`."""
         return f"{ros_path(self.field.path)}: {self.field.type.name}"
 
 
 def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
-    """A port for every leaf that has a value and is used, in wire order; what else is used does not change its name."""
+    """A port for each used leaf that holds a value, in wire order; names do not depend on the selection of fields."""
     fields = [field for field in frame.fields if field.count]
     numbered = (name for field in fields if _NUMBERED.fullmatch(name := identifier(*field.names)))
     names = distinct_identifiers((field.names for field in fields), reserved=[*_TAKEN, *numbered])
@@ -54,11 +54,11 @@ def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
 
 
 def port_width(field: FrameField) -> int | None:
-    """Bits of a leaf's port; None for a lone bool."""
+    """The width of a leaf's port in bits; None for a single bool."""
     is_bit = field.type.bits == 1 and not field.is_array
     return None if is_bit else field.count * field.type.bits
 
 
 def ros_path(path: Path) -> str:
-    """A path as a definition's reader knows it, with the sizes of fixed arrays: `pose.covariance[36]`."""
+    """A path in the notation of a definition, with the sizes of fixed arrays: `pose.covariance[36]`."""
     return ".".join(step.name if step.count is None else f"{step.name}[{step.count}]" for step in path)

@@ -1,18 +1,19 @@
-"""What a converter does for a message of variable size: a program of steps in wire order.
+"""The program of a converter for a message of variable size: a list of steps in wire order.
 
-A subscriber takes the bytes of a frame step by step, a publisher puts them there; both work off the same steps:
+A subscriber takes the bytes of a frame step by step; a publisher sends them step by step. Both use the same kinds of
+steps:
 
     Header              the payload's length
     Block               bytes of known arrangement
     Padding             padding that depends on the position
-    Count, Guard, Open  a part's number of elements; whether its padding is there; its beginning
+    Count, Guard, Open  a part's number of elements; a skip of its padding if empty; its beginning
     Stream              the elements of a string or an array of numbers
     Close               the end of an element of an array of messages or strings
-    Tail                whatever is left, since nothing of it is used
+    Tail                the unused rest of the payload
     End                 the end of the message
 
-A step is known by its place in the list. It is followed by the next one, but for `Guard` and `Open` of an empty part
-and for `Close`, which `Program` leads elsewhere.
+The index in the list identifies a step. Each step is followed by the next one, with three exceptions whose targets
+`Program` computes: `Guard` and `Open` of an empty part, and `Close`.
 """
 
 from __future__ import annotations
@@ -28,16 +29,17 @@ from fusesoc_firm.frame.defaults import default_elements
 from fusesoc_firm.frame.model import COUNT_BYTES, Data, DataKind, Fixed, Frame, FrameField, Loop, Node, Pad, Path, Run
 from fusesoc_firm.frame.values import dotted, units_of
 
-# The loops around a step, the outermost first.
+# The loops around a step, outermost first.
 Scope = tuple[Loop, ...]
 
 
 @dataclass(frozen=True)
 class Segment:
-    """Values that become valid together: number `number` of a message or of a loop's element, counted from 0.
+    """Values that become valid together: segment `number` of a message or of a loop's element, counted from 0.
 
-    It is a run of fields of fixed size with the length of the variable part behind it, as far as they are used. The
-    first one of a message is always there: it has the payload's length. Others exist if they hold a value.
+    A segment consists of the used fields of fixed size up to the next variable part, and the length of this part if it
+    is used. A message always has a first segment, which contains the payload's length. All other segments exist only if
+    they hold a value.
     """
 
     scope: Scope
@@ -46,7 +48,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Header:
-    """The payload's length; `completes` is segment 0 where nothing more belongs to it."""
+    """The payload's length; `completes` is segment 0 if nothing else belongs to that segment."""
 
     completes: Segment | None = None
     segment: Segment | None = None
@@ -54,11 +56,11 @@ class Header:
 
 @dataclass(frozen=True)
 class Block:
-    """`size` bytes. The runs of `fields`, and `constants`, count from its first byte.
+    """A block of `size` bytes; the runs of `fields` and the offsets of `constants` count from its first byte.
 
-    A constant is (offset, bytes): what a publisher sends there. A subscriber compares those in `checks`, given alike.
-    All other bytes are padding or are not used. `completes` is the segment that it is the last of, unless a `Count` or
-    an `Open` follows, which then completes it.
+    A constant is a pair (offset, bytes) that a publisher sends. `checks` has the same form: a subscriber compares the
+    received bytes with it. All other bytes are padding or unused. `completes` is the segment that ends with this block;
+    if a `Count` or an `Open` follows, that step completes the segment instead.
     """
 
     scope: Scope
@@ -72,7 +74,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Padding:
-    """Up to a multiple of `alignment`, counted from behind the prefix."""
+    """Padding up to a multiple of `alignment`; positions count from the end of the prefix."""
 
     scope: Scope
     alignment: int
@@ -80,7 +82,7 @@ class Padding:
 
 @dataclass(frozen=True)
 class Count:
-    """The number of elements of a part on the wire: four bytes."""
+    """The four bytes on the wire that hold a part's number of elements."""
 
     scope: Scope
     part: Data | Loop
@@ -89,7 +91,7 @@ class Count:
 
 @dataclass(frozen=True)
 class Guard:
-    """Where the part is empty, `Open` follows at once: there is no padding in front of no elements."""
+    """A jump to `Open` if the part is empty: no padding precedes an empty part."""
 
     scope: Scope
     part: Data | Loop
@@ -97,7 +99,7 @@ class Guard:
 
 @dataclass(frozen=True)
 class Open:
-    """The beginning of a part, whose number of elements is known; an empty one is passed by. Completes a segment."""
+    """The beginning of a part with a known number of elements; it skips an empty part and completes a segment."""
 
     scope: Scope
     part: Data | Loop
@@ -114,7 +116,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Close:
-    """The end of an element of `loop`; `scope` is that of the element, the loop included."""
+    """The end of an element of `loop`; `scope` is the scope of the element and includes the loop."""
 
     scope: Scope
     loop: Loop
@@ -122,7 +124,7 @@ class Close:
 
 @dataclass(frozen=True)
 class Tail:
-    """All that is left of the payload."""
+    """The rest of the payload."""
 
 
 @dataclass(frozen=True)
@@ -142,32 +144,32 @@ class Program:
 
     @property
     def loops(self) -> tuple[Loop, ...]:
-        """Every loop whose elements are gone through, in wire order."""
+        """All loops with `Open` steps, in wire order."""
         return tuple(step.part for step in self.steps if isinstance(step, Open) and isinstance(step.part, Loop))
 
     @property
     def streams(self) -> tuple[Data, ...]:
-        """Every string and array of numbers, in wire order."""
+        """All strings and arrays of numbers, in wire order."""
         return tuple(step.part for step in self.steps if isinstance(step, Stream))
 
     def segments(self, scope: Scope = ()) -> int:
-        """How many segments the message has, or the element of the innermost loop of `scope`."""
+        """The number of segments of the message, or of an element of the innermost loop of `scope`."""
         return self._completed[_path(scope)]
 
     @cached_property
     def _completed(self) -> Counter[Path]:
-        """How many segments each scope has, by its path."""
+        """The number of segments of each scope, by its path."""
         steps = (step for step in self.steps if isinstance(step, Header | Block | Open))
         return Counter(_path(step.completes.scope) for step in steps if step.completes)
 
     def behind_guard(self, number: int) -> int:
-        """Where a `Guard` leads if its part is empty: to its `Open`."""
+        """The target of a `Guard` if its part is empty: the part's `Open`."""
         guard = self.steps[number]
         assert isinstance(guard, Guard)
         return self._openings[id(guard.part)]
 
     def behind(self, number: int) -> int:
-        """Where an `Open` leads if its part is empty."""
+        """The target of an `Open` if its part is empty."""
         opening = self.steps[number]
         assert isinstance(opening, Open)
         if isinstance(opening.part, Data):
@@ -175,19 +177,19 @@ class Program:
         return self._closings.get(id(opening.part), number) + 1
 
     def body(self, number: int) -> int:
-        """Where a `Close` leads if another element follows."""
+        """The target of a `Close` if another element follows."""
         closing = self.steps[number]
         assert isinstance(closing, Close)
         return self._openings[id(closing.loop)] + 1
 
     @cached_property
     def _openings(self) -> dict[int, int]:
-        """The place of the `Open` of each part, by the part's identity: to compare parts is to compare all in them."""
+        """The place of each part's `Open`, by the part's identity, since comparing parts compares their contents."""
         return {id(step.part): place for place, step in enumerate(self.steps) if isinstance(step, Open)}
 
     @cached_property
     def _closings(self) -> dict[int, int]:
-        """The place of the `Close` of each loop, by its identity."""
+        """The place of each loop's `Close`, by the loop's identity."""
         return {id(step.loop): place for place, step in enumerate(self.steps) if isinstance(step, Close)}
 
 
@@ -197,7 +199,7 @@ def _path(scope: Scope) -> Path:
 
 
 def subscriber_program(frame: Frame) -> Program:
-    """What a subscriber does; what is not used is skipped."""
+    """The program of a subscriber, which skips unused parts."""
     builder = _Builder()
     builder.header(frame)
     builder.nodes(frame.nodes)
@@ -205,7 +207,7 @@ def subscriber_program(frame: Frame) -> Program:
 
 
 def publisher_program(frame: Frame) -> Program:
-    """What a publisher does; what is not used is sent as its default, or as zeros, or as an empty array."""
+    """The program of a publisher, which sends unused parts as their defaults, as zeros or as empty arrays."""
     builder = _Builder(is_publisher=True)
     builder.header(frame)
     builder.nodes(frame.nodes)
@@ -214,10 +216,10 @@ def publisher_program(frame: Frame) -> Program:
 
 @dataclass
 class _Builder:
-    """One walk through the nodes of a message.
+    """The state of one walk through the nodes of a message.
 
-    `block` is not closed yet. `open_steps` are the places of the steps of the segment that is not closed yet, and
-    `is_valued` says whether it holds a value; `numbers` are those of the segments, of each scope around, so far.
+    `block` is the current block. `open_steps` are the places of the steps of the current segment, and `is_valued` tells
+    whether that segment holds a value. `numbers` are the next segment numbers, one for each enclosing scope.
     """
 
     is_publisher: bool = False
@@ -255,7 +257,7 @@ class _Builder:
                 case Data() | Loop():
                     self._constant(node, node.default)
 
-    # --- what the message has -----------------------------------------------------------------------------------
+    # --- parts of the message -----------------------------------------------------------------------------------
 
     def _fixed(self, node: Fixed) -> None:
         start = self.block.size
@@ -290,7 +292,7 @@ class _Builder:
         self._open(node)
         if not has_bytes(node):
             return
-        # The segment around a loop that is not used goes on behind it.
+        # After an unused loop, the enclosing segment continues.
         outer = self.scope, self.open_steps, self.is_valued
         self.scope, self.open_steps, self.is_valued = (*self.scope, node), [], False
         self.block = Block(self.scope, 0)
@@ -313,7 +315,7 @@ class _Builder:
         if part.is_used:
             self._close_segment()
 
-    # --- what a publisher sends for what it has no ports for ----------------------------------------------------
+    # --- constants for unused parts -----------------------------------------------------------------------------
 
     def _constant(self, node: Data | Loop, value: Any) -> None:
         if isinstance(node, Data):
@@ -360,7 +362,7 @@ class _Builder:
         self.block = Block(self.scope, 0)
 
     def _close_segment(self) -> None:
-        """Tell the steps since the last segment which one they belong to, if it holds a value."""
+        """Assign the steps since the last segment to a new segment if they hold a value."""
         self._flush()
         if self.is_valued:
             segment = Segment(self.scope, self.numbers[-1])
@@ -389,9 +391,9 @@ def _is_valued(step: Step) -> bool:
 
 
 def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """A `Tail` in place of what follows the last step that is used, if that is more than what closes a text."""
+    """Replace the steps after the last used one by a `Tail`, unless they only close a text."""
     last = max(place for place, step in enumerate(steps) if _is_used(step))
-    # A loop is gone through to its end.
+    # A loop always runs to its end.
     closings = {step.loop.path: place for place, step in enumerate(steps) if isinstance(step, Close)}
     scope: Scope = getattr(steps[last], "scope", ())
     if scope:
@@ -418,12 +420,12 @@ def _is_used(step: Step) -> bool:
 
 
 def has_bytes(loop: Loop) -> bool:
-    """Whether the elements are gone through: where they take no bytes, only their number is there."""
+    """Whether the loop has a body; if its elements take no bytes, only their number is transferred."""
     return any(not isinstance(node, Fixed) or node.size for node in loop.body)
 
 
 def comment(step: Step) -> str:
-    """What a step is about, in a few words: for the list of steps in generated VHDL."""
+    """A short description of a step, for the list of steps in generated VHDL."""
     match step:
         case Header():
             return "the payload's length"

@@ -1,4 +1,4 @@
-"""Names that no field's port may have, since the templates declare or use them: they are read from the templates."""
+"""Names that no port of a field may have, since the templates declare or use them; they are read from the templates."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import cache
 
 from fusesoc_firm.text.render import template_text
 
-# What a template uses by the names of others.
+# Names that templates use but do not declare.
 _USED = frozenset(
     """rtl firm ieee work std std_logic_1164 numeric_std std_logic std_logic_vector unsigned natural positive integer
     boolean line string to_unsigned to_integer resize shift_left shift_right rising_edge failure true false""".split()
@@ -17,14 +17,14 @@ _COMMENT = re.compile(r"--.*")
 _DECLARED = re.compile(
     r"^\s*(?:signal|constant|variable|type|subtype|function|alias)\s+(\w+(?:\s*,\s*\w+)*)"  # signal a, b : ...
     r"|^\s*(\w+)\s*:"  # a port, a generic, the label of a process or an instance
-    r"|\b(?:firm\.|use\s+firm\.\w+\.)(\w+)",  # what is used of the library
+    r"|\b(?:firm\.|use\s+firm\.\w+\.)(\w+)",  # a unit of the library
     re.MULTILINE,
 )
 
 
 @cache
 def reserved_names(*templates: str) -> frozenset[str]:
-    """In lower case, the names in the VHDL templates; those made of a tag have no place here, as they are numbered."""
+    """The names in the VHDL templates, in lower case, except names that contain tags: these are numbered."""
     found = set(_USED)
     for template in templates:
         text = _TAG.sub("\N{REPLACEMENT CHARACTER}", _COMMENT.sub("", template_text(template)))

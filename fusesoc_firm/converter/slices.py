@@ -1,4 +1,4 @@
-"""Which bits of a port are which bytes of the payload."""
+"""The mapping between bits of a port and bytes of the payload."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fusesoc_firm.frame.model import FrameField
 
 @dataclass(frozen=True)
 class Slice:
-    """`width` bits of a port from bit `low` on, in the payload from byte `offset` on; `bytes` as sent.
+    """`width` bits of a port from bit `low` on, and their position in the payload: `bytes` bytes from `offset` on.
 
-    A bool is one bit of the port and a byte of the payload; everything else has 8 bits a byte.
+    A bool is one bit of the port and one byte of the payload. All other types have 8 bits in each byte.
     """
 
     port: FieldPort
@@ -25,28 +25,28 @@ class Slice:
 
     @property
     def high(self) -> int:
-        """The highest of the port's bits."""
+        """The highest bit of the slice."""
         return self.low + self.width - 1
 
     @property
     def is_bit(self) -> bool:
-        """Whether it is of a bool."""
+        """Whether the slice is a bool."""
         return self.port.field.type.bits == 1
 
     @property
     def target(self) -> str:
-        """The port in VHDL, or the part of it that the slice is."""
+        """The slice in VHDL: the whole port or a part of it."""
         if self.port.width is None or (self.width == self.port.width and not self.is_bit):
             return self.port.name
         return bit(self.port.name, self.low) if self.is_bit else bits(self.port.name, self.high, self.low)
 
 
 def slices_of(port: FieldPort) -> Iterator[Slice]:
-    """The pieces of a port that lie in one piece in the payload, lowest bits first."""
+    """The slices of a port that are contiguous in the payload, lowest bits first."""
     type_ = port.field.type
     low = 0
     for run in port.field.runs:
-        # Bits of neighbouring bools are not neighbours on the wire.
+        # Neighbouring bools of a port are a byte apart on the wire.
         pieces, elements = (run.count, 1) if type_.bits == 1 else (1, run.count)
         for piece in range(pieces):
             yield Slice(port, low, elements * type_.bits, run.offset + piece * type_.size, elements * type_.size)
@@ -54,7 +54,7 @@ def slices_of(port: FieldPort) -> Iterator[Slice]:
 
 
 def windows_of(fields: Iterable[FrameField]) -> list[tuple[int, int]]:
-    """Where fields in use lie, as (first, end) offsets in order, touching parts joined."""
+    """The positions of used fields in the payload, as sorted (first, end) offsets; adjacent ranges are merged."""
     windows: list[tuple[int, int]] = []
     for first, end in sorted(
         (run.offset, run.offset + run.count * field.type.size)

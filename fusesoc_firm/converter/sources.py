@@ -1,6 +1,7 @@
-"""A Frame's converters as template and configuration: those of fixed size, or those of any.
+"""The template and configuration of a Frame's converters, of fixed or variable size.
 
-The latter are imported where there is one: an edit of them leaves what the store has of the others.
+The modules for variable size are imported only if needed, so that an edit of them does not invalidate cached converters
+of fixed size.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ from fusesoc_firm.text.render import Context
 
 
 class ConverterSource(NamedTuple):
-    """What a converter's text is rendered from."""
+    """The template of a converter's text, with its configuration."""
 
     template: str
     configuration: Context
 
 
 def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
-    """`entity`, or else `subscriber_entity`, on `width` bits. Raises `InputError` for what no converter is made for."""
+    """The subscriber `entity` (default: `subscriber_entity`) on `width` bits; raises `InputError` if unsupported."""
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, entity))
@@ -42,7 +43,7 @@ def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSo
 
 
 def publisher_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
-    """`entity`, or else `publisher_entity`, on `width` bits. Raises `InputError` for what no converter is made for."""
+    """The publisher `entity` (default: `publisher_entity`) on `width` bits; raises `InputError` if unsupported."""
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, entity))

@@ -1,6 +1,6 @@
-"""A message on each stage of its way to hardware, as text.
+"""A message at each stage of its way to hardware, as text.
 
-What a stage needs is imported for it alone: whoever looks at a message waits for the import.
+Each stage imports its modules itself, since the user of `firm message show` waits for these imports.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> str:
-    """A message, or those of a service or action, in one of `STAGES`, without the last line's end.
+    """A message, or the messages of a service or action, at one of `STAGES`, without the final newline.
 
-    `width` are the bits of the converters' stream. Raises `InputError`.
+    `width` is the width of the converters' stream in bits. Raises `InputError`.
     """
     from fusesoc_firm.message.parser import parse_full_name
 
@@ -36,7 +36,7 @@ def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> 
 
 
 def _title(interface: Interface, definitions: Definitions) -> str:
-    """What stands above the messages of a service or an action."""
+    """The heading of a message of a service or an action."""
     from fusesoc_firm.message.signature import signature
 
     title = f"# {interface} ({interface.ros.title})"
@@ -77,7 +77,7 @@ def _vhdl(name: MessageName, definitions: Definitions, width: int) -> str:
 
 
 def _sources(name: MessageName, definitions: Definitions, width: int) -> Iterator[ConverterSource]:
-    """The message's package of constants and both converters."""
+    """The message's package of constants, and both converters."""
     from fusesoc_firm.converter import constants
     from fusesoc_firm.converter.sources import ConverterSource, publisher_source, subscriber_source
     from fusesoc_firm.frame.layout import frame_of

@@ -1,4 +1,4 @@
-"""What the steps of a program are, as tables by their numbers, for the subscriber's template."""
+"""The properties of a program's steps as tables, indexed by step number, for the subscriber's template."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def is_fixed(step: Step) -> bool:
 
 
 def fixed_size(step: Step) -> int:
-    """How many; 0 of any other step."""
+    """The number of bytes of a fixed step; 0 for any other step."""
     match step:
         case Header():
             return LENGTH_BYTES
@@ -42,42 +42,42 @@ def fixed_size(step: Step) -> int:
 
 
 def is_counted(step: Step) -> bool:
-    """Whether a part is opened of which the wire has the number of elements."""
+    """Whether the step opens a part whose number of elements is on the wire."""
     return isinstance(step, Open) and (isinstance(step.part, Data) or step.part.count is None)
 
 
 def opens_data(step: Step) -> bool:
-    """Whether a stream follows."""
+    """Whether a stream follows the step."""
     return isinstance(step, Open) and isinstance(step.part, Data)
 
 
 def is_hollow(step: Step) -> bool:
-    """Whether an array is opened whose elements take no bytes."""
+    """Whether the step opens an array whose elements take no bytes."""
     return isinstance(step, Open) and isinstance(step.part, Loop) and not has_bytes(step.part)
 
 
 def terminator_of(part: Data | Loop) -> int:
-    """The zeros that a part's count includes."""
+    """The number of terminating zeros that a part's count includes."""
     return part.terminator if isinstance(part, Data) else 0
 
 
 def is_text(step: Step) -> bool:
-    """Whether a text with a closing zero is opened."""
+    """Whether the step opens a text with a terminating zero."""
     return isinstance(step, Open) and terminator_of(step.part) > 0
 
 
 def closes_text(step: Step) -> bool:
-    """Whether the first byte is a text's closing zero."""
+    """Whether the first byte of the step is a text's terminating zero."""
     return isinstance(step, Block) and step.checks == ((0, b"\x00"),)
 
 
 def element_size(step: Step) -> int:
-    """Bytes of an element of the stream that is opened; 0 of any other step."""
+    """The bytes of an element of the stream that the step opens; 0 for any other step."""
     return step.part.element.size if isinstance(step, Open) and isinstance(step.part, Data) else 0
 
 
 def alignment_of(step: Step) -> int:
-    """What padding leads to a multiple of; 0 of any other step."""
+    """The alignment that padding establishes; 0 for any other step."""
     return step.alignment if isinstance(step, Padding) else 0
 
 
@@ -89,7 +89,7 @@ def _alignment_is(alignment: int) -> Callable[[Step], bool]:
     return lambda step: alignment_of(step) == alignment
 
 
-# The sets of steps that a template asks for; those behind the first two are left out where they are empty.
+# The sets of steps that a template uses; all but the first two are omitted if empty.
 _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("IS_FIXED", "Takes a known number of bytes.", is_fixed),
     ("IS_REST", "Takes what is left of the payload.", lambda step: isinstance(step, Tail | End)),
@@ -108,12 +108,12 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("HAS_8", "Its elements have 8 bytes.", _size_is(8)),
 )
 _ALWAYS_THERE = 2
-# What the sets are called in VHDL, in lower case.
+# The names of the sets in VHDL, in lower case.
 SET_NAMES = frozenset(f"step_{name}".lower() for name, _, _ in _SETS)
 
 
 def step_sets(steps: Sequence[Step]) -> list[Context]:
-    """The sets as rows of digits, a digit a step."""
+    """The sets as rows of digits, one digit for each step."""
     found = []
     for number, (name, about, is_in) in enumerate(_SETS):
         digits = "".join(str(int(is_in(step))) for step in steps)
@@ -124,13 +124,13 @@ def step_sets(steps: Sequence[Step]) -> list[Context]:
 
 
 def number_rows(numbers: Sequence[int]) -> list[str]:
-    """The rows of a table of numbers by step."""
+    """The rows of a table with one number for each step."""
     rows = [numbers[start : start + _NUMBERS_IN_A_ROW] for start in range(0, len(numbers), _NUMBERS_IN_A_ROW)]
     return [", ".join(map(str, row)) for row in rows]
 
 
 def step_list(steps: Sequence[Step]) -> list[str]:
-    """The steps for the list in the head of an architecture."""
+    """The steps for the list at the head of an architecture."""
     column = len(str(len(steps) - 1))
     return [f"{number:>{column}}  {_description(step)}" for number, step in enumerate(steps)]
 

@@ -1,8 +1,9 @@
 """The configuration of stores, for the partials `store_signals`, `store_enables`, `store_beats` and `store_resets`.
 
-A template that includes them counts the beats as the stores' are counted, in `position_r`, tells by `is_first` that
-beat 0 is there whatever the count is, and has `store_beats` where a beat is taken. A store is enabled by comparisons
-with the ends of its windows. Where these are many, a table holds the ends instead, and a pointer walks through it.
+A template that includes these partials counts the beats in `position_r`, in the same way as the stores. Its signal
+`is_first` identifies beat 0, regardless of the count. The template includes `store_beats` where it accepts a beat.
+Comparisons with the ends of its windows enable a store. If the windows are many, a table holds their ends instead, and
+a pointer advances through it.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from fusesoc_firm.converter.stream import Store, StoreMap, ranges
 from fusesoc_firm.converter.vhdl import bits, within
 from fusesoc_firm.text.render import Context
 
-# A table takes less logic (45 LUTs and 1.3 a window, where comparisons take 40 and 2.3 at 8 bits) if there are more
-# windows, and more beats: the windows among few beats are a small function of the counter.
+# A table takes less logic (45 LUTs and 1.3 a window, against 40 and 2.3 for comparisons at 8 bits) if both windows and
+# beats are many: with few beats, the comparisons reduce to a small function of the counter.
 _MOST_COMPARED = 8
 _TABLE_BEATS = 1024
 _NUMBERS_IN_A_ROW = 12
@@ -31,13 +32,13 @@ def is_beat(first: int, last: int) -> str:
 
 
 def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
-    """The condition for a beat of a store, one of the `parts` whose windows a table has."""
+    """The condition for the beats of one store, among the `parts` whose windows share a table."""
     used = f"used_{table} = '1'"
     return used if len(parts) == 1 else f"{used} and {is_beat(store.beats[0], store.beats[-1])}"
 
 
 def store_configuration(stores: Sequence[Store]) -> Context:
-    """What the partials need for `stores` as `stores_of` gives them."""
+    """The partials' configuration for `stores`, in the form of `stores_of`."""
     tables: list[Context] = []
     enables: list[list[str]] = []
     for _, group in groupby(stores, lambda store: store.lanes):
@@ -63,24 +64,24 @@ def store_configuration(stores: Sequence[Store]) -> Context:
 
 
 def store_names(stores: Sequence[Store]) -> list[str]:
-    """What tells the stores apart in names: nothing if there is but one."""
+    """The suffix of each store's name; empty for a single store."""
     return [""] if len(stores) == 1 else [f"_{number}" for number in range(len(stores))]
 
 
 def store_data(register: str, store: Store, source: str) -> list[str]:
-    """What a store's register takes with a beat, highest bits first: its lanes of `source`, and what it has."""
+    """The next value of a store's register at a beat, highest bits first: its lanes of `source`, then older content."""
     data = [bits(source, 8 * last + 7, 8 * first) for first, last in reversed(ranges(store.lanes))]
     return data if len(store.beats) == 1 else [*data, bits(register, store.bits - 1, store.beat_bits)]
 
 
 def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> Iterator[Context]:
-    """The parts of a port's piece that lie in one piece in a store, for the partial `stored_field`."""
+    """The pieces of a port's slice that are contiguous in a store, for the partial `stored_field`."""
     low = piece.low
     for stored in places.pieces(piece.offset, piece.bytes):
         part = piece if piece.is_bit else replace(piece, low=low, width=8 * stored.count)
         yield {
             "port": part.target,
-            # As roscpp and rospy read a bool: whatever is not zero is true.
+            # As in roscpp and rospy, any nonzero value of a bool is true.
             "is_bool": piece.is_bit,
             "register": registers[stored.store],
             "high": stored.high,
@@ -90,12 +91,12 @@ def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> I
 
 
 def _table(windows: Sequence[tuple[int, int]]) -> Context:
-    """The table of the beats behind which a window begins or ends, and the pointer to the next of them."""
+    """The table of beats after which a window begins or ends, with a pointer to the next of them."""
     turns = [beat for first, last in windows for beat in (first - 1, last)]
-    # A window that begins at once is open from the start.
+    # A window that begins with the first beat is open from the start.
     is_open = turns[0] < 0
     turns = turns[1:] if is_open else turns
-    # Behind the last turn the pointer stays on a beat that is past.
+    # After the last turn, the pointer stays on a past beat.
     numbers = [*turns, turns[-1]]
     rows = [numbers[start : start + _NUMBERS_IN_A_ROW] for start in range(0, len(numbers), _NUMBERS_IN_A_ROW)]
     return {

@@ -1,7 +1,7 @@
-"""Where the bytes of a frame lie on a stream of some width, and which registers keep those of the fields.
+"""The positions of a frame's bytes on a stream of some width, and the registers that store the fields.
 
-A subscriber's stream carries the frame behind its id. At 8 bits it starts with the length; at wider streams the
-id's byte is still there, in the lowest lane of the first beat, and void (docs/explanation/design.md).
+A subscriber's stream carries the frame without its id. At 8 bits it starts with the length. On wider streams the lane
+of the id, which is the lowest one of the first beat, remains but is void (docs/explanation/design.md).
 """
 
 from __future__ import annotations
@@ -11,30 +11,30 @@ from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 
-# A larger store is parted, at the cost of one more enable: in simulation, each beat that is taken moves a whole store.
+# Larger stores are split, at the cost of one more enable each: a simulator copies a whole store on each accepted beat.
 _MOST_BITS = 2048
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
 
 
 @dataclass(frozen=True)
 class Stream:
-    """A stream of `width` bits, a byte a lane."""
+    """A stream of `width` bits, with one byte in each lane."""
 
     width: int
 
     @property
     def lanes(self) -> int:
-        """Bytes of a beat."""
+        """The bytes of a beat."""
         return self.width // 8
 
     @property
     def length_start(self) -> int:
-        """Bytes in front of the length on a subscriber's stream."""
+        """The bytes before the length on a subscriber's stream."""
         return 0 if self.lanes == 1 else ID_BYTES
 
     @property
     def payload_start(self) -> int:
-        """Bytes in front of the payload on a subscriber's stream."""
+        """The bytes before the payload on a subscriber's stream."""
         return self.length_start + LENGTH_BYTES
 
     def beat(self, byte: int) -> int:
@@ -48,9 +48,9 @@ class Stream:
 
 @dataclass(frozen=True)
 class Store:
-    """A shift register: in each of `beats` it takes the bytes of `lanes`, and ends with the first beat's lowest.
+    """A shift register that stores the bytes of `lanes` in each of `beats`; the first beat's bytes end up lowest.
 
-    Lanes that hold bytes of fields in the same beats share one, so a field costs registers and wires alone.
+    Lanes that hold bytes of fields in the same beats share a store, so a field costs only registers and wires.
     """
 
     lanes: tuple[int, ...]
@@ -58,17 +58,17 @@ class Store:
 
     @property
     def bits(self) -> int:
-        """Bits of the register."""
+        """The width of the register."""
         return 8 * len(self.lanes) * len(self.beats)
 
     @property
     def beat_bits(self) -> int:
-        """Bits that come with a beat."""
+        """The number of bits that a beat adds."""
         return 8 * len(self.lanes)
 
 
 def stores_of(stream: Stream, windows: Sequence[tuple[int, int]]) -> list[Store]:
-    """The stores for the payload's `windows`, given as (first, end) offsets."""
+    """The stores for the `windows` of the payload, which are (first, end) offsets."""
     beats: dict[int, list[int]] = {}
     for first, end in windows:
         for byte in range(stream.payload_start + first, stream.payload_start + end):
@@ -90,7 +90,7 @@ def _parts(beats: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
 
 @dataclass(frozen=True)
 class StoredBytes:
-    """`count` bytes of the payload that lie in one piece in store number `store`, from bit `low` on."""
+    """`count` bytes of the payload that are contiguous in store number `store`, from bit `low` on."""
 
     store: int
     low: int
@@ -103,7 +103,7 @@ class StoredBytes:
 
 
 class StoreMap:
-    """Finds the payload's bytes in the stores."""
+    """Maps bytes of the payload to the stores."""
 
     def __init__(self, stream: Stream, stores: Sequence[Store]) -> None:
         self._stream = stream
@@ -114,7 +114,7 @@ class StoreMap:
                     self._place[beat, lane] = number, row * store.beat_bits + 8 * column
 
     def pieces(self, offset: int, count: int) -> list[StoredBytes]:
-        """The payload's bytes `offset` to `offset + count - 1`, neighbours in a store joined, in order."""
+        """The payload's bytes `offset` to `offset + count - 1`, in order; neighbours in a store are merged."""
         found: list[StoredBytes] = []
         for byte in range(self._stream.payload_start + offset, self._stream.payload_start + offset + count):
             store, low = self._place[self._stream.beat(byte), self._stream.lane(byte)]
@@ -126,7 +126,7 @@ class StoreMap:
 
 
 def ranges(numbers: Sequence[int]) -> list[tuple[int, int]]:
-    """Ascending numbers as (first, last) of each run without a gap."""
+    """Ascending numbers as a pair (first, last) for each run without a gap."""
     found: list[tuple[int, int]] = []
     for number in numbers:
         if found and found[-1][1] + 1 == number:

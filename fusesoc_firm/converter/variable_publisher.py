@@ -1,7 +1,7 @@
 """Frame -> configuration of the publisher of a message of variable size.
 
-The publisher goes through the places of its program (`places`); a multiplexer chooses the word of the place. What
-depends on the place is a list in the order of places, each item with the `last` place that it holds for.
+The publisher goes through the places of its program (`places`); a multiplexer selects the word of the current place. A
+value that depends on the place is a list in the order of places; each item holds up to and including its `last` place.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from fusesoc_firm.text.render import Context
 
 VARIABLE_PUBLISHER_TEMPLATE = "vhdl/variable_publisher.vhd"
 
-# A literal is no longer: GHDL's Verilog loses the low half of some that are.
+# Longer literals are split: for some of them, GHDL's Verilog output loses the low half.
 _LITERAL_BYTES = 4
 _COUNTER_BITS = 32
 _LARGEST_NATURAL = 2**31 - 1
@@ -86,7 +86,7 @@ class _Publisher:
             "lanes": self.lanes,
             "count_bits": self.lanes.bit_length(),
             "is_byte_wide": self.lanes == 1,
-            # A count, of 32 bits, comes in several words or is a part of one.
+            # A 32-bit count takes several words, or only part of one.
             "is_narrow": self.width < _COUNTER_BITS,
             "is_wide": self.width > _COUNTER_BITS,
             "ports": port_declarations(message_ports(self.frame, self.width), "in"),
@@ -97,7 +97,7 @@ class _Publisher:
             "place_bits": end.bit_length(),
             "all_bits": (end + 1) * self.width,
             "header_last": self.places.areas[0].last,
-            # Bits of the length in the first word, and whether others follow.
+            # The bits of the length in the first word, and whether more words follow.
             "early_bits": 8 * self._early_bytes,
             "is_length_parted": self._early_bytes < LENGTH_BYTES,
             "pieces": list(self._pieces()),
@@ -114,11 +114,11 @@ class _Publisher:
 
     @property
     def _early_bytes(self) -> int:
-        """Bytes of the length in the first word."""
+        """The number of length bytes in the first word."""
         return min(LENGTH_BYTES, self.lanes - ID_BYTES)
 
     def _pieces(self) -> Iterator[Context]:
-        """The bits of all words behind the header, and the value of each, in order."""
+        """The bits of all words after the header with their values, in order."""
         cursor = 8 * (ID_BYTES + LENGTH_BYTES)
         total = (self.places.end + 1) * self.width
         for low, count, value in [*self._known(), (total, 0, "")]:
@@ -129,7 +129,7 @@ class _Publisher:
             cursor = low + count
 
     def _known(self) -> list[tuple[int, int, str]]:
-        """(lowest bit, bits, value) of what is not zeros, in order."""
+        """Sorted (lowest bit, bits, value) of all nonzero values."""
         found = [
             (8 * (self.lanes * row.place + offset - row.offset), 8 * size, value)
             for area in self.places.areas
@@ -141,7 +141,7 @@ class _Publisher:
         return sorted(found)
 
     def _values(self, step: Step) -> Iterator[tuple[int, int, str]]:
-        """(offset, bytes, value) of what a step has that is not zeros."""
+        """(offset, bytes, value) of all nonzero values of a step."""
         if isinstance(step, Count):
             yield 0, COUNT_BYTES, self._count(step.part)
         elif isinstance(step, Block):
@@ -154,15 +154,15 @@ class _Publisher:
         return f"std_logic_vector(unsigned({length}) + {terminator})" if terminator else length
 
     def _slices(self, leaf: FrameField) -> Iterator[Slice]:
-        """The pieces of the leaf's port; another `Fixed` may hold the elements before the first one here."""
+        """The pieces of the leaf's port; another `Fixed` may hold the elements before the leaf's first one."""
         port = self.side.field(leaf)
         for piece in slices_of(FieldPort(port.name, port.width, leaf)):
             yield Slice(port, piece.low + leaf.first * leaf.type.bits, piece.width, piece.offset, piece.bytes)
 
-    # --- what a place waits for, and how many bytes it has ------------------------------------------------------
+    # --- inputs and sizes of places -----------------------------------------------------------------------------
 
     def _supplies(self) -> Iterator[tuple[int, Context]]:
-        """(last place, what the places up to it wait for): an input, and the end of an element if both end here."""
+        """(last place, the inputs that the places up to it wait for); an element's last place also has its `valid`."""
         yield 0, {"signal": "segment_valid(0)", "element": ""}
         for area in self.places.areas:
             signal = self._supply(area.step)
@@ -185,7 +185,7 @@ class _Publisher:
         return _TRUE
 
     def _segment(self, segment: Segment | None) -> str:
-        # Behind the first place, the message's first segment is valid, or the message is withdrawn.
+        # After the first place, the message's first segment stays valid, or the message is withdrawn.
         if segment is None or segment == Segment((), 0):
             return _TRUE
         if not segment.scope:
@@ -194,7 +194,7 @@ class _Publisher:
         return ports.valid if ports.segments is None else f"{ports.segment_valid}({segment.number})"
 
     def _sizes(self) -> Iterator[tuple[int, Context]]:
-        """(last place, bytes of each of the places up to it); a stream and padding know their own."""
+        """(last place, bytes of each place up to it), without streams and padding, which determine their own sizes."""
         for area in self.places.areas:
             if isinstance(area.step, Stream | Padding):
                 continue
@@ -219,7 +219,7 @@ class _Publisher:
 
     @cached_property
     def _streams(self) -> list[tuple[Area, StreamPorts]]:
-        """Every stream's place and ports."""
+        """The place and the ports of every stream."""
         areas = self.places.areas_of(Stream)
         return [(area, self.side.stream(area.step.part)) for area in areas if isinstance(area.step, Stream)]
 
@@ -228,7 +228,7 @@ class _Publisher:
         return {
             "streams": [{"name": port.name, "place": area.first} for area, port in self._streams],
             "in_stream": _any_place(area.first for area, _ in self._streams),
-            # What is counted are bytes, of up to 2**32 - 1 elements.
+            # The counter counts bytes, of up to 2**32 - 1 elements.
             "left_bits": _COUNTER_BITS + extra_bits,
             "has_extra_bits": extra_bits > 0,
             "step_bits": max(2, self.lanes).bit_length(),
@@ -260,7 +260,7 @@ class _Publisher:
         }
 
     def _opening_jump(self, area: Area) -> Context:
-        """Past a part without elements; an array of fixed size has some."""
+        """The jump past a part without elements; an array of fixed size is never empty."""
         part = _part(area)
         is_array = isinstance(part, Loop) and part.count is None
         return {
@@ -272,7 +272,7 @@ class _Publisher:
         }
 
     def _closing_jump(self, closing: tuple[Close, int]) -> Context:
-        """Back to the next element."""
+        """The jump back to the next element."""
         return {
             "place": closing[1],
             "is_stream": False,
@@ -302,12 +302,12 @@ class _Publisher:
 
     @cached_property
     def _depths(self) -> dict[int, int]:
-        """How many loops are around the elements of each loop, itself included; by its identity."""
+        """The number of loops around the elements of each loop, including the loop itself, by the loop's identity."""
         return {id(close.loop): len(close.scope) for close, _ in self._closings}
 
     @cached_property
     def _bits_of_depths(self) -> dict[int, int]:
-        """Bits of the counter for the elements of loops, by the number of loops around these elements."""
+        """The width of the element counter for each depth, which is the number of loops around the elements."""
         bits: dict[int, int] = {}
         for close, _ in self._closings:
             count, depth = close.loop.count, len(close.scope)
@@ -353,7 +353,7 @@ class _Publisher:
         }
 
 
-# --- what a step is --------------------------------------------------------------------------------------------------
+# --- properties of steps ----------------------------------------------------------------------------------------------
 
 
 def _part(area: Area) -> Data | Loop:
@@ -362,7 +362,7 @@ def _part(area: Area) -> Data | Loop:
 
 
 def _shift(part: Data) -> int:
-    """By how many bits elements are more bytes."""
+    """The left shift that turns a number of elements into a number of bytes."""
     return _log2(part.element.size)
 
 
@@ -382,7 +382,7 @@ def _constants(block: Block) -> Iterator[tuple[int, int, str]]:
 
 
 def _by_place(choices: Iterable[tuple[int, Context]]) -> list[Context]:
-    """What holds up to a last place each, in order; neighbours that are alike share one."""
+    """The choices with their last places, in order; equal neighbours are merged."""
     return [{**value, "last": list(group)[-1][0]} for value, group in groupby(choices, key=lambda choice: choice[1])]
 
 
@@ -400,7 +400,7 @@ def _any_area(areas: Iterable[Area]) -> str:
 
 
 def _listed(places: Places) -> list[Context]:
-    """The places for the list in front of the architecture."""
+    """The places for the list before the architecture."""
     return [
         {"first": area.first, "last": area.last if area.last > area.first else None, "text": _about(area)}
         for area in places.areas

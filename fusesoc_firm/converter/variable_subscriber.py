@@ -57,7 +57,7 @@ _LARGEST_ALIGNMENT = 8
 
 
 class _Window(Lanes):
-    """The bytes of a block as the window shows them: from the lowest lane up."""
+    """The alignment of a block's bytes in the window: the first byte is in the lowest lane."""
 
     @property
     def payload_start(self) -> int:
@@ -97,7 +97,7 @@ class _Subscriber:
             "count_bits": self.lanes.bit_length(),
             "is_byte_wide": self.lanes == 1,
             "is_narrow": self.lanes < _LARGEST_ALIGNMENT,
-            # A count or the payload's length comes in one beat.
+            # A count or the payload's length fits into one beat.
             "is_count_whole": self.lanes >= COUNT_BYTES,
             "void_lanes": 0 if self.lanes == 1 else ID_BYTES,
             "ports": port_declarations(message_ports(self.frame, self.window.width), "out"),
@@ -129,7 +129,7 @@ class _Subscriber:
     # --- steps --------------------------------------------------------------------------------------------------
 
     def _tables(self) -> Context:
-        """The steps as lists and tables by their numbers."""
+        """The steps as lists and tables, indexed by step number."""
         sizes = [fixed_size(step) for step in self.steps]
         last_beats = [max(0, -(-size // self.lanes) - 1) for size in sizes]
         last_bytes = [size - self.lanes * beat for size, beat in zip(sizes, last_beats, strict=True)]
@@ -143,7 +143,7 @@ class _Subscriber:
         }
 
     def _kinds(self) -> Context:
-        """Which kinds of steps there are, and what of those is to be told apart."""
+        """The kinds of steps in the program, with the cases that the template must distinguish."""
         sizes = {element_size(step) for step in self.steps}
         alignments = {alignment_of(step) for step in self.steps}
         return {
@@ -169,7 +169,7 @@ class _Subscriber:
         }
 
     def _checks(self) -> Context:
-        """What must be on the wire."""
+        """The values that the subscriber checks on the wire."""
         prefix = self.frame.prefix[: self.frame.checked_prefix]
         beats = [prefix[first : first + self.lanes] for first in range(0, len(prefix), self.lanes)]
         has_zeros = any(map(closes_text, self.steps))
@@ -192,7 +192,7 @@ class _Subscriber:
         }
 
     def _opened(self, place: int, step: Step) -> Iterator[Context]:
-        """The registers of a part that is opened: of its length, and of how many elements are left."""
+        """The registers of a part: its length and the number of elements left."""
         if not isinstance(step, Open):
             return
         has_length, is_closed = step.part.is_used and is_counted(step), self._is_closed(step.part)
@@ -206,7 +206,7 @@ class _Subscriber:
             }
 
     def _loop(self, place: int) -> Context:
-        """An element ends with its last bytes; if a part at its end is empty, or an array, in a cycle of its own."""
+        """The end of a loop's element: with its last bytes, or in a separate cycle after a variable part or array."""
         step = self.steps[place]
         assert isinstance(step, Close)
         return {
@@ -218,7 +218,7 @@ class _Subscriber:
         }
 
     def _jumps(self, place: int) -> Iterator[Context]:
-        """Where a step leads elsewhere than to the next one: past a part that is empty, and at an element's end."""
+        """The jumps of a step: past an empty part, and at the end of an element."""
         match self.steps[place]:
             case Guard():
                 yield _jump("is_guard", place, self.program.behind_guard(place))
@@ -231,7 +231,7 @@ class _Subscriber:
     # --- ports --------------------------------------------------------------------------------------------------
 
     def _part(self, part: FieldPort | StreamPorts | ElementPorts) -> Iterator[Context]:
-        """The lengths and elements at the message side, and the numbers of their registers."""
+        """The lengths and elements on the message side, with the numbers of their registers."""
         if isinstance(part, StreamPorts):
             yield {"name": part.name, "number": self._number(part.part), "has_length": True, "element": None}
         elif isinstance(part, ElementPorts):
@@ -246,13 +246,13 @@ class _Subscriber:
         return {"name": ports.name, "number": self._number(ports.loop), "segments": ports.segments}
 
     def _streams(self) -> list[Context]:
-        """Every stream that somebody takes; the bytes of others are dropped."""
+        """All used streams; the bytes of other streams are dropped."""
         streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, Stream)]
         return [{"name": self.side.stream(part).name, "step": place} for place, part in streams if part.is_used]
 
     @cached_property
     def _stores(self) -> list[tuple[int, Block, list[tuple[str, Store]]]]:
-        """The stores of each block that holds used fields, by name."""
+        """The stores of each block with used fields, with their names."""
         found = []
         number = 0
         for place, step in enumerate(self.steps):
@@ -265,7 +265,7 @@ class _Subscriber:
         return found
 
     def _field_slices(self, block: Block, named: Sequence[tuple[str, Store]]) -> Iterator[Context]:
-        """The bits of ports, and where they are in the stores."""
+        """The bits of ports with their positions in the stores."""
         places = StoreMap(self.window, [store for _, store in named])
         names = [name for name, _ in named]
         for leaf in block.fields:
@@ -277,7 +277,7 @@ class _Subscriber:
 
     @cached_property
     def _elements(self) -> list[ElementPorts]:
-        """Of every loop whose elements somebody takes."""
+        """The ports of the elements of all loops with used elements."""
         return [ports for ports in self.side.parts if isinstance(ports, ElementPorts) and self._is_closed(ports.loop)]
 
     @cached_property
@@ -293,7 +293,7 @@ class _Subscriber:
 
     @cached_property
     def _numbers(self) -> dict[tuple[type, Path], int]:
-        """Parts are numbered in wire order for the names of their registers."""
+        """The number of each part in wire order, for the names of its registers."""
         paths = [(type(step.part), step.part.path) for step in self.steps if isinstance(step, Open)]
         return {path: number for number, path in enumerate(paths)}
 
@@ -301,7 +301,7 @@ class _Subscriber:
         return self._numbers[type(part), part.path]
 
     def _segment_bit(self, segment: Segment | None) -> str:
-        """The bit that tells that a segment is there; "" if nobody is told."""
+        """The bit that signals a segment as valid; "" if no port signals it."""
         if segment is None:
             return ""
         if not segment.scope:
@@ -316,12 +316,12 @@ _JUMPS = ("is_guard", "is_open", "is_last_element", "is_element")
 
 
 def _jump(kind: str, place: int, target: int, number: int | None = None) -> Context:
-    """A jump of one of these kinds; `number` is that of a loop."""
+    """A jump of the given kind; `number` is the number of a loop."""
     return {"step": place, "target": target, "number": number, **{name: name == kind for name in _JUMPS}}
 
 
 def _store(place: int, block: Block, name: str, store: Store, lanes: int) -> Context:
-    """A register, and the beats of a block in which it takes lanes of the window."""
+    """A register, with the beats of a block in which it stores lanes of the window."""
     beats = ranges(store.beats)
     is_always = beats == [(0, -(-block.size // lanes) - 1)]
     windows = [] if is_always else [within("beat_r", *window) for window in beats]

@@ -1,10 +1,10 @@
-"""Literals, operands and conditions in VHDL, for the values that templates print: statements stand in the templates."""
+"""Literals, operands and conditions in VHDL, for the values that templates print; templates hold the statements."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-# About so long are the lines of a condition.
+# The approximate length of a condition's lines.
 LINE = 80
 
 
@@ -19,7 +19,7 @@ def bit(vector: str, number: int) -> str:
 
 
 def bits(vector: str, high: int, low: int) -> str:
-    """Some bits of a vector."""
+    """A range of bits of a vector."""
     return f"{vector}({high} downto {low})"
 
 
@@ -29,22 +29,22 @@ def binary(value: int, width: int) -> str:
 
 
 def hexadecimal(data: bytes) -> str:
-    """Bytes as a literal, the first one lowest."""
+    """Bytes as a literal, the first byte lowest."""
     return f'x"{data[::-1].hex()}"'
 
 
 def bits_of_bool(port: str) -> str:
-    """A bool's bit as the byte that is sent."""
+    """The byte that is sent for a bool's bit."""
     return f'"0000000" & {port}'
 
 
 def within(number: str, first: int, last: int) -> str:
-    """The condition that a number is one of `first` to `last`."""
+    """The condition that a number is in the range `first` to `last`."""
     return f"{number} = {first}" if first == last else f"({number} >= {first} and {number} <= {last})"
 
 
 def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
-    """Operands with an operator between them, in lines of about `length` characters that lack it at their ends."""
+    """Operands joined by an operator, in lines of about `length` characters; the operator is omitted at line ends."""
     lines: list[str] = []
     for operand in operands:
         if lines and len(lines[-1]) + len(operand) < length:
@@ -55,10 +55,10 @@ def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
 
 
 def all_of(conditions: Iterable[str]) -> str:
-    """What is '1' while all of them are."""
+    """The expression that is '1' while all conditions are."""
     return " and ".join(conditions)
 
 
 def any_of(conditions: Iterable[str]) -> str:
-    """The condition that one of them holds; "" if there is none."""
+    """The condition that at least one of them holds; "" if there are no conditions."""
     return " or\n        ".join(wrapped(conditions, "or", LINE))

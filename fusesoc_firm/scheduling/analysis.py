@@ -1,4 +1,4 @@
-"""What each policy means for a set of tasks: bounds on response and lateness, buffers, and which policy is best."""
+"""The analysis of policies for a set of tasks: bounds on response and lateness, buffers, and the best policy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fusesoc_firm.scheduling.tasks import Task
 
 
 class Criterion(StrEnum):
-    """What the best policy is best at."""
+    """The criterion by which the best policy is chosen."""
 
     LUTS = "luts"
     LATENESS = "lateness"
@@ -25,9 +25,9 @@ class Criterion(StrEnum):
 
 @dataclass(frozen=True)
 class Bound:
-    """What is certain of a task, in cycles; None is no bound: it may never be served.
+    """The guarantees for a task, in cycles; None means no bound: the task may never be served.
 
-    `buffer` are the bytes that the accelerator may have to keep (section 6.3.2): what comes while the task is late.
+    `buffer` is the number of bytes that the accelerator may have to store while the task is late (section 6.3.2).
     """
 
     task: Task
@@ -36,15 +36,16 @@ class Bound:
 
     @property
     def lateness(self) -> int | None:
-        """The most cycles between deadline and end; negative if the task is always early (equation 4.5)."""
+        """The most cycles from deadline to end; negative if the task always ends before its deadline (equation 4.5)."""
         return None if self.response is None else self.response - self.task.deadline
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """What a policy does with the tasks; `bounds` are in the order of the tasks.
+    """The results of a policy for the tasks; `bounds` are in the order of the tasks.
 
-    `priorities` are the tasks' names, the highest first, if the policy has fixed ones. `lut` is None if not known.
+    `priorities` are the tasks' names, the highest priority first, if the policy has fixed priorities. `lut` is None if
+    it is unknown.
     """
 
     policy: str
@@ -54,53 +55,54 @@ class Analysis:
 
     @property
     def all_finish(self) -> bool:
-        """Whether nobody can starve."""
+        """Whether no task can starve."""
         return all(bound.response is not None for bound in self.bounds)
 
     @property
     def is_schedulable(self) -> bool:
-        """Whether no deadline can be missed."""
+        """Whether no task can miss its deadline."""
         return self.worst_lateness <= 0
 
     @property
     def worst_lateness(self) -> float:
-        """The greatest bound on a lateness; infinite if somebody may starve."""
+        """The greatest bound on a lateness; infinite if a task may starve."""
         return max(inf if bound.lateness is None else bound.lateness for bound in self.bounds)
 
     @property
     def latest(self) -> Bound:
-        """The task that this is the bound of."""
+        """The task with that lateness."""
         return max(self.bounds, key=lambda bound: inf if bound.lateness is None else bound.lateness)
 
     @property
     def buffer(self) -> int | None:
-        """Bytes of all buffers; None if one has no bound."""
+        """The bytes of all buffers; None if one of them has no bound."""
         sizes = [bound.buffer for bound in self.bounds]
         return None if None in sizes else sum(size for size in sizes if size is not None)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """What the tasks share: bytes of a beat, and the least beats of a run that may be interrupted."""
+    """The resource that the tasks share: bytes of a beat, and the shortest run in beats before an interruption."""
 
     beat_bytes: int = 1
     shortest_run: int = 1
 
 
 def utilisation(tasks: Sequence[Task]) -> float:
-    """The part of the channel that the tasks ask for (equation 4.1)."""
+    """The utilisation of the channel by the tasks (equation 4.1)."""
     return sum(task.transfer_time / task.period for task in tasks)
 
 
 def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overheads:
-    """What the cores of a policy cost (cores/sched).
+    """The overheads of a policy's cores (cores/sched).
 
-    A scheduler that chooses among all requests at once needs a cycle, or two if it compares times. One with a queue
-    takes in a request a cycle; each may lead to three operations of the queue (it goes in, who is interrupted goes in,
-    the next comes out), of two cycles each in a heap.
+    A scheduler that chooses among all requests at once needs one cycle, or two if it compares times. A scheduler with a
+    queue accepts one request in each cycle. Each request may cause three operations of the queue: the request is
+    inserted, the interrupted task is inserted, and the next task is removed. In a heap, each operation takes two
+    cycles.
     """
     row = POLICIES[policy]
-    # Who is alone is never interrupted.
+    # A single task is never interrupted.
     run, resume = (shortest_run, 1) if row.is_preemptive and requesters > 1 else (0, 0)
     if requesters <= row.most_at_once:
         return Overheads(2 if row.has_deadlines else 1, 0, run, resume)
@@ -108,12 +110,12 @@ def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overhea
 
 
 def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *, is_ordered: bool = False) -> Analysis:
-    """Bounds under a policy; with fixed priorities, under the best assignment that is found.
+    """Bounds under a policy; with fixed priorities, under the best known assignment.
 
-    If the tasks are `is_ordered`, they stand in the order of their priorities, the highest first.
+    If `is_ordered` is set, the tasks are in the order of their priorities, the highest first.
 
-    The bounds hold for the cores' cycle-exact models with a sink that takes every beat; tests hold them against
-    simulation.
+    The bounds hold for the cores' cycle-exact models with a sink that accepts every beat. Tests compare them with
+    simulations.
     """
     overheads = overheads_of(policy, len(tasks), channel.shortest_run)
     order: Sequence[Task] = ()
@@ -133,10 +135,10 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
 
 
 def luts(policy: str, requesters: int) -> int | None:
-    """LUTs of a scheduler, and of what the Manager takes more to make bursts of what a preemptive one interrupts.
+    """The LUTs of a scheduler, plus those that the Manager needs for the bursts of a preemptive one.
 
-    They are the measured ones, or where nothing was measured those of the dissertation's table 4.1, which knows no
-    bursts; None if they are not known.
+    The values are measured. If there is no measurement, they are those of the dissertation's table 4.1, which has no
+    bursts. The result is None if both are missing.
     """
     measured = area.measured()
     if not measured:
@@ -149,15 +151,15 @@ def luts(policy: str, requesters: int) -> int | None:
 
 
 def _burst_luts(measured: Areas, requesters: int) -> int | None:
-    """The Manager's; as a difference of two mappings it can be below 0, where the multiplexers are most of it."""
+    """The Manager's LUTs for bursts; a difference of two mappings, which multiplexer mapping can make negative."""
     bursts, whole = (area.at(measured, design, requesters) for design in (area.MANAGER_PREEMPTIVE, area.MANAGER))
     return bursts.lut - whole.lut if bursts and whole else None
 
 
 def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
-    """Bytes that come while a task is late: those of the requests after it, a beat a cycle at most.
+    """The bytes that arrive while a task is late: those of the requests after it, at most one beat in each cycle.
 
-    That is never more than section 6.3.2's rule, a byte for each cycle of the greatest lateness.
+    The result never exceeds the rule of section 6.3.2: one byte for each cycle of the greatest lateness.
     """
     if response is None:
         return None
@@ -173,8 +175,8 @@ def assign_priorities(policy: str, tasks: Sequence[Task], overheads: Overheads) 
     """The tasks, the highest priority first.
 
     Deadline monotonic is optimal with preemption if no deadline is longer than its period (J. Leung and J. Whitehead,
-    1982). Otherwise from the lowest priority up, each goes to a task that meets its deadline there (N. Audsley, 1991),
-    to the one with the longest deadline if several do, or if none does.
+    1982). Otherwise, priorities are assigned from the lowest up: each goes to a task that meets its deadline there (N.
+    Audsley, 1991). If several tasks do, or none, the one with the longest deadline gets it.
     """
     by_deadline = sorted(tasks, key=lambda task: task.deadline)
     if POLICIES[policy].is_preemptive and all(task.deadline <= task.period for task in tasks):
@@ -224,7 +226,7 @@ def _lst(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
 
 
 def _least(task: Task, lateness: float, counted: int) -> int:
-    """The lesser of two bounds, of which the first is on the lateness of any task."""
+    """The smaller of two bounds, the first of which limits the lateness of every task."""
     return counted if lateness == inf else min(task.deadline + floor(lateness), counted)
 
 
@@ -241,7 +243,7 @@ _RESPONSES: Mapping[Order, Callable[[Sequence[Task], Overheads], list[int | None
 
 @dataclass(frozen=True)
 class Choice:
-    """All policies, the best one first, and why it is."""
+    """All policies, the best one first, with the reasons for this order."""
 
     criterion: Criterion
     utilisation: float
@@ -250,7 +252,7 @@ class Choice:
 
     @property
     def best(self) -> Analysis:
-        """The chosen one."""
+        """The chosen policy."""
         return self.analyses[0]
 
 
@@ -261,7 +263,7 @@ def choose(
     *,
     is_ordered: bool = False,
 ) -> Choice:
-    """The best policy; `is_ordered` as in `analyse`. Raises `ValueError` for no tasks, or two of one name."""
+    """Choose the best policy, with `is_ordered` as in `analyse`; raises `ValueError` for no tasks or equal names."""
     if not tasks:
         raise ValueError("there are no tasks")
     if len({task.name for task in tasks}) < len(tasks):
@@ -278,7 +280,8 @@ def _luts_rank(analysis: Analysis) -> float:
     return inf if analysis.lut is None else analysis.lut
 
 
-# Who keeps all deadlines goes before who does not, who lets all finish before who does not; then what is asked for.
+# First the policies that keep all deadlines, then those that finish all tasks; within each group, the criterion
+# decides.
 _RANKS: Mapping[Criterion, Callable[[Analysis], tuple[float, ...]]] = {
     Criterion.LUTS: lambda each: (
         not each.is_schedulable,
@@ -330,7 +333,7 @@ _MERITS: Mapping[Criterion, Callable[[Analysis], str]] = {
 
 
 def end_of(analysis: Analysis) -> str:
-    """How the worst end stands to its deadline, in words."""
+    """The greatest lateness relative to the deadline, in words."""
     latest = analysis.latest
     name, lateness = latest.task.name, latest.lateness
     if lateness is None:

@@ -1,8 +1,8 @@
-"""LUTs and flip-flops of the schedulers and of the Manager: what `make bench BENCH=manager` measured.
+"""LUTs and flip-flops of the schedulers and of the Manager, measured by `make bench BENCH=manager`.
 
-The file is `area.csv` beside this module, with the columns design, requesters, lut, ff. A design is a policy, a
-combination of policies by its name in table 4.5, or the Manager without scheduler for streams of 8 bits. Of a design or
-a number that the file has not, nothing is known here.
+The file is `area.csv` next to this module, with the columns design, requesters, lut, ff. A design is a policy, a
+combination of policies by its name in table 4.5, or the Manager without scheduler for streams of 8 bits. The areas of
+all other designs and numbers of requesters are unknown.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MANAGER_PREEMPTIVE = "manager_preemptive"
 
 @dataclass(frozen=True)
 class Area:
-    """What a design takes; LUTs that are memory count as LUTs."""
+    """The area of a design; LUTs used as memory count as LUTs."""
 
     lut: int
     ff: int
@@ -37,25 +37,25 @@ Areas = Mapping[tuple[str, int], Area]
 
 @cache
 def measured() -> Areas:
-    """By design and number of requesters; empty if nothing was measured."""
+    """The areas by design and number of requesters; empty if nothing was measured."""
     file = resources.files(__package__) / FILE
     return read(file.read_text(encoding="utf-8")) if file.is_file() else {}
 
 
 def read(text: str) -> dict[tuple[str, int], Area]:
-    """The areas in the text of a file."""
+    """Read the areas from the text of a file."""
     rows = csv.DictReader(text.splitlines())
     return {(row["design"], int(row["requesters"])): Area(int(row["lut"]), int(row["ff"])) for row in rows}
 
 
 def write(path: Path, areas: Areas) -> None:
-    """Write what was measured, in the order of names and numbers."""
+    """Write the measured areas, in the order of names and numbers."""
     lines: Iterable[tuple[object, ...]] = ((*key, area.lut, area.ff) for key, area in sorted(areas.items()))
     text = "\n".join(",".join(map(str, line)) for line in (COLUMNS, *lines))
     path.write_text(f"{text}\n", encoding="utf-8")
 
 
 def at(areas: Areas, design: str, requesters: int) -> Area | None:
-    """The area for a number of requesters, or for the next larger one that is known; None if there is none."""
+    """The area for a number of requesters, or for the next larger known number; None if there is none."""
     known = [number for name, number in areas if name == design and number >= requesters]
     return areas[design, min(known)] if known else None

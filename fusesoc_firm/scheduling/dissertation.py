@@ -1,4 +1,4 @@
-"""The values of the dissertation's tables 4.1 to 4.6, from the file of facts beside this module."""
+"""The values of the dissertation's tables 4.1 to 4.6, from the data file next to this module."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Row = list[float]
 
 @dataclass(frozen=True)
 class Dissertation:
-    """Tables by policy and number of accelerators; the rows are described in the file."""
+    """Tables by policy and number of accelerators; comments in the file describe the rows."""
 
     area: dict[str, dict[int, Row]]
     edf_ratio: dict[int, Row]

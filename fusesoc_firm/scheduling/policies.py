@@ -1,6 +1,7 @@
-"""The scheduling policies: each is a row here, a model in `models` and a core in cores/sched.
+"""The scheduling policies: each has a row here, a model in `models` and a core in cores/sched.
 
-`make policies` writes the lists that cores hold of them (tests/cores/policies.py). docs/scheduling.md: how to add one.
+`make policies` writes the cores' lists of policies (tests/cores/policies.py). docs/scheduling.md explains how to add a
+policy.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from types import MappingProxyType
 
 
 class Order(StrEnum):
-    """The order in which tasks are served, from which the analysis takes its bounds."""
+    """The order in which tasks are served; the analysis derives its bounds from it."""
 
     PRIORITY = "fixed priorities"
     TURNS = "each other task at most once before a task"
@@ -23,7 +24,7 @@ class Order(StrEnum):
 
 @dataclass(frozen=True)
 class Policy:
-    """A policy; `name` is its word in specifications, and its model's function and file."""
+    """A policy; `name` is its word in specifications, and the name of its model's function and file."""
 
     name: str
     short: str
@@ -52,7 +53,7 @@ class Policy:
 
     @property
     def core_file(self) -> str:
-        """The name of the core's file, without its ending."""
+        """The name of the core's file, without its suffix."""
         return self.core or self.name
 
     @property
@@ -62,7 +63,7 @@ class Policy:
 
     @property
     def generics(self) -> tuple[str, ...]:
-        """The generics of the entity beside REQUESTERS."""
+        """The generics of the entity other than REQUESTERS."""
         uses = {
             "PREEMPTIVE": self.is_preemptive and self.order is Order.PRIORITY,
             "PERIODS": self.has_deadlines,

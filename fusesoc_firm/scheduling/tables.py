@@ -13,7 +13,7 @@ UNKNOWN = "-"
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the dissertation again: its number there (`4.3`), a title, rows of cells, and what must be said."""
+    """A reproduced table of the dissertation: its number there (`4.3`), a title, rows of cells, and remarks."""
 
     number: str
     title: str
@@ -23,15 +23,15 @@ class Table:
 
     @property
     def file_name(self) -> str:
-        """Without a suffix, such as `table_4_3`."""
+        """The file name without a suffix, such as `table_4_3`."""
         return f"table_{self.number.replace('.', '_')}"
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A diagram: values by the name of the scheduler, one for each number of accelerators; NaN is no value.
+    """A diagram: values by scheduler name, one for each number of accelerators; NaN means no value.
 
-    `dissertation` are its values, where its tables hold them.
+    `dissertation` has the dissertation's values, if its tables contain them.
     """
 
     title: str
@@ -41,7 +41,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the dissertation again, with diagrams side by side over the numbers of accelerators."""
+    """A reproduced figure of the dissertation: diagrams side by side over the numbers of accelerators."""
 
     number: str
     title: str
@@ -51,12 +51,12 @@ class Figure:
 
     @property
     def file_name(self) -> str:
-        """Without a suffix, such as `figure_4_10`."""
+        """The file name without a suffix, such as `figure_4_10`."""
         return f"figure_{self.number.replace('.', '_')}"
 
 
 def decimal(value: float | None) -> str:
-    """A value as the dissertation's tables have it, with two digits behind the point."""
+    """A value in the format of the dissertation's tables, with two decimal places."""
     return UNKNOWN if value is None or math.isnan(value) else f"{value:.2f}"
 
 
@@ -67,7 +67,7 @@ def markdown(table: Table) -> str:
 
 
 def figure_markdown(figure: Figure) -> str:
-    """The values of a figure under its heading, a table a panel."""
+    """The values of a figure under its heading, with a table for each panel."""
     parts = [f"### Figure {figure.number}: {figure.title} ({figure.unit})\n"]
     for panel in figure.panels:
         columns = ("accelerators", *panel.series)
@@ -80,7 +80,7 @@ def figure_markdown(figure: Figure) -> str:
 
 
 def grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table; the first column to the left, numbers to the right."""
+    """A Markdown table; the first column is left-aligned, numbers are right-aligned."""
     lines = [columns, *rows]
     widths = [max(len(line[column]) for line in lines) for column in range(len(columns))]
     rule = "|".join(["", "-" * (widths[0] + 2), *("-" * (width + 1) + ":" for width in widths[1:]), ""])
@@ -92,7 +92,7 @@ def grid(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def table_csv(table: Table) -> str:
-    """The table's cells; what is unknown is empty."""
+    """The table's cells as CSV; unknown values are empty."""
     return _csv(table.columns, [["" if cell == UNKNOWN else cell for cell in row] for row in table.rows])
 
 

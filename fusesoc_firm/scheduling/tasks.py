@@ -1,4 +1,4 @@
-"""A task: what a requester sends, and by when."""
+"""A task: a requester's transfer with its period and deadline."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 class Task:
     """A sporadic task, in cycles.
 
-    Its requests come at least `period` apart, and never before its last transfer is over; each wants `transfer_time`
-    beats, and wants them sent `deadline` cycles after it is first seen. The deadline may be shorter or longer than the
-    period (section 4.1).
+    Its requests are at least `period` apart, and never before the end of the last transfer. Each request is for
+    `transfer_time` beats, to be sent within `deadline` cycles after the scheduler first sees it. The deadline may be
+    shorter or longer than the period (section 4.1).
     """
 
     name: str

@@ -1,7 +1,7 @@
-"""What the core beside a specification says of its messages, so that all commands search the places that a build does.
+"""The message sources that the core next to a specification names, so that all commands search where a build does.
 
-The order is that of a build, too: what the specification itself names under `paths`, what a command is given, what the
-core names, a sourced ROS, a distribution.
+The order is also that of a build: the specification's own `paths`, the command's arguments, the core's paths, a sourced
+ROS, a distribution.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.system.system_core import LoadedSystem, load_system, with_paths
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 
-# The instance of the generator that makes the system.
+# The generator instance that makes the system.
 _INSTANCE = "system"
 
 
 @dataclass(frozen=True)
 class MessageSources:
-    """Where the messages of a system come from, beside what its specification names: in order of precedence."""
+    """The sources of a system's messages in order of precedence, except those that its specification names."""
 
     paths: tuple[Path, ...] = ()
     distro: str | None = None
 
 
 def core_of(spec: Path) -> CoreFile | None:
-    """The core beside a specification that makes a system of it and can simulate it; None if there is none."""
-    # Path.resolve() raises an error of its own for a link that leads in a circle.
+    """The core next to a specification that uses and can simulate it; None if there is no such core."""
+    # Path.resolve() raises an error of its own for a cyclic link.
     spec = Path(os.path.realpath(spec))
     for path in sorted(spec.parent.glob("*.core")):
-        # What is wrong with a core that is not this one's is FuseSoC's to say.
+        # FuseSoC reports the faults of unrelated cores.
         with suppress(InputError):
             core = read_core(path)
             made = core.parameters(_INSTANCE).get("spec")
@@ -47,9 +47,9 @@ def core_of(spec: Path) -> CoreFile | None:
 def sources_of(
     spec: Path, paths: Sequence[Path] = (), distro: str | None = None, core_folders: CoreFolders = no_core_folders
 ) -> MessageSources:
-    """What a command is given, then what the core beside a specification says.
+    """The command's arguments, followed by the sources of the core next to a specification.
 
-    A core with messages that FuseSoC does not know here is left to the build.
+    If messages come from a core that FuseSoC does not know here, the build reports it.
     """
     core = core_of(spec)
     parameters = core.parameters(_INSTANCE) if core else {}
@@ -68,19 +68,19 @@ def load_beside(
     needs_sources: bool = True,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """The system of a specification for a command that is given `paths` and `distro`. Raises `InputError`."""
+    """The system of a specification for a command with arguments `paths` and `distro`; raises `InputError`."""
     sources = sources_of(spec, paths, distro, core_folders)
     known = libraries(sources.paths, os.environ, sources.distro)
     return load_system(spec, known, needs_sources=needs_sources, core_folders=core_folders)
 
 
 def known_names(spec: Path, own: Sequence[str], sources: MessageSources, core_folders: CoreFolders) -> list[str]:
-    """All messages that a specification at `spec` with `own` paths can name, sorted. Raises `InputError`."""
+    """All messages that a specification at `spec` with its `own` paths can name, sorted; raises `InputError`."""
     known = libraries(sources.paths, os.environ, sources.distro)
     found = with_paths(known, dict.fromkeys(own), spec.parent, core_folders, Diagnostics())
     return sorted({str(name) for library in found.values() for name in library.names()})
 
 
 def _words(value: object) -> list[str]:
-    """A list of words; none where it is something else, which the build reports."""
+    """A list of words; empty for any other value, which the build reports."""
     return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []

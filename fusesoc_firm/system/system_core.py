@@ -1,4 +1,4 @@
-"""The generator `far`: a system's converters, accelerators and top level as a core."""
+"""The generator `far`: a core with a system's converters, accelerators and top level."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, S
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
 
-# FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
+# FuseSoC's file types for accelerators' languages, and the suffixes of files that are not compiled by themselves.
 _FILE_TYPES = {
     ".vhd": VHDL,
     ".vhdl": VHDL,
@@ -62,9 +62,9 @@ _INCLUDE_SUFFIXES = (".vh", ".svh")
 
 @dataclass(frozen=True)
 class LoadedSystem:
-    """A specification, the folder its paths are relative to, the board if one is given, and the system derived.
+    """A specification, its folder, an optional board, and the derived system; paths are relative to the folder.
 
-    `warnings` are for whoever wrote the specification.
+    `warnings` are for the author of the specification.
     """
 
     specification: Specification
@@ -75,16 +75,16 @@ class LoadedSystem:
     warnings: tuple[Diagnostic, ...] = ()
 
     def inputs(self) -> list[Input]:
-        """The accelerators' sources and the files of all messages."""
+        """The accelerators' sources and the definitions of all messages."""
         return [*source_files(self.specification, self.folder), *self._message_files()]
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
-        """Every message of a converter once, whichever of its fields are used, with all definitions within it."""
+        """Each message of a converter once, regardless of its used fields, with its definition and all nested ones."""
         messages = dict.fromkeys((frame.ros, frame.message) for frame in self.system.frames)
         return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
 
     def definitions(self) -> list[tuple[MessageLibrary, Definitions]]:
-        """The library of each message, of software too, with all definitions within it."""
+        """The library of each message, also of those of software, with the message's definition and all nested ones."""
         types = self.system.software.types
         sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
         frames = dict.fromkeys((*self.system.frames, *sides))
@@ -103,10 +103,10 @@ def load_system(
     board: Board | None = None,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """Read and derive the system of a specification, on a board if one is given. Raises `InputError` with all faults.
+    """Read and derive the system of a specification, on an optional board; raises `InputError` with all faults.
 
-    Unless it `needs_sources`, those of accelerators may be missing. What the specification names under `paths` goes
-    before what the `libraries` know.
+    Unless it `needs_sources`, accelerators' source files may be missing. Messages in the specification's `paths` take
+    precedence over those in `libraries`.
     """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
@@ -127,7 +127,7 @@ def with_paths(
     core_folders: CoreFolders,
     faults: Diagnostics,
 ) -> dict[Middleware, MessageLibrary]:
-    """The libraries with the `paths` of a specification in `folder` before all else.
+    """The libraries, with the `paths` of a specification in `folder` first.
 
     Raises `InputError` with all `faults` if one of these paths is wrong, since unknown messages would follow from it.
     """
@@ -160,12 +160,12 @@ def load_requested(request: Request) -> LoadedSystem:
 
 
 def specification_path(request: Request) -> Path:
-    """The specification that a generator call names."""
+    """The path of the specification that a generator call names."""
     return request.files_root / str(request.parameters["spec"])
 
 
 def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """The specification of a request and every file that it leads to, as it was loaded."""
+    """The specification of a request with all files that it uses."""
     board = [_board_path(request)] if request.parameters.get("board") else []
     return [specification_path(request), *board, *loaded.inputs()]
 
@@ -180,7 +180,7 @@ def _board(request: Request) -> Board | None:
 
 
 class Part(Enum):
-    """What a generated file is for, as the dissertation's table 6.2 tells them apart."""
+    """The purpose of a generated file, in the classes of the dissertation's table 6.2."""
 
     CONVERTERS = "converters"
     WRAPPERS = "wrappers"
@@ -189,7 +189,7 @@ class Part(Enum):
 
 @dataclass(frozen=True)
 class Artifact:
-    """A generated file: what it is called, what it is for, and what it is rendered from."""
+    """A generated file: its name, its purpose, its template and its data."""
 
     path: str
     part: Part
@@ -198,12 +198,12 @@ class Artifact:
 
     @cached_property
     def text(self) -> str:
-        """Its content."""
+        """The text of the file."""
         return render(self.template, self.configuration)
 
 
 def artifacts(loaded: LoadedSystem) -> list[Artifact]:
-    """Every file that is generated for a system, once, in the order in which a tool reads them, the top level last."""
+    """All generated files of a system, each once, in compilation order with the top level last."""
     return list({item.path: item for item in _artifacts(loaded)}.values())
 
 
@@ -227,7 +227,7 @@ def _artifacts(loaded: LoadedSystem) -> Iterator[Artifact]:
 
 
 def system_core(loaded: LoadedSystem) -> GeneratedCore:
-    """The core of a loaded system, its files in the order in which a tool reads them. Raises `InputError`."""
+    """The core of a loaded system, with its files in compilation order; raises `InputError`."""
     system = loaded.system
     made = {item.path: GeneratedFile(item.text, VHDL) for item in artifacts(loaded)}
     top = f"{system.entity}.vhd"
@@ -240,7 +240,7 @@ def system_core(loaded: LoadedSystem) -> GeneratedCore:
 
 
 def _board_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
-    """What fits a system on a board: a top level and constraints."""
+    """The top level and the constraints that fit a system to a board."""
     check_fits(loaded.system, board)
     if board.is_linked:
         return _linked_files(loaded, board)
@@ -257,7 +257,7 @@ def _linked_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile
 
 
 def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedFile]:
-    """The block design, and what it takes to make IP of C++."""
+    """The block design, and the scripts that turn C++ functions into IPs."""
     system, clock = loaded.system, _clock(loaded)
     files: dict[str, GeneratedFile] = {}
     for type_ in system.kernels:
@@ -273,7 +273,7 @@ def _processor_files(loaded: LoadedSystem, board: Board) -> dict[str, GeneratedF
 
 
 def _clock_files(loaded: LoadedSystem, board: Board, form: str, file_type: str) -> dict[str, GeneratedFile]:
-    """The constraints of clocks."""
+    """The timing constraints of clocks."""
     text = render(f"board/{form}", clocks_configuration(loaded.system, board, _clock(loaded)))
     return {f"{board.name}.{form}": GeneratedFile(text, file_type)}
 
@@ -285,7 +285,7 @@ def _clock(loaded: LoadedSystem) -> Fraction:
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:
-    """The user's VHDL and Verilog; a package of two accelerators is there once, as it must not be analysed twice."""
+    """The user's VHDL and Verilog; a shared package is listed once, as it must not be analysed twice."""
     files: dict[str, GeneratedFile] = {}
     taken: set[Path] = set()
     for type_ in types:
@@ -302,7 +302,7 @@ def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, Genera
 
 
 def source_name(accelerator: Accelerator, source: str) -> str:
-    """Where a source file lies in the generated core: below a folder of its accelerator, as in the specification."""
+    """The path of a source file in the generated core: in its accelerator's folder, as in the specification."""
     names = {"..": "above", "/": "root"}
     parts = [names.get(part, part) for part in PurePosixPath(source).parts]
     return str(PurePosixPath(identifier(accelerator.name), *parts))

@@ -1,4 +1,4 @@
-"""What the generator `firm` makes of a request: of a message, a service, an action, or a configuration file."""
+"""The generator `firm` with requests for a message, a service, an action, or a configuration file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.expected import check_expected
 
 GOLDEN = Path(__file__).parent / "golden"
 
-# The dissertation's listing 5.1 as it stands.
+# The dissertation's listing 5.1, unchanged.
 LISTING_5_1 = """\
 project:
   name: Sobel Filter
@@ -187,7 +187,7 @@ def test_a_message_in_both_versions_one_each_way(demo: Path) -> None:
 
 
 def test_packages_are_namespaces(demo: Path) -> None:
-    """Messages of one name in two packages stand side by side."""
+    """Messages of the same name in two packages coexist."""
     (demo / "other_msgs" / "msg").mkdir(parents=True)
     (demo / "other_msgs" / "msg" / "Grip.msg").write_text("uint64 width\n")
     entries = [

@@ -1,4 +1,4 @@
-"""What no converter is made for is refused with every field that is to blame, where it is defined."""
+"""Messages that converters do not support are rejected with all offending fields, at their definitions."""
 
 from __future__ import annotations
 

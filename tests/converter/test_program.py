@@ -1,4 +1,4 @@
-"""The steps of converters of variable size, and the segments that they tell their values by."""
+"""The steps of converters of variable size, and the segments of their values."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_what_is_not_used_is_constant_to_a_publisher() -> None:
 
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 def test_both_converters_have_the_same_segments(ros: Middleware) -> None:
-    """Whatever is used: each field, length and element is told by the same bit on both sides."""
+    """Each used field, length and element has the same bit on both sides, for any selection of fields."""
     chance = random.Random(20240715)
     for frame in variable_frames(ros):
         names = [dotted(step.part.names) for step in subscriber_program(frame).steps if isinstance(step, Open)]

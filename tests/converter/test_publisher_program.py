@@ -1,4 +1,4 @@
-"""The steps of a publisher: gone through for a value, they make the bytes of rosbags."""
+"""The steps of a publisher: executed for a value, they produce the bytes of rosbags."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Walk:
     def __init__(self, program: Program, value: Any) -> None:
         self.program = program
         self.payload = bytearray()
-        # The value of each scope around, and of each loop the elements that are still to come.
+        # The value of each enclosing scope, and the remaining elements of each loop.
         self.values: list[tuple[Any, int]] = [(value, 0)]
         self.waiting: dict[int, list[Any]] = {}
 
@@ -59,7 +59,7 @@ class Walk:
         return bytes(self.payload)
 
     def step(self, place: int) -> int:
-        """Do a step and tell the next one."""
+        """Execute a step and return the next one."""
         step = self.program.steps[place]
         match step:
             case Block():
@@ -141,7 +141,7 @@ def test_every_message_is_that_of_rosbags(ros: Middleware) -> None:
 
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 def test_what_is_not_used_is_sent_as_its_default(ros: Middleware) -> None:
-    """For every message and each of its fields alone; unused are zeros, empty texts and arrays."""
+    """Select each field of every message alone; unused fields are zeros, empty texts and empty arrays."""
     oracle = Oracle(ros, VARIABLE[ros])
     source = random.Random(SEED)
     for name in (f"{PACKAGE}/Tree", f"{PACKAGE}/Nameds", f"{PACKAGE}/Sizes", "sensor_msgs/PointCloud2"):
@@ -156,7 +156,7 @@ def test_what_is_not_used_is_sent_as_its_default(ros: Middleware) -> None:
 
 
 def test_defaults_of_unused_fields_are_constants() -> None:
-    """rosbags drops defaults: the codec makes what is compared with."""
+    """rosbags drops defaults, so the codec provides the expected bytes."""
     text = "string name 'ab'\nuint8 x 7\nfloat64[] many [1.5, -2]\nint16[3] three [1, 2, 3]\n"
     text += "string[] s ['x', 'yz']\nuint8 y\n"
     frame = select(layout(ROS2, text), {"y": None})
@@ -183,7 +183,7 @@ def test_both_directions_have_the_same_segments(ros: Middleware) -> None:
 
 
 def _segments(program: Program) -> set[tuple[object, Segment]]:
-    """Which value belongs to which segment."""
+    """The segment of each value."""
     found: set[tuple[object, Segment]] = set()
     for step in program.steps:
         match step:
@@ -222,7 +222,7 @@ def test_the_steps_of_an_array_of_messages() -> None:
 
 
 def test_names_do_not_meet_those_of_the_publisher() -> None:
-    """A name that the architecture needs, and each name that a second field would get, ends somewhere."""
+    """Names that the architecture needs, and the names of second fields, are distinct."""
     text = "uint8 step_2\nuint8[] word\nuint8 place_r\nuint8 all_words\nuint8[] is_done\nuint8 is_done_length\n"
     names = {port.name for port in message_ports(layout(ROS1, text), 8)}
     assert {"step_2", "word_length", "place_r_2", "all_words_2", "is_done_length", "is_done_length_2"} <= names

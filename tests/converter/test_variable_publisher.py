@@ -1,4 +1,4 @@
-"""Frame to the configuration of a publisher of variable size: places, words, and the text's own names."""
+"""Frame to the configuration of a publisher of variable size: places, words, and names in the text."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def places(configuration: Context) -> list[tuple[int, int | None, str]]:
 
 
 def words(configuration: Context) -> list[tuple[int, int, str]]:
-    """The highest and the lowest bit of each piece of the words, and its value, as they stand in the text."""
+    """The highest and lowest bit of each piece of the words, with its value, in the order of the text."""
     text = render(VARIABLE_PUBLISHER_TEMPLATE, configuration)
     found = re.findall(r"^  all_words\((\d+) downto (\d+)\) *<= (.*);$", text, re.MULTILINE)
     return [(int(high), int(low), value) for high, low, value in found]
@@ -78,7 +78,7 @@ def test_each_bit_of_the_words_is_driven_once(ros: Middleware, width: int) -> No
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_word_of_the_end_is_zeros(width: int) -> None:
-    """It is what a frame is filled up with."""
+    """Zeros fill the rest of a frame."""
     for size in range(40):
         configuration = configured(layout(ROS1, f"uint8[{size}] block\nstring text\n"), width)
         high, low, value = words(configuration)[-1]
@@ -112,7 +112,7 @@ def test_a_counter_is_as_wide_as_its_elements_need() -> None:
 
 
 def test_a_block_that_ends_an_element_ends_it_with_its_last_word() -> None:
-    """A stream that does needs a place for it."""
+    """A stream that ends an element needs a place for it."""
     with_block = configured(layout(ROS1, "E[] e\n", {"p/E": "string s\nuint16 x\n"}))
     assert (16, 17, "2 bytes: e.x") in places(with_block)
     assert with_block["closings"] == [{"name": "e", "place": 17}]
@@ -126,7 +126,7 @@ def test_a_message_that_is_too_large_is_an_error() -> None:
 
 
 def test_every_name_of_the_text_is_kept_from_fields() -> None:
-    """Whatever the architecture declares: a field of that name gets another one."""
+    """A field with the name of any declaration in the architecture gets another name."""
     template = (TEMPLATES / f"{VARIABLE_PUBLISHER_TEMPLATE}.mustache").read_text(encoding="utf-8")
     template = template.replace("{{{depth}}}", "1")
     declared = set(re.findall(r"^  (?:signal|constant) (\w+)", template, re.MULTILINE))
@@ -139,7 +139,7 @@ def test_every_name_of_the_text_is_kept_from_fields() -> None:
 
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 def test_lines_are_of_a_readable_length(ros: Middleware) -> None:
-    """Whatever the number of parts; declarations of ports are as long as their names."""
+    """For any number of parts; declarations of ports are as long as their names."""
     text = "".join(f"string s{number}\nuint8[] d{number}\n" for number in range(60))
     lines = render(VARIABLE_PUBLISHER_TEMPLATE, configured(layout(ros, text))).splitlines()
     assert max(map(len, lines)) <= 130

@@ -1,4 +1,4 @@
-"""The generated text: golden files, and what every converter's text must keep to."""
+"""The generated text: golden files, and rules for the text of every converter."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def texts(frame: Frame, width: int = 8) -> dict[str, str]:
         (ROS1, "geometry_msgs/Point", "geometry_msgs_point_to_axis.vhd"),
         (ROS2, "awkward_msgs/Gaps", "axis_to_awkward_msgs_gaps.vhd"),
         (ROS2, "awkward_msgs/Gaps", "awkward_msgs_gaps_to_axis.vhd"),
-        # A length that carries, and bytes behind the last field.
+        # A length with a carry, and bytes after the last field.
         (ROS2, "awkward_msgs/Carry254", "axis_to_awkward_msgs_carry254.vhd"),
     ],
 )
@@ -67,13 +67,13 @@ def test_the_text_is_clean(ros: Middleware, name: str, width: int) -> None:
         assert "{{" not in text, file
         assert not [line for line in text.splitlines() if len(line) > LONGEST_LINE], file
         assert f"entity {file.removesuffix('.vhd')} is" in text
-        # Nothing that differs from one run or machine to the next.
+        # The text does not depend on the run or the machine.
         assert not re.search(r"\b20\d\d-\d\d-\d\d|/tmp|/home|<rosbags", text), file
 
 
 @pytest.mark.parametrize(("ros", "name"), MESSAGES)
 def test_ports_are_aligned(ros: Middleware, name: str) -> None:
-    """Within a group of ports, which a comment heads, names, directions and types begin in the same columns."""
+    """Each group of ports begins with a comment; its names, directions and types are in the same columns."""
     for text in texts(ORACLES[ros].frame(name)).values():
         ports = text.partition("  port (\n")[2].partition("  );\n")[0].splitlines()
         for is_comment, group in groupby(ports, lambda line: line.startswith("    --")):

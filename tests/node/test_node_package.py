@@ -159,7 +159,7 @@ def test_blocks_in_software_have_ids_of_their_own(tmp_path: Path) -> None:
     loaded = written(tmp_path, specification(blocks, types))
     source = cpp_package(loaded)["src/robot_node.cpp"]
     assert [(row[0], row[1]) for row in rows(source)] == [("0", "sub"), ("0", "last"), ("{}", "pub"), ("{}", "rest")]
-    assert "    2,  // converters that take messages\n    2,  // converters that send them\n" in source
+    assert "    2,  // subscribers\n    2,  // publishers\n" in source
     ports = re.findall(r'^ +\{ "(.*)", (.*) \},$', source, re.MULTILINE)
     assert ports == [("sub", "{}"), ("", "1"), ("", "1"), ("pub", "{}"), ("rest", "{}")]
 

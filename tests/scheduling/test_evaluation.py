@@ -21,7 +21,7 @@ def test_a_job_gives_the_same_outcome_again() -> None:
     assert first == again
     other = evaluate(Job(job.key, Settings(seed=4, sets=4, cycles=2000))).metrics.means()
     assert first != other
-    # Five accelerators of 100 beats in 200 cycles each: the channel is full, and everybody has his turn.
+    # Five accelerators of 100 beats in 200 cycles each: the channel is full, and every accelerator is served.
     assert first["finished"] == 5
     assert first["utilisation"] > 95 and first["utilisation_requested"] > 99.5
 

@@ -1,4 +1,4 @@
-"""Models of schedulers by hand-made examples; against hardware they are held in tests/cores/test_sched_models.py."""
+"""Models of schedulers by hand-made examples; tests/cores/test_sched_models.py compares them with hardware."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fusesoc_firm.scheduling.policies import POLICIES
 
 
 def grants(scheduler: Scheduler, tasks: list[list[int]], cycles: int) -> list[list[int]]:
-    """Who has a beat in each cycle, by member of the batch, or -1. Each requester has one task: start, beats."""
+    """The requester with a beat in each cycle, by member of the batch, or -1. Each has one task: start, beats."""
     starts, beats = np.array(tasks).T
     left = np.tile(beats, (scheduler.batch, 1))
     members = np.arange(scheduler.batch)

@@ -1,4 +1,4 @@
-"""Response-time analyses on the examples of their books and papers, with schedulers that cost nothing."""
+"""Response-time analyses of examples from books and papers, with schedulers without overheads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Requesters and sink around a scheduler, on cases that are worked out by hand."""
+"""Requesters and sink around a scheduler, in cases worked out by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the lengths of payloads are found: what analysis chooses, what it tells, what the top level is filled with."""
+"""The sources of payload lengths: the choice of the analysis, its reasons, and the configuration of the top level."""
 
 from __future__ import annotations
 

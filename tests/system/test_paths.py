@@ -1,4 +1,4 @@
-"""Where a system's messages are searched: by every command alike, and by the build."""
+"""The places where a system's messages are searched, by every command and by the build alike."""
 
 from __future__ import annotations
 

@@ -126,7 +126,7 @@ def test_a_first_version_has_the_fields(tmp_path: Path) -> None:
         == '''\
 """mix: geometry_msgs/Point, geometry_msgs/Polygon in, diagnostic_msgs/DiagnosticStatus, geometry_msgs/Pose out.
 
-A first version: it answers with zeros. This file is yours, and is not written again.
+A first version: it responds with zeros. This file is yours; it is never regenerated.
 """
 
 

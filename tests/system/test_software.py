@@ -60,7 +60,7 @@ def converters(system: DerivedSystem) -> tuple[list[str], list[str]]:
 
 
 def row(*types: str, message: str = "Point") -> str:
-    """A subscriber `sub`, blocks `b0`, `b1`, ... of these types, and a publisher `pub`, one behind the other."""
+    """A subscriber `sub`, blocks `b0`, `b1`, ... of these types, and a publisher `pub`, connected in a row."""
     names = [f"b{number}" for number in range(len(types))]
     blocks = converter("sub", "subscriber", message, names[0])
     blocks += "".join(
@@ -126,7 +126,7 @@ def test_blocks_in_a_row(
     in_software = [f"b{number}" for number, kind in enumerate(types.split()) if kind == "soft"]
     assert [block.block for block in system.software.blocks] == in_software
     assert not {block.block for block in system.accelerators} & {*in_software}
-    # The top level knows nothing of it.
+    # The top level does not contain it.
     assert {item["block"] for item in system_configuration(system)["accelerators"]}.isdisjoint(in_software)
 
 
@@ -332,7 +332,7 @@ def test_a_length_is_of_hardware_and_does_no_harm(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("count", "fault"), [(256, ""), (257, "the hardware has 257 publishers")])
 def test_an_id_is_one_byte(tmp_path: Path, count: int, fault: str) -> None:
-    """Publishers that get their messages from software need none."""
+    """Publishers whose messages come from software need no id."""
     blocks = converter("sub", "subscriber", "Point", *(f"a{number}" for number in range(count)))
     for number in range(count):
         blocks += instance(f"a{number}", "hard", f"s{number}") + instance(
@@ -418,7 +418,7 @@ def test_a_word_moves_an_accelerator_and_no_message_takes_another_way(tmp_path: 
 
 
 def test_sources_and_messages_of_software_are_inputs(tmp_path: Path) -> None:
-    """Whatever is generated is generated anew when one of them changes."""
+    """Generated files are regenerated when one of them changes."""
     definition = tmp_path / "own_msgs" / "msg" / "Own.msg"
     definition.parent.mkdir(parents=True)
     definition.write_text("float64 x\n", encoding="utf-8")

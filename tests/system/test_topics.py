@@ -1,4 +1,4 @@
-"""The topics of a system: what they are called, and what meets on one. What is refused: tests/errors/spec/topic*."""
+"""The names of topics, and topics shared by several blocks. Faults: tests/errors/spec/topic*."""
 
 from __future__ import annotations
 

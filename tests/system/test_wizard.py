@@ -1,4 +1,4 @@
-"""`firm system new`: answers in, a specification out that is as if somebody had written it."""
+"""`firm system new`: the answers result in a specification as if written by hand."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ POINT, VECTOR = "geometry_msgs/Point", "geometry_msgs/Vector3"
 
 
 class Answers:
-    """Answers by question, in turn; whatever is not said is left at its default. It notes what was asked."""
+    """Answers by question, in turn, with defaults for the others; it records the questions."""
 
     def __init__(self, **answers: list[str]) -> None:
         self._answers = {name.replace("_", " "): [*given] for name, given in answers.items()}

@@ -1,4 +1,4 @@
-"""`firm scheduler bench`: section 4.3 again, with a progress bar, as Markdown, CSV and pictures."""
+"""`firm scheduler bench`: reproduces section 4.3, with a progress bar, as Markdown, CSV and pictures."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from fusesoc_firm.tools.workers import Workers, cluster_workers, local_workers
 
 REPORT = "evaluation.md"
 
-# What the terminal shows of each evaluation.
+# The metrics of each evaluation that the terminal shows.
 _SHOWN = ("granted", "finished", "preemptions", "response_avg", "lateness_avg", "lateness_max", "utilisation")
 
 
 @dataclass(frozen=True)
 class Selection:
-    """What is evaluated: every combination of these."""
+    """The selection to evaluate: all combinations of these values."""
 
     data_sets: Sequence[str]
     policies: Sequence[str]
@@ -49,7 +49,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Places:
-    """Where the work is done, and where its results go."""
+    """The places where the work is done and where its results go."""
 
     jobs: int | None = None
     cluster: str | None = None
@@ -58,9 +58,9 @@ class Places:
 
 
 def bench(selection: Selection, places: Places) -> None:
-    """Evaluate, print a summary, and write what `places` asks for.
+    """Evaluate, print a summary, and write the outputs that `places` requests.
 
-    Raises `InputError` if a place cannot be written, before anything is evaluated.
+    Raises `InputError` before any evaluation if a place cannot be written.
     """
     _check(places)
     settings = selection.settings
@@ -90,7 +90,7 @@ def bench(selection: Selection, places: Places) -> None:
 
 
 def write(evaluation: chapter.Evaluation, selection: Selection, folder: Path) -> Path:
-    """Write the report with all tables and figures into a folder that is there; its path is returned."""
+    """Write the report with all tables and figures into an existing folder, and return its path."""
     tables = list(chapter.tables(evaluation))
     figures = list(chapter.figures(evaluation))
     lines = list(timelines())
@@ -113,7 +113,7 @@ def write(evaluation: chapter.Evaluation, selection: Selection, folder: Path) ->
 
 
 def _check(places: Places) -> None:
-    """Make the folder, and see whether the file can be written: an evaluation is too long to fail at its end."""
+    """Make the folder, and check that the file can be written: an evaluation is too long to fail at its end."""
     if places.output:
         make_folder(places.output)
     if places.csv:
@@ -156,7 +156,7 @@ Times are in clock cycles; docs/explanation/scheduler-evaluation.md defines the 
 
 
 def _of_all(settings: Settings) -> str:
-    """What all evaluations share; what is as in section 4.3 goes without saying."""
+    """The settings that all evaluations share, if they differ from section 4.3."""
     found = f"seed {settings.seed}, {settings.distribution} distribution"
     if settings.shortest_run > 1:
         found += f", a shortest run of {settings.shortest_run} beats"
@@ -181,7 +181,7 @@ def _summary(evaluation: chapter.Evaluation, data_set: str) -> str:
 
 
 def _all_values(evaluation: chapter.Evaluation) -> str:
-    """A row for each evaluation, a column for each metric; NaN is empty."""
+    """A row for each evaluation and a column for each metric; NaN becomes an empty cell."""
     lines = [",".join(("data_set", "policy", "requesters", *METRICS))]
     for key, means in evaluation.means.items():
         values = ("" if means[name] != means[name] else f"{means[name]:.6g}" for name in METRICS)
@@ -190,7 +190,7 @@ def _all_values(evaluation: chapter.Evaluation) -> str:
 
 
 def names_of(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
-    """The names in a list with commas. Raises `InputError` for an unknown one."""
+    """The names in a comma-separated list; raises `InputError` for an unknown name."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in legal:
@@ -199,7 +199,7 @@ def names_of(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
 
 
 def numbers_of(text: str, most: int = 256) -> tuple[int, ...]:
-    """The numbers of accelerators in a list with commas, sorted. Raises `InputError` for one that is not legal."""
+    """The numbers of accelerators in a comma-separated list, sorted; raises `InputError` for an illegal number."""
     found = set()
     for word in text.split(","):
         if not word.strip().isdecimal() or not 1 <= int(word) <= most:

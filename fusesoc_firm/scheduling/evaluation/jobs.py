@@ -1,4 +1,4 @@
-"""The evaluation of section 4.3 as jobs: a data set, a number of accelerators and a scheduler each."""
+"""The evaluation of section 4.3 as jobs; each has a data set, a number of accelerators and a scheduler."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from fusesoc_firm.tools.workers import Workers
 
 @dataclass(frozen=True)
 class Settings:
-    """What all jobs share; `sets` and `cycles` of None are those of the data set.
+    """The settings of all jobs; if `sets` or `cycles` is None, the value of the data set applies.
 
-    `shortest_run` and `resume_beats` are those of preemptive policies: the beats that a run has before it may be
-    interrupted, and the cycles that each run of a task but its first costs beside its beats. Those of section 4.3 are 1
-    and 0; the Manager's bursts cost one.
+    `shortest_run` and `resume_beats` apply to preemptive policies. The former is the number of beats before a run may
+    be interrupted. The latter is the number of additional cycles for each run of a task except its first. They are 1
+    and 0 in section 4.3; the Manager's bursts cost one cycle.
     """
 
     seed: int = 1
@@ -31,17 +31,17 @@ class Settings:
     resume_beats: int = 0
 
     def sets_of(self, data_set: str) -> int:
-        """The sets that are simulated of a data set."""
+        """The number of sets of a data set that are simulated."""
         return self.sets or DATA_SETS[data_set].sets
 
     def cycles_of(self, data_set: str) -> int:
-        """The cycles that each of them is simulated for."""
+        """The number of cycles of each set's simulation."""
         return self.cycles or DATA_SETS[data_set].cycles
 
 
 @dataclass(frozen=True, order=True)
 class Key:
-    """What is evaluated: a policy or a combination, by its name, with so many accelerators of a data set."""
+    """The key of an evaluation: the name of a policy or combination, a data set, and a number of accelerators."""
 
     data_set: str
     policy: str
@@ -50,7 +50,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Job:
-    """An evaluation; it needs no file, so any machine can do it."""
+    """A self-contained evaluation that needs no files, so that any machine can run it."""
 
     key: Key
     settings: Settings
@@ -58,7 +58,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The metrics of each set, and the seconds that it took."""
+    """The metrics of each set, with the duration in seconds."""
 
     key: Key
     metrics: Metrics
@@ -66,9 +66,9 @@ class Outcome:
 
 
 def model_of(policy: str, workload: Workload, shortest_run: int = 1) -> SchedulerModel:
-    """The model of a policy, or of a combination, for a workload.
+    """The model of a policy or a combination for a workload.
 
-    The period of a requester is the least time between its requests, that is, its implicit deadline.
+    The period of a requester is the least time between its requests, which is its implicit deadline.
     """
     generics = Generics(workload.deadlines, workload.transfer_times, shortest_run=shortest_run)
     if policy in COMBINATIONS:
@@ -89,9 +89,9 @@ def evaluate(job: Job) -> Outcome:
 
 
 def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence[int], settings: Settings) -> list[Job]:
-    """A job for all of everything; the longest come first, so that no worker is left with one of them at the end.
+    """A job for each combination; the longest come first, so that no single worker finishes long after the others.
 
-    The combined schedulers of figure 4.18 join in if all that they consist of takes part.
+    The combined schedulers of figure 4.18 are included if all their components are.
     """
     data_sets = list(data_sets)
     keys = [Key(data_set, policy, number) for data_set in data_sets for policy in policies for number in requesters]
@@ -106,5 +106,5 @@ def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence
 
 
 def run(to_do: Iterable[Job], workers: Workers) -> Iterator[Outcome]:
-    """The outcome of each job, as they come."""
+    """The outcome of each job, in the order of completion."""
     return (outcome for _, outcome in workers.run(evaluate, to_do))

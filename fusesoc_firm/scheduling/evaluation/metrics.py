@@ -1,11 +1,12 @@
-"""The metrics of section 4.3, of each set and over the sets of a data set.
+"""The metrics of section 4.3, for each set and averaged over the sets of a data set.
 
-The dissertation says how each is defined, not how it is brought together. Here the minimum, the average and the maximum
-are taken over the tasks of a set, then the mean of each over the sets: so tables 4.3 and 4.4 have fractions in all
-three columns, and the models of the fixed priorities and of LRU come to their values with it.
+The dissertation defines each metric but not its aggregation. Here the minimum, average and maximum are taken over the
+tasks of a set, then averaged over the sets. This explains why all three columns of tables 4.3 and 4.4 have fractions,
+and the models of the fixed priorities and of LRU reproduce their values.
 
-The response time is that of every granted task, though equation 4.4 speaks of completed transactions: the maxima of
-table 4.3 come out only with those that the simulation's end cut short (docs/explanation/scheduler-evaluation.md).
+The response time is that of every granted task, although equation 4.4 speaks of completed transactions. The maxima of
+table 4.3 are only reproduced if tasks cut short by the end of the simulation count
+(docs/explanation/scheduler-evaluation.md).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Metrics:
-    """All metrics of section 4.3, an element a set, shape (B,); NaN where a set has no task to measure.
+    """All metrics of section 4.3, one element for each set, shape (B,); NaN if a set has no task to measure.
 
     Times are in cycles.
     """
@@ -53,7 +54,7 @@ class Metrics:
     """The same of the cycles in which somebody asked, in percent."""
 
     def means(self) -> dict[str, float]:
-        """The mean of each metric over the sets, leaving out those without a value; NaN if none has one."""
+        """The mean of each metric over the sets with a value; NaN if no set has one."""
         return {each.name: _mean(getattr(self, each.name)) for each in fields(self)}
 
 
@@ -100,14 +101,17 @@ class _Spread:
 
 
 def _distinct(of_set: Times, of_requester: Times, sets: int, requesters: int) -> Values:
-    """How many requesters of each set occur."""
+    """The number of distinct requesters in each set."""
     found = np.zeros((sets, requesters), np.bool_)
     found[of_set, of_requester] = True
     return np.asarray(found.sum(axis=1), float)
 
 
 def _preemptions(trace: Trace, completed: Times) -> Values:
-    """Those of unfinished tasks count too, in the accelerators that completed another one."""
+    """The preemptions per completed task, averaged over the accelerators that completed one.
+
+    Preemptions of unfinished tasks count too.
+    """
     tasks = trace.tasks
     found = np.zeros(completed.shape)
     np.add.at(found, (tasks.set, tasks.requester), tasks.preemptions)
@@ -116,7 +120,7 @@ def _preemptions(trace: Trace, completed: Times) -> Values:
 
 
 def _ratio(numerator: Any, denominator: Any) -> Values:
-    """Element by element; NaN over 0."""
+    """The element-wise quotient; NaN for a zero denominator."""
     ratio: Values = np.where(denominator > 0, numerator / np.maximum(denominator, 1), np.nan)
     return ratio
 

@@ -1,4 +1,4 @@
-"""Figures as pictures, with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
+"""Draws figures with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SUFFIXES = ("png", "svg")
 _PANEL_INCHES = (6.0, 4.0)
 _TIMELINE_INCHES = (9.0, 3.0)
 _MARKERS = "osv^DPX"
-# Without the date and the random names that matplotlib puts into a file, the same values give the same bytes.
+# Without the date and random names that matplotlib writes into files, equal values give equal bytes.
 _SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
 _METADATA = {"png": {"Software": None}, "svg": {"Date": None}}
 
@@ -26,7 +26,7 @@ def are_possible() -> bool:
 
 
 def draw_figure(figure: Figure, folder: Path) -> None:
-    """Draw a figure, ours in full lines and the dissertation's in dashed ones."""
+    """Draw a figure, with solid lines for our values and dashed lines for the dissertation's."""
     plots = _plots()
     columns = min(2, len(figure.panels))
     rows = -(-len(figure.panels) // columns)
@@ -42,7 +42,7 @@ def draw_figure(figure: Figure, folder: Path) -> None:
 
 
 def draw_timeline(timeline: Timeline, folder: Path) -> None:
-    """Draw requests as thin bars, and the grant as thick ones over them."""
+    """Draw requests as thin bars, with the grant as thick bars over them."""
     plots = _plots()
     drawing, axis = plots.subplots(figsize=_TIMELINE_INCHES, layout="constrained")
     axis.set_title(f"Figure {timeline.number}: {timeline.title}")
@@ -65,7 +65,7 @@ def _plots() -> Any:
 
 
 def _draw_bars(axis: Any, figure: Figure, panel: Panel) -> None:
-    """Of a single number of accelerators: a bar for each scheduler."""
+    """Draw a bar for each scheduler, for a single number of accelerators."""
     heights = [values[0] for values in panel.series.values()]
     axis.barh(list(panel.series), heights)
     axis.invert_yaxis()

@@ -1,7 +1,7 @@
 """Requesters and a sink around the model of a scheduler, cycle by cycle, for all sets of a data set at once.
 
-A requester behaves as section 4.3 says: it raises its request, keeps it until each of its beats is taken (AXI-Stream),
-pauses for its frequency, and asks again. The sink takes a beat in every cycle.
+A requester follows section 4.3: it raises its request, holds it until all its beats are accepted (AXI-Stream), pauses
+for its frequency, and requests again. The sink accepts a beat in every cycle.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ class SchedulerModel(Protocol):
 
     @property
     def grant_select(self) -> Times:
-        """Who is granted, (B,)."""
+        """The granted requester, (B,)."""
 
     def step(self, request: Flags, beat: Flags, last: Flags) -> None:
-        """One rising edge; `request` has the shape (B, N), `beat` and `last` (B,)."""
+        """Simulate a rising edge; `request` has the shape (B, N), `beat` and `last` have the shape (B,)."""
 
 
 @dataclass(frozen=True)
 class Tasks:
-    """All tasks that were granted, one an element, in the order of their ends; unfinished ones stand last.
+    """All granted tasks, one in each element, in the order of their ends; unfinished ones come last.
 
-    Times are edges of the clock: what happens in cycle k begins at k and ends at k + 1. `finish` is -1 of a task that
-    the simulation's end cut short.
+    Times are clock edges: an event in cycle k begins at k and ends at k + 1. `finish` is -1 for a task that the end of
+    the simulation cut short.
     """
 
     set: Times
@@ -53,13 +53,13 @@ class Tasks:
 
     @property
     def is_finished(self) -> Flags:
-        """Whether the last beat was taken."""
+        """Whether the last beat was accepted."""
         return np.asarray(self.finish >= 0)
 
 
 @dataclass(frozen=True)
 class Trace:
-    """What came of a simulation: its tasks, and cycles of each set, shape (B,)."""
+    """The result of a simulation: its tasks, and the cycles of each set, shape (B,)."""
 
     workload: Workload
     cycles: int
@@ -79,10 +79,11 @@ def simulate(
 ) -> Trace:
     """Run a model for a number of cycles after its reset.
 
-    `first_requests` (B, N) are the cycles of the first requests. If it is None each comes after a pause as long as all
-    others of its requester: of what section 4.3 leaves open, this explains the maxima of table 4.3 at N = 2, where
-    requests that all come at once would give a quarter more. `resume_beats` more cycles begin each run of a task but
-    its first, as the Manager's resumed bursts need them; the scheduler sees no beat in them.
+    `first_requests` (B, N) are the cycles of the first requests. If it is None, each requester makes its first request
+    after its usual pause. Section 4.3 leaves this open; this choice explains the maxima of table 4.3 for two
+    accelerators, while simultaneous first requests would give a quarter more. Each run of a task except its first
+    begins with `resume_beats` more cycles, as the Manager's resumed bursts need them; the scheduler sees no beat in
+    them.
     """
     first = workload.frequencies if first_requests is None else first_requests
     environment = _Environment(workload, first, resume_beats)
@@ -92,7 +93,7 @@ def simulate(
 
 
 class _Environment:
-    """All requesters; arrays of them are flat, element b * N + i is requester i of set b."""
+    """All requesters, as flat arrays: element b * N + i is requester i of set b."""
 
     def __init__(self, workload: Workload, first_requests: Times, resume_beats: int) -> None:
         shape = workload.transfer_times.shape
@@ -103,7 +104,7 @@ class _Environment:
         periods = np.zeros_like(workload.frequencies) if workload.periods is None else workload.periods
         self.periods = periods.ravel()
         self.base = np.arange(shape[0]) * shape[1]
-        # 32 bits: these are compared with the time in every cycle.
+        # 32 bits, since these are compared with the time in every cycle.
         self.next_request = first_requests.astype(np.int32)
         self.request = np.zeros(shape, np.bool_)
         count = self.lengths.size
@@ -111,7 +112,7 @@ class _Environment:
         self.arrival = np.zeros(count, np.int64)
         self.grant = np.full(count, -1, np.int64)
         self.preemptions = np.zeros(count, np.int64)
-        # The run that goes on: whose it is, and the beats that its resumption still costs.
+        # The current run: its task, and the remaining beats of its resumption.
         self.running = self.base.copy()
         self.owed = np.zeros(shape[0], np.int64)
         self.busy = np.zeros(shape[0], np.int64)
@@ -119,7 +120,7 @@ class _Environment:
         self.finished: list[tuple[Times, Times, Times, Times, Times]] = []
 
     def step(self, model: SchedulerModel, cycle: int) -> None:
-        """One cycle: what the registers show, what follows from it, and the edge at its end."""
+        """Simulate one cycle: read the registers, derive the beats, and apply the edge."""
         self._arrive(cycle)
         granted = self.base + model.grant_select
         asks = self.request.ravel()[granted]
@@ -145,12 +146,12 @@ class _Environment:
         self.requested += self.request.any(axis=1)
 
     def _begin_runs(self, granted: Times, served: Flags, cycle: int) -> None:
-        """Where another task is served than before: its first grant or its resumption, and who was interrupted."""
+        """Where the served task changes, note its first grant or its resumption, and the interrupted task."""
         begins = served & ((granted != self.running) | (self.grant[granted] < 0))
         if not begins.any():
             return
         new, old = granted[begins], self.running[begins]
-        # Of a task that has begun and is not over, if it is not the one that begins.
+        # The interrupted task has begun and is unfinished, unless it is the one that begins.
         interrupted = old[(self.grant[old] >= 0) & (old != new)]
         self.preemptions[interrupted] += 1
         is_first = self.grant[new] < 0
@@ -168,7 +169,7 @@ class _Environment:
         self.preemptions[done] = 0
 
     def trace(self, cycles: int) -> Trace:
-        """Everything that was noted, and the tasks that have begun and are not over."""
+        """The tasks noted so far, with those that have begun and are unfinished."""
         cut = np.flatnonzero(self.grant >= 0)
         cut_short = (cut, self.arrival[cut], self.grant[cut], np.full(cut.size, -1), self.preemptions[cut])
         columns = [np.concatenate(column) for column in zip(*self.finished, cut_short, strict=True)]

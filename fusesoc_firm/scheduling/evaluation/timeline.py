@@ -1,4 +1,4 @@
-"""What happens at a scheduler's ports, cycle by cycle: for figures 4.8 and 4.9."""
+"""Recordings of a scheduler's ports, cycle by cycle, for figures 4.8 and 4.9."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fusesoc_firm.scheduling.evaluation.workloads import Times, Workload
 
 
 class Recorder:
-    """A scheduler that notes its ports in every cycle."""
+    """A scheduler that records its ports in every cycle."""
 
     def __init__(self, model: SchedulerModel) -> None:
         self._model = model
@@ -25,16 +25,16 @@ class Recorder:
 
     @property
     def grant_valid(self) -> Flags:
-        """That of the scheduler."""
+        """The scheduler's port of this name."""
         return self._model.grant_valid
 
     @property
     def grant_select(self) -> Times:
-        """That of the scheduler."""
+        """The scheduler's port of this name."""
         return self._model.grant_select
 
     def step(self, request: Flags, beat: Flags, last: Flags) -> None:
-        """Note the ports, and go on."""
+        """Record the ports, and simulate a rising edge."""
         self.request.append(request.copy())
         self.beat.append(beat.copy())
         self.last.append(last.copy())
@@ -44,7 +44,7 @@ class Recorder:
 
 @dataclass(frozen=True)
 class Timeline:
-    """The requests of each accelerator, and who is granted (-1: nobody yet), in each cycle."""
+    """The requests of each accelerator and the granted one (-1: none yet) in each cycle."""
 
     number: str
     title: str
@@ -53,11 +53,11 @@ class Timeline:
 
     @property
     def file_name(self) -> str:
-        """Without a suffix, such as `figure_4_8`."""
+        """The file name without a suffix, such as `figure_4_8`."""
         return f"figure_{self.number.replace('.', '_')}"
 
     def csv(self) -> str:
-        """A row a cycle."""
+        """The timeline as CSV, with a row for each cycle."""
         names = [f"request_{index}" for index in range(len(self.requests))]
         lines = [",".join(["cycle", *names, "granted"])]
         for cycle, granted in enumerate(self.granted):
@@ -77,7 +77,7 @@ def timelines() -> tuple[Timeline, Timeline]:
 
 
 def record(policy: str, workload: Workload, cycles: int) -> tuple[tuple[tuple[bool, ...], ...], tuple[int, ...]]:
-    """Requests and grants of a timeline: those of the workload's first set, whose accelerators all ask in cycle 1."""
+    """The requests and grants of the workload's first set; all its accelerators request in cycle 1."""
     recorder = Recorder(model_of(policy, workload))
     simulate(recorder, workload, cycles, np.ones_like(workload.frequencies))
     requests = np.array(recorder.request)[:, 0, :].T

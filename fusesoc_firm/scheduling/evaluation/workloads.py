@@ -1,4 +1,4 @@
-"""The data sets of section 4.3: what accelerators want to send, and how often."""
+"""The data sets of section 4.3: the lengths and frequencies of the accelerators' transfers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NANOSECONDS_PER_CYCLE = 10
 
 
 class Distribution(StrEnum):
-    """How times spread around a data set's centre."""
+    """The distribution of times around a data set's centre."""
 
     NORMAL = "normal"
     UNIFORM = "uniform"
@@ -28,7 +28,7 @@ class Distribution(StrEnum):
 
 @dataclass(frozen=True)
 class DataSet:
-    """A centre, a spread, and how much of it is simulated; all times in cycles.
+    """The centre and spread of a data set, and the extent of its simulation; all times in cycles.
 
     An accelerator is a pair S = {T, F} (section 4.3): it sends `transfer_time` beats, and has new data `frequency`
     cycles after its last beat.
@@ -44,7 +44,7 @@ class DataSet:
 
     @property
     def formula(self) -> str:
-        """The data set as section 4.3 writes it."""
+        """The data set in the notation of section 4.3."""
         return f"({{{self.transfer_time}, {self.frequency}}}, {self.sigma})"
 
 
@@ -66,8 +66,8 @@ DATA_SETS: Mapping[str, DataSet] = MappingProxyType(
 class Workload:
     """Accelerators of B sets of N each; the arrays have the shape (B, N) and count cycles.
 
-    A request comes `frequencies` after the last transmission, and no sooner than `periods` after the last request;
-    `periods` of None do not matter.
+    A request comes at least `frequencies` after the last transmission and `periods` after the last request. If
+    `periods` is None, only `frequencies` apply.
     """
 
     transfer_times: Times
@@ -76,22 +76,22 @@ class Workload:
 
     @property
     def sets(self) -> int:
-        """B, the sets that are simulated side by side."""
+        """B, the number of sets that are simulated in parallel."""
         return int(self.transfer_times.shape[0])
 
     @property
     def requesters(self) -> int:
-        """N, the accelerators of a set."""
+        """N, the number of accelerators in a set."""
         return int(self.transfer_times.shape[1])
 
     @property
     def deadlines(self) -> Times:
-        """From a request to its implicit deadline: 'period + length' (note of table 4.4), shape (B, N)."""
+        """The implicit deadlines, counted from a request: 'period + length' (note of table 4.4), shape (B, N)."""
         return self.frequencies + self.transfer_times
 
     @property
     def load(self) -> NDArray[np.float64]:
-        """What each set asks of the channel, equation 4.1 with the period F + T; shape (B,)."""
+        """The load of the channel in each set, by equation 4.1 with the period F + T; shape (B,)."""
         return np.asarray((self.transfer_times / self.deadlines).sum(axis=1))
 
 
@@ -102,10 +102,9 @@ def draw(
     sets: int | None = None,
     distribution: Distribution = Distribution.NORMAL,
 ) -> Workload:
-    """A workload of a data set, the same for the same arguments on every machine.
+    """Draw a workload of a data set; equal arguments give equal workloads on every machine.
 
-    The sets of a data set are drawn one by one, each from a generator of its own, so the first ones stay as they are
-    whatever `sets` says.
+    Each set has a random generator of its own, so a larger number of `sets` leaves the first ones unchanged.
     """
     count = data_set.sets if sets is None else sets
     pairs = np.stack([_pairs(data_set, requesters, [seed, requesters, k], distribution) for k in range(count)])
@@ -120,5 +119,5 @@ def _pairs(data_set: DataSet, requesters: int, seed: list[int], distribution: Di
         drawn = generator.normal(centre, data_set.sigma, (2, requesters))
     else:
         drawn = generator.uniform(centre - data_set.sigma, centre + data_set.sigma, (2, requesters))
-    # What is cut off below is 2 % of a normal distribution whose centre lies two sigma above 0.
+    # This cuts off 2 % of a normal distribution whose centre is two sigma above 0.
     return np.maximum(np.rint(drawn), 1).astype(np.int64)

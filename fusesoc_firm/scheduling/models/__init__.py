@@ -1,4 +1,4 @@
-"""Cycle-exact models of the schedulers in cores/sched: a policy's is the function of its name in its file here."""
+"""Cycle-exact models of the schedulers in cores/sched; the function and file of a model have its policy's name."""
 
 from __future__ import annotations
 

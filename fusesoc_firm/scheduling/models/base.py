@@ -1,7 +1,7 @@
-"""What all models of schedulers share.
+"""The common parts of all models of schedulers.
 
-A model does what its entity in cores/sched does, cycle by cycle, for a batch of schedulers at once: B of them, each
-with N requesters. The ports are arrays; `step` is a rising edge of the clock.
+A model behaves like its entity in cores/sched, cycle by cycle, for a batch of B schedulers with N requesters each. The
+ports are arrays; `step` is a rising edge of the clock.
 
     scheduler = make_model("lru", Generics(periods))
     while ...:
@@ -23,10 +23,11 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Generics:
-    """The generics of the entities, of which a policy takes what it needs.
+    """The generics of the entities; each policy uses those that it needs.
 
-    Times are in clock cycles, (B, N). `deadlines` of None are implicit (section 4.1). `time_bits` of None is a time
-    that never wraps around. Raises `ValueError` for arrays of different shape and for values that the entities refuse.
+    Times are in clock cycles, (B, N). If `deadlines` is None, deadlines are implicit (section 4.1). If `time_bits` is
+    None, time never wraps around. Raises `ValueError` for arrays of different shapes and for values that the entities
+    reject.
     """
 
     periods: Ints
@@ -49,21 +50,21 @@ class Generics:
 
     @property
     def batch(self) -> int:
-        """B."""
+        """The number of schedulers in the batch, B."""
         return int(self.periods.shape[0])
 
     @property
     def requesters(self) -> int:
-        """N."""
+        """The number of requesters of each scheduler, N."""
         return int(self.periods.shape[1])
 
     @property
     def relative_deadlines(self) -> Ints:
-        """From a request to its deadline, (B, N)."""
+        """The time from a request to its deadline, (B, N)."""
         return self.periods if self.deadlines is None else self.deadlines
 
     def part(self, requesters: slice) -> Generics:
-        """The generics for some of the requesters."""
+        """The generics for a subset of the requesters."""
         deadlines, transfer_times = (
             None if times is None else times[:, requesters] for times in (self.deadlines, self.transfer_times)
         )
@@ -74,7 +75,7 @@ class Generics:
 class Scheduler(ABC):
     """A batch of schedulers of one policy, just after reset.
 
-    `grant_valid` and `grant_select`, both (B,), are the registers of the same names as they are in the current cycle.
+    `grant_valid` and `grant_select`, both (B,), are the registers of the same names in the current cycle.
     """
 
     MAX_REQUESTERS = 256
@@ -90,19 +91,20 @@ class Scheduler(ABC):
 
     @abstractmethod
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
-        """A rising edge. `request` (B, N), `beat` and `last` (B,) are those of the cycle that ends; none is written to.
+        """Simulate a rising edge; `request` (B, N), `beat` and `last` (B,) are those of the ending cycle.
 
-        `beat` may be true only where the grant is valid and its requester requests; `last` matters with `beat` only.
+        No argument is changed. `beat` may be true only where the grant is valid and its requester requests. `last`
+        matters only where `beat` is true.
         """
 
     def _without_granted(self, request: Bools, without: Bools) -> Bools:
-        """A copy of `request` (B, N) in which the granted requester does not ask where `without` (B,) is true."""
+        """A copy of `request` (B, N) without the granted requester's request where `without` (B,) is true."""
         eligible = request.copy()
         eligible[self._members, self.grant_select] &= ~without
         return eligible
 
     def _of_granted(self, request: Bools) -> Bools:
-        """Whether the granted requester asks, (B,)."""
+        """Whether the granted requester requests, (B,)."""
         return request[self._members, self.grant_select]
 
     def _grant(self, choice: Ints, where: Bools) -> None:

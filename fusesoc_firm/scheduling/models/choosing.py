@@ -1,4 +1,4 @@
-"""Non-preemptive schedulers that choose in a single cycle, among all requests."""
+"""Non-preemptive schedulers that choose among all requests in a single cycle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
 
 class ChoosingScheduler(Scheduler):
-    """Chooses anew in every cycle in which no task goes on, and in that of a task's last beat without its requester."""
+    """A scheduler that chooses in each cycle without a task in progress.
+
+    It also chooses in the cycle of a task's last beat; that task's requester is then excluded.
+    """
 
     def __init__(self, batch: int, requesters: int) -> None:
         super().__init__(batch, requesters)
@@ -19,10 +22,10 @@ class ChoosingScheduler(Scheduler):
 
     @abstractmethod
     def _choose(self, eligible: Bools) -> Ints:
-        """Who goes first, (B,), of those in `eligible` (B, N); any number where nobody is."""
+        """The chosen requester, (B,), among those in `eligible` (B, N); arbitrary where none is eligible."""
 
     def _note_completed(self, finished: Bools) -> None:
-        """Where `finished` (B,) is true the granted requester completes a task. Comes before the choice."""
+        """Note a completed task of the granted requester where `finished` (B,) is true; runs before the choice."""
 
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
         """See `Scheduler`."""

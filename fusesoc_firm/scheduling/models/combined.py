@@ -1,4 +1,4 @@
-"""A scheduler of schedulers (section 4.3.5): groups of requesters, and one more scheduler among the groups."""
+"""A scheduler of schedulers (section 4.3.5): groups of requesters, with another scheduler among the groups."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
 
 class Combined(Scheduler):
-    """A group asks if the requester asks to which its scheduler gives the grant; only the chosen group sees beats.
+    """A combined scheduler; a group requests if its granted requester does, and only the chosen group sees beats.
 
     The requesters of the first of `groups` have the lowest indices. `top` has a requester for each group. Raises
-    `ValueError` where it has not, or where the batches are not of one size.
+    `ValueError` if the number of groups or the sizes of the batches do not match.
     """
 
     def __init__(self, groups: Sequence[Scheduler], top: Scheduler) -> None:

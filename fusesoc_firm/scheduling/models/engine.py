@@ -1,7 +1,7 @@
-"""The engine of the policies that keep their tasks in a priority queue: firm_sched_engine and what it is made of.
+"""The model of firm_sched_engine and its parts, for the policies that keep their tasks in a priority queue.
 
-Keys and times are numbers that never wrap around. Everything that exists once a scheduler is an array (B,); what a
-cycle costs is some dozens of operations on those, and one on the requests (B, N).
+Keys and times are numbers that never wrap around. State that exists once in a scheduler is an array (B,). A cycle costs
+some dozens of operations on such arrays, and one on the requests (B, N).
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ _SHORTEST_TIME, _LONGEST_TIME = 8, 31  # bits
 
 
 def index_bits(requesters: int) -> int:
-    """Bits of an index, 1 at least, as the function of the same name in firm_axis_pkg."""
+    """The bits of an index, at least 1, as computed by the function of the same name in firm_axis_pkg."""
     return max(1, (requesters - 1).bit_length())
 
 
 def rows_and_columns(requesters: int) -> tuple[int, int]:
-    """How many rows the requesters stand in, and columns, as the functions in firm_sched_queue_pkg."""
+    """The numbers of rows and columns of requesters, as computed by the functions in firm_sched_queue_pkg."""
     bits = index_bits(requesters)
     column_bits = max(1, bits // 2)
     rows: int = 2 ** max(1, bits - column_bits)
@@ -31,13 +31,13 @@ def rows_and_columns(requesters: int) -> tuple[int, int]:
 
 
 class Arrivals:
-    """firm_sched_arrivals: accepts tasks row by row. `valid` and `first` (B,) are the one that leaves next."""
+    """The model of firm_sched_arrivals: accepts tasks row by row; `valid` and `first` (B,) describe the next one."""
 
     def __init__(self, batch: int, requesters: int) -> None:
         self._rows, self._columns = rows_and_columns(requesters)
         self._requesters = requesters
         self._members = np.arange(batch)
-        # Bits of a row's columns, the lowest column lowest.
+        # The bits of a row's columns, the first column lowest.
         self._known: Ints = np.zeros((batch, self._rows), np.int64)
         self._accepted: Ints = np.zeros(batch, np.int64)
         self._row: Ints = np.full(batch, self._rows - 1, np.int64)
@@ -48,18 +48,18 @@ class Arrivals:
 
     @property
     def valid(self) -> Bools:
-        """Whether an accepted task has not left."""
+        """Whether an accepted task waits to leave."""
         valid: Bools = self._accepted != 0
         return valid
 
     @property
     def first(self) -> Ints:
-        """Its requester; any where there is none."""
+        """The requester of the next task; arbitrary if `valid` is false."""
         first: Ints = np.where(self.valid, self._row * self._columns + self._lowest[self._accepted], 0)
         return first
 
     def step(self, request: Bools, leaves: Bools, finished: Bools, finished_id: Ints) -> None:
-        """A rising edge. A task of `finished_id` that is known is not any more where `finished` is true."""
+        """Simulate a rising edge; where `finished` is true, the task of `finished_id` is no longer known."""
         finished_row = finished_id // self._columns
         finished_bit = np.where(finished, 1 << (finished_id % self._columns), 0)
         of_row = np.where(self._row == finished_row, finished_bit, 0)
@@ -73,17 +73,17 @@ class Arrivals:
         self._accepted = accepted
 
     def _accept(self, request: Bools, where: Bools, accepted: Ints, finished_row: Ints, finished_bit: Ints) -> None:
-        """Take the new requests of the next row into `accepted`, where nothing is left of the last one."""
+        """Accept the new requests of the next row into `accepted` where the previous row is empty."""
         self._padded[:, : self._requesters] = request
         by_row: Bools = self._padded.reshape((len(request), self._rows, self._columns))
         asks: Bools = np.logical_or.reduce(by_row, axis=2)
         where = where & asks.any(axis=1)
-        # The rows in their order behind the last one.
+        # The rows in cyclic order, starting after the last one.
         order = (self._row[:, np.newaxis] + 1 + np.arange(self._rows)) % self._rows
         row = order[self._members, np.take_along_axis(asks, order, axis=1).argmax(axis=1)]
         new = by_row[self._members, row] @ self._weights
         new &= ~self._known[self._members, row]
-        # The request of who finishes is its last beat's.
+        # The request of the requester that finishes belongs to its last beat.
         new &= ~np.where(row == finished_row, finished_bit, 0)
         self._known[self._members, row] |= np.where(where, new, 0)
         self._row = np.where(where, row, self._row)
@@ -91,12 +91,13 @@ class Arrivals:
 
 
 class Queue(ABC):
-    """A priority queue of items that each have an index of their own. `root_*` and `ready` are as in the current cycle.
+    """A priority queue of items with distinct indices; `root_*` and `ready` are those of the current cycle.
 
-    The root may be on its way; then `root_id` and `root_key` tell already what it will be, as the core's first_id and
-    first_key, and what `pop` takes.
+    While the root is still on its way, `root_id` and `root_key` already describe the next root, like the core's
+    first_id and first_key, and `pop` removes it.
 
-    Entries are ranks, key * size + index, so that the smallest is the smallest key and of equal ones the lowest index.
+    Entries are ranks, key * size + index: the smallest rank has the smallest key and, among equal keys, the lowest
+    index.
     """
 
     def __init__(self, batch: int, items: int) -> None:
@@ -108,28 +109,28 @@ class Queue(ABC):
 
     @property
     def root_id(self) -> Ints:
-        """The index of the root; any number where there is none."""
+        """The index of the root; arbitrary if there is no root."""
         return self._root % self._size
 
     @property
     def root_key(self) -> Ints:
-        """The key of the root; any number where there is none."""
+        """The key of the root; arbitrary if there is no root."""
         return self._root // self._size
 
     @property
     @abstractmethod
     def first_valid(self) -> Bools:
-        """Where an item can be popped: a root, or what becomes one in this cycle."""
+        """Whether an item can be popped: a root, or the item that becomes the root in this cycle."""
 
     @property
     @abstractmethod
     def empty(self) -> Bools:
-        """Whether nothing is inside, not even a root that is about to come."""
+        """Whether the queue has no item, not even a root that is on its way."""
 
     @property
     @abstractmethod
     def clearing(self) -> bool:
-        """Whether reset goes on, so that nothing can enter."""
+        """Whether the reset is still in progress, so that the queue accepts no item."""
 
     @property
     @abstractmethod
@@ -138,11 +139,11 @@ class Queue(ABC):
 
     @abstractmethod
     def ready(self, pop: Bools) -> Bools:
-        """Where an item can enter in this cycle."""
+        """Whether an item can enter in this cycle."""
 
     @abstractmethod
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
-        """A rising edge. `insert` only where it is ready, `pop` only where `first_valid` is true."""
+        """Simulate a rising edge; `insert` is legal only where `ready` is true, `pop` where `first_valid` is true."""
 
     def _insert(self, insert: Bools, index: Ints, key: Ints) -> None:
         rank = key * self._size + index
@@ -156,12 +157,12 @@ class Queue(ABC):
 
 
 class Heap(Queue):
-    """firm_sched_heap: the root is filled anew in the cycle behind a pop, or two cycles behind two in a row."""
+    """The model of firm_sched_heap: it replaces the root one cycle after a pop, or two after two consecutive pops."""
 
     def __init__(self, batch: int, items: int) -> None:
         super().__init__(batch, items)
         self._filling: Bools = np.zeros(batch, np.bool_)
-        # What would have filled the root was popped in the last cycle.
+        # The item that would have replaced the root was popped in the last cycle.
         self._owing: Bools = np.zeros(batch, np.bool_)
         self._clearing: int = 2 ** (index_bits(items) - 1)
 
@@ -202,7 +203,7 @@ class Heap(Queue):
 
 
 class SortedQueue(Queue):
-    """firm_sched_sorted_queue: the next root is there in the next cycle."""
+    """The model of firm_sched_sorted_queue: the new root is present in the next cycle."""
 
     @property
     def first_valid(self) -> Bools:
@@ -236,23 +237,23 @@ class SortedQueue(Queue):
 
 
 class Keys(ABC):
-    """Where the keys of tasks come from."""
+    """The source of the tasks' keys."""
 
     @abstractmethod
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
-        """The keys of tasks that leave the arrivals in this cycle, and where they are there."""
+        """The keys of tasks that leave the arrivals in this cycle, and where these keys are valid."""
 
     @abstractmethod
     def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
-        """Where time goes on; `oldest` are the keys that must not grow too old, each with where it is one."""
+        """Whether time advances; `oldest` are pairs of the keys that must not become too old and their valid bits."""
 
     @abstractmethod
     def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
-        """A rising edge."""
+        """Simulate a rising edge."""
 
 
 def check_times(name: str, times: Ints, time_bits: int | None) -> None:
-    """Raises `ValueError` if a time of many bits does not fit; `name` is what `times` are, as "deadline"."""
+    """Raise `ValueError` if a time does not fit into the bits; `name` is what `times` are, such as "deadline"."""
     if time_bits is None:
         return
     if not _SHORTEST_TIME <= time_bits <= _LONGEST_TIME:
@@ -264,7 +265,7 @@ def check_times(name: str, times: Ints, time_bits: int | None) -> None:
 
 
 class Times(Keys):
-    """Keys are the time at which a task leaves the arrivals and an offset (B, N) of its requester."""
+    """Keys that are the time at which a task leaves the arrivals, plus an offset (B, N) of its requester."""
 
     def __init__(self, offsets: Ints, time_bits: int | None) -> None:
         self._offsets = offsets
@@ -290,21 +291,21 @@ class Times(Keys):
 
 
 def is_overdue(key: Ints, now: Ints, eighth: int) -> Bools:
-    """Whether keys lie two eighths of the range before `now`, each cut to whole eighths of 2**`eighth` cycles."""
+    """Whether keys are two eighths of the range before `now`, each truncated to whole eighths of 2**`eighth` cycles."""
     overdue: Bools = (now >> eighth) - (key >> eighth) >= 2
     return overdue
 
 
 @dataclass(frozen=True)
 class Preemption:
-    """How a task with a smaller key takes the grant, and whether the key of the task that sends grows by one a beat."""
+    """Settings of preemption, and whether each beat increases the key of the task that is being sent by one."""
 
     shortest_run: int = 1
     sends_own_time: bool = False
 
 
 class Engine(Scheduler):
-    """firm_sched_engine, with the queue and the keys of a policy; non-preemptive if `preemption` is None."""
+    """The model of firm_sched_engine, with a policy's queue and keys; without `preemption`, it is non-preemptive."""
 
     def __init__(
         self, batch: int, requesters: int, queue: Queue, keys: Keys, preemption: Preemption | None = None
@@ -332,7 +333,7 @@ class Engine(Scheduler):
         advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
 
         choose = finished | ~(self._running | beat)
-        # A task that can be preempted after a beat need not wait for a root that is on its way.
+        # If the task can be preempted after a beat, it need not wait for a root that is on its way.
         gives_way = ~queue.first_valid if self._is_preemptive and self._rules.shortest_run == 1 else empty
         take_root = choose & queue.first_valid
         take_b = choose & gives_way & self._b_valid
@@ -366,7 +367,7 @@ class Engine(Scheduler):
         self._beats = np.where(choose | preempt, 0, np.minimum(self._beats + beat, self._rules.shortest_run))
 
     def _preempt(self, request: Bools, beat: Bools, finished: Bools, root_valid: Bools, root_key: Ints) -> Bools:
-        """Where the root takes the grant from a task that is not over."""
+        """Where the root takes the grant from an unfinished task."""
         if not self._is_preemptive:
             return np.zeros(self.batch, np.bool_)
         preempt = self._running & self._keyed & root_valid & (root_key < self._key) & ~finished

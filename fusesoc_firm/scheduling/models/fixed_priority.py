@@ -1,4 +1,4 @@
-"""Fixed priority (section 4.2.2): the lowest index goes first."""
+"""Fixed priority (section 4.2.2): the lowest index has the highest priority."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fusesoc_firm.scheduling.models.choosing import ChoosingScheduler
 
 
 class FixedPriority(ChoosingScheduler):
-    """Non-preemptive: a task that has begun is never interrupted."""
+    """The non-preemptive scheduler: a task that has begun is never interrupted."""
 
     def _choose(self, eligible: Bools) -> Ints:
         choice: Ints = eligible.argmax(axis=1)
@@ -17,16 +17,16 @@ class FixedPriority(ChoosingScheduler):
 
 
 class PreemptiveFixedPriority(Scheduler):
-    """Preemptive: chooses in every cycle.
+    """The preemptive scheduler: chooses in every cycle.
 
-    A run is the beats that a requester has in a row. Once one has begun, it lasts for `shortest_run` beats, until the
-    task's end or until its requester pauses, whichever comes first.
+    A run is a sequence of consecutive beats of a requester. It lasts for `shortest_run` beats, until the task's end or
+    until its requester pauses, whichever comes first.
     """
 
     def __init__(self, batch: int, requesters: int, shortest_run: int = 1) -> None:
         super().__init__(batch, requesters)
         self._shortest_run = shortest_run
-        # Beats of the run, no further than to the shortest run.
+        # Beats of the current run, saturating at the shortest run.
         self._beats: Ints = np.zeros(batch, np.int64)
 
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
@@ -41,10 +41,10 @@ class PreemptiveFixedPriority(Scheduler):
 
 
 def fixed_priority(generics: Generics) -> Scheduler:
-    """The non-preemptive one."""
+    """The non-preemptive scheduler."""
     return FixedPriority(generics.batch, generics.requesters)
 
 
 def fixed_priority_preemptive(generics: Generics) -> Scheduler:
-    """The preemptive one."""
+    """The preemptive scheduler."""
     return PreemptiveFixedPriority(generics.batch, generics.requesters, generics.shortest_run)

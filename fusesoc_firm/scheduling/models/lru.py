@@ -1,4 +1,4 @@
-"""Least recently used (section 4.2.1): who has waited longest since it completed a task goes first."""
+"""Least recently used (section 4.2.1): serves the requester whose last completed task is the oldest."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ _NEVER = np.iinfo(np.int64).max
 
 
 class ImmediateLru(ChoosingScheduler):
-    """Non-preemptive, for few requesters. After reset the lower index counts as less recently used."""
+    """The non-preemptive scheduler for few requesters; after reset, a lower index counts as less recently used."""
 
     MAX_REQUESTERS = 16
 
     def __init__(self, batch: int, requesters: int) -> None:
         super().__init__(batch, requesters)
-        # When each completed its last task, counted in completed tasks.
+        # The time of each requester's last completion, counted in completed tasks.
         self._used: Ints = np.tile(np.arange(requesters), (batch, 1))
         self._now = requesters
 
@@ -32,10 +32,10 @@ class ImmediateLru(ChoosingScheduler):
 
 
 class Stamps(Keys):
-    """firm_sched_stamps: when each requester completed its last task, counted in completions."""
+    """The model of firm_sched_stamps: the time of each requester's last completion, counted in completions."""
 
-    _QUARTER_BITS = 3  # more than those of an index
-    _STEPS = 4  # of the count for one of the sweep
+    _QUARTER_BITS = 3  # bits beyond those of an index
+    _STEPS = 4  # bits of the count for one requester of the sweep
 
     def __init__(self, batch: int, requesters: int) -> None:
         bits = index_bits(requesters)
@@ -44,7 +44,7 @@ class Stamps(Keys):
         self._members = np.arange(batch)
         self._stamps: Ints = np.tile(np.arange(self._size), (batch, 1))
         self._count: Ints = np.full(batch, self._size)
-        # The sweep's requester, its stamp, and where that has been read.
+        # The sweep's requester, its stamp, and whether the stamp has been read.
         self._sweep: Ints = np.zeros(batch, np.int64)
         self._swept: Ints = np.zeros(batch, np.int64)
         self._known: Bools = np.zeros(batch, np.bool_)
@@ -60,7 +60,7 @@ class Stamps(Keys):
         return self._stamps[self._members, index], self._reads(wanted, finished)
 
     def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
-        """See `Keys`. Stamps know no time."""
+        """See `Keys`; stamps do not depend on time."""
         return np.zeros_like(oldest[0][0])
 
     def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
@@ -84,7 +84,7 @@ class Stamps(Keys):
 
 
 def lru(generics: Generics) -> Scheduler:
-    """Few requesters are compared all at once, the tasks of more of them wait in a heap."""
+    """Compares few requesters in parallel; with more requesters, tasks wait in a heap."""
     batch, requesters = generics.batch, generics.requesters
     if requesters <= ImmediateLru.MAX_REQUESTERS:
         return ImmediateLru(batch, requesters)

@@ -8,7 +8,7 @@ from fusesoc_firm.scheduling.models.parallel import Parallel
 
 
 def lst(generics: Generics) -> Scheduler:
-    """Few requesters are compared all at once, the tasks of more of them wait in a heap.
+    """Compares few requesters in parallel; with more requesters, tasks wait in a heap.
 
     Raises `ValueError` without transfer times.
     """

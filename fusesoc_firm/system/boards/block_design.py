@@ -1,8 +1,8 @@
-"""Derived System -> template configuration: the system beside a processor, as a block design of Vivado.
+"""Derived System -> template configuration: the system next to a processor, as a block design of Vivado.
 
-A DMA engine carries frames between the processor's memory and the system's streams. Its descriptors are lists (scatter
-and gather): frames, or the bursts of a preemptive scheduler, come at any time and of any length, each into the next
-buffer. The id is in the bytes, so `m_axis_tid` leads nowhere.
+A DMA engine carries frames between the processor's memory and the system's streams. It uses lists of descriptors
+(scatter and gather): frames, or the bursts of a preemptive scheduler, arrive at any time with any length, each in the
+next buffer. The id is in the bytes, so `m_axis_tid` is not connected.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from fusesoc_firm.text.render import Context
 BLOCK_DESIGN_TEMPLATE = "board/block_design.tcl"
 PACKAGE_TEMPLATE = "hls/package.tcl"
 
-# Bits of a descriptor's length: as many as the DMA engine has (PG021).
+# The width of the length in a descriptor: the DMA engine's maximum (PG021).
 _LENGTH_BITS = 26
 _ADDRESS_BITS = 32
 _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
-# What Vivado would find out by itself, of interfaces that are connected whole and of pins whose polarity is known.
+# Parameters that Vivado infers from whole interface connections and from pins of known polarity.
 _FOUND_OUT = {"c_s_axis_s2mm_tdata_width", "C_AUX_RESET_HIGH"}
-# Clock pins of cells, beside the processor's.
+# The clock pins of all cells other than the processor.
 _CLOCK_PINS = (
     *(f"dma/{name}_aclk" for name in ("s_axi_lite", "m_axi_sg", "m_axi_mm2s", "m_axi_s2mm")),
     *("control/aclk", "memory/aclk", "reset/slowest_sync_clk", "system_reset/slowest_sync_clk", "system/clk"),
@@ -77,7 +77,7 @@ def _processor_properties(processor: Processor, system: DerivedSystem, clock: Fr
 
 
 def _cells(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, str, str, Sequence[tuple[str, object]]]]:
-    """Every cell that is an IP, but the processor."""
+    """All IP cells except the processor."""
     data_width = max(processor.memory_width, system.width)
     yield (
         "dma",
@@ -115,7 +115,7 @@ def _interfaces(processor: Processor) -> Iterator[tuple[str, str]]:
 
 
 def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """What is connected pin by pin, each as driver and sink."""
+    """The connections of single pins, each with driver and sink."""
     clock = f"processor/{processor.clock.format(0)}"
     processor_clocks = (f"processor/{processor.control_clock}", f"processor/{processor.memory_clock}")
     yield "The clock", [(clock, pin) for pin in (*processor_clocks, *_CLOCK_PINS)]
@@ -156,7 +156,7 @@ def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, li
 
 
 def _pins(system: DerivedSystem) -> list[Context]:
-    """The pins of accelerators as ports of the design."""
+    """The accelerators' pins as ports of the design."""
     return [
         {"name": port["name"], "direction": "I" if port["direction"] == "in" else "O", "bits": port["bits"]}
         for group in pin_groups(Names(system), system)
@@ -167,7 +167,7 @@ def _pins(system: DerivedSystem) -> list[Context]:
 def package_configuration(
     type_: AcceleratorType, sources: Sequence[str], system: DerivedSystem, board: Board, clock: Fraction
 ) -> Context:
-    """The configuration of the script by which Vitis HLS makes an IP of a C++ function, from `sources` beside it."""
+    """The configuration of the script for Vitis HLS, which makes an IP of a C++ function from adjacent `sources`."""
     clocks = {item.name: item.frequency for item in system.clocks}
     fastest = max(clocks.get(block.clock, clock) for block in system.accelerators if block.type is type_)
     return {

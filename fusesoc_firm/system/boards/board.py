@@ -1,7 +1,8 @@
-"""A board: what its FPGA is connected to, and the top level that fits a system on it.
+"""A board: the connections of its FPGA, and the top level that fits a system to it.
 
-A board is one YAML file. Those of the package lie in `fusesoc_firm/boards`; a core names its own by a path. One without
-a processor has pins, and a link to the host. One with a processor has the system in a block design (`block_design`).
+A board is one YAML file. The package's boards are in `fusesoc_firm/boards`; a core names its own board by a path. A
+board without a processor has pins, and a link to the host. A board with a processor has the system in a block design
+(`block_design`).
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 FOLDER = Path(__file__).resolve().parents[2] / "boards"
 BOARD_TEMPLATE = "vhdl/board.vhd"
 
-# Edalize's flows for boards with pins, each with the form of its constraints: their template, FuseSoC's file type.
+# Edalize's flows for boards with pins, each with the template and FuseSoC file type of its constraints.
 FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
-# Tools that take the system with its streams: Vivado beside a processor, Quartus as it is.
+# Tools that implement the system with its streams: Vivado next to a processor, Quartus without changes.
 VIVADO, QUARTUS = "vivado", "quartus"
-# What they have to know of a board.
+# The keys of a board that each tool requires.
 _NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
 _CLOCK = "clk"
 _PORTS = (
@@ -38,16 +39,16 @@ _PORTS = (
     *(name for pins in LINK_PINS.values() for name, _, _ in pins),
     *("led", "led_n", "reset", "reset_n"),
 )
-# What a board may do without.
+# The optional keys of a board.
 _OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq"}
 
 
-# What FPGAs, families and pins are called: scripts and constraints have such words without quotes.
+# Legal names of FPGAs, families and pins: scripts and constraints contain them without quotes.
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.,:+/()-]*")
 
 
 def word_fault(text: str) -> tuple[str, str] | None:
-    """What keeps `text` from being what tools call an FPGA, a family or a pin; None if nothing does."""
+    """The reason why `text` is not a legal name of an FPGA, a family or a pin; None if it is."""
     if fault := text_fault(text):
         return fault
     legal = "legal are letters, digits, blanks and '_.,:+/()-', a letter or digit first"
@@ -65,7 +66,7 @@ class BoardPin(Section):
 
 @dataclass(frozen=True)
 class Board(Section):
-    """The whole file."""
+    """The board file."""
 
     description: Text = key("maker, board and FPGA", is_required=True)
     flow: Text = key("what of Edalize builds for it", is_required=True, choices=(*FLOWS, *_NEEDED))
@@ -86,13 +87,13 @@ class Board(Section):
 
     @property
     def is_linked(self) -> bool:
-        """Whether a link of bytes leads to the host."""
+        """Whether a byte link connects the host."""
         return self.flow in FLOWS
 
 
 @dataclass(frozen=True)
 class _Port:
-    """A pin of an accelerator at the top level: bits of a vector or None, and what to call it in a message."""
+    """A pin of an accelerator at the top level: its bits, None for a scalar, and its name in messages."""
 
     name: str
     direction: str
@@ -101,7 +102,7 @@ class _Port:
     source: SourceRef | None
 
     def bits(self) -> list[str]:
-        """Every bit, each of which has a place of its own."""
+        """All bits; each of them has a place of its own."""
         return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
 
 
@@ -116,7 +117,7 @@ def board_path(name: str, folder: Path) -> Path:
 
 
 def read_board(name: str, folder: Path = Path()) -> Board:
-    """The board that `board_path` says. Raises `InputError`."""
+    """Read the board that `board_path` identifies; raises `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
         fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
@@ -169,16 +170,17 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
 
 
 def on_board(specification: Specification, board: Board) -> Specification:
-    """The specification of the system on the board, whose interconnect it has.
+    """The specification of the system on the board, with the board's interconnect.
 
-    The pin of a board without a processor decides what clk is; a PLL makes whatever the specification wants.
+    On a board without a processor, the clock pin determines the frequency of clk. On other boards, a PLL provides any
+    frequency that the specification asks for.
     """
     clock = board.clock if board.is_linked else specification.project.clock or board.clock
     return replace(specification, project=replace(specification.project, interconnect=board.interconnect, clock=clock))
 
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
-    """Raise `InputError` for what a system has and a board's file cannot say."""
+    """Raise `InputError` for features of a system that a board's file cannot describe."""
     clocks = 1 + len(system.clocks)
     if board.processor and clocks > MOST_CLOCKS:
         fail(f"board '{board.name}' makes {MOST_CLOCKS} clocks, clk included; the system has {clocks}")
@@ -192,7 +194,7 @@ def check_fits(system: DerivedSystem, board: Board) -> None:
 
 
 def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> None:
-    """Note every pin of an accelerator that the board has no place for, and every place that is for none."""
+    """Note every accelerator pin without a place on the board, and every place without a pin."""
     places = {pin.port.lower() for pin in board.pins}
     for pin in pins:
         if pin.name in _PORTS:
@@ -208,12 +210,12 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
 
 
 def board_entity(system: DerivedSystem, board: Board) -> str:
-    """The top level of a system on a board; beside a processor, the block design."""
+    """The entity of the top level of a system on a board; next to a processor, the block design."""
     return system.entity if board.flow == QUARTUS else f"{system.name}_{board.name}"
 
 
 def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
-    """The configuration of the top level, and of the constraints of its ports."""
+    """The configuration of the top level and of its constraints."""
     assert system.link is not None
     clock_hz = system.link.clock_hz
     ports = {pin.port.lower() for pin in board.pins}
@@ -251,11 +253,11 @@ def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
 
 
 def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
-    """The pins of accelerators, as the top level has them."""
+    """The accelerators' pins with the names and bits that they have at the top level."""
     names = top_level_pins(system)
     return [
         _Port(
-            # As GHDL writes it: it has forgotten the case.
+            # In lower case, as GHDL writes it.
             names[block.block, pin.name].lower(),
             str(pin.direction),
             pin.bits,

@@ -1,4 +1,4 @@
-"""The processors of FPGAs as blocks of Vivado's: what their IP, pins and properties are called.
+"""The processors of FPGAs as Vivado's blocks: the names of their IPs, pins and properties.
 
 Sources: Zynq-7000, PG082 (Processing System 7) and UG585; Zynq UltraScale+, PG201 and UG1085.
 """
@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-# Clocks that a processor makes for the logic.
+# The number of clocks that a processor provides for the logic.
 MOST_CLOCKS = 4
 
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor of an FPGA. Names with `{}` are those of clock 0, 1, ...
+    """A processor of an FPGA; names with `{}` are those of clock 0, 1, ...
 
-    `clock` is a clock's pin, `timing_clock` what timing constraints call it, `frequency` and `clock_switch` its
-    properties. `control` is the master for registers, with the address `base` for those of the DMA engine; `memory`, of
-    `memory_width` bits, is the slave that leads to the processor's memory; both with their clocks' pins.
+    `clock` is a clock's pin and `timing_clock` its name in timing constraints. `frequency` and `clock_switch` are its
+    properties. `control` is the master for registers; `base` is the address of the DMA engine's registers. `memory` is
+    the slave that leads to the processor's memory and has `memory_width` bits. Both come with the pins of their clocks.
     """
 
     ip: str
@@ -75,7 +75,7 @@ PROCESSORS = {
         memory_clock="saxihp0_fpd_aclk",
         memory_width=128,
         interrupts="pl_ps_irq0",
-        # Presets of boards switch on masters that nothing is connected to.
+        # Boards' presets enable masters that are not connected here.
         properties=(
             ("PSU__USE__M_AXI_GP0", 1),
             ("PSU__USE__M_AXI_GP1", 0),

@@ -15,7 +15,7 @@ from fusesoc_firm.text.render import Context
 
 
 def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Context:
-    """The configuration; `clock` is the frequency of clk in Hz. A processor has names of its own for its clocks."""
+    """The configuration; `clock` is the frequency of clk in Hz, and a processor names its clocks itself."""
     clocks = [("clk", clock), *((item.port, item.frequency) for item in system.clocks)]
     if board.processor:
         name = PROCESSORS[str(board.processor)].timing_clock

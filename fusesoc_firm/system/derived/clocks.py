@@ -1,4 +1,4 @@
-"""The clocks of a specification, and what is wrong with them."""
+"""The clocks of a specification, and checks of their use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fusesoc_firm.text.naming import identifier
 
 
 def clocks_of(specification: Specification, own: Fraction | None, faults: Diagnostics) -> tuple[Clock, ...]:
-    """The clocks beside that of the system, in the order of the specification; what is wrong is noted.
+    """The clocks of the specification other than the system's, in their order; faults are noted.
 
     `own` is the frequency of clk in Hz, if it is known.
     """
@@ -55,7 +55,7 @@ def _check_names(specification: Specification, faults: Diagnostics) -> None:
 
 
 def _pin_called(specification: Specification, port: str) -> str:
-    """The pin that is a port of this name at the top level; empty if there is none."""
+    """The pin whose port at the top level has this name; empty if there is no such pin."""
     pins = {str(item.name): item.pins for item in specification.accelerators}
     for block in specification.blocks:
         for pin in pins.get(str(block.type), ()):
@@ -65,7 +65,7 @@ def _pin_called(specification: Specification, port: str) -> str:
 
 
 def _check_uses(specification: Specification, faults: Diagnostics) -> None:
-    """Note every block with a clock that is none, and every clock that has no block."""
+    """Note every block with an unknown clock, and every clock without a block."""
     project, blocks = specification.project, specification.blocks
     names: Sequence[str] = [clock.name for clock in project.clocks]
     software = {item.name for item in specification.accelerators if item.is_software}

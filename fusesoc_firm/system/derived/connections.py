@@ -1,6 +1,6 @@
-"""Which message goes where: the ports and fields that each `outgoing` means, and what is wrong with the data flow.
+"""The data flow: finds the ports and fields that each `outgoing` refers to, and reports faults.
 
-A connection that cannot be made is one fault. What lacks a message only because of it is not reported as well.
+An impossible connection is reported as one fault. Messages that are missing only because of it are not reported.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from fusesoc_firm.text.yaml_text import Text
 Sides = Mapping[str, tuple[MessageSide, ...]]
 Pair = tuple[MessageSide, MessageSide]
 
-# Stands for the fields of a message that has none.
+# Represents the fields of a message without fields.
 _NO_FIELD: Names = ()
 
 
 @dataclass
 class Wiring:
-    """The connections between `blocks`, by name, whose message sides are known (`inputs`, `outputs`).
+    """The connections between named `blocks` whose message sides (`inputs`, `outputs`) are known.
 
-    Where the specification has faults: `has_more_blocks` tells that there are blocks whose names could not be read,
-    `has_more_messages` that there are connections of messages that are not known; `strays` are messages of connections
-    that could not be read. `ambiguous` are names of several blocks; the first is in the tables.
+    The other attributes limit follow-up errors of faulty specifications. `has_more_blocks` is set if names of blocks
+    could not be read, `has_more_messages` if messages of connections are unknown. `strays` are messages of connections
+    that could not be read. `ambiguous` are names of several blocks; the tables contain the first one.
     """
 
     blocks: Mapping[str, Block]
@@ -43,7 +43,7 @@ class Wiring:
     has_more_messages: bool = False
     strays: set[tuple[MessageName, Middleware]] = field(default_factory=set)
     ambiguous: set[str] = field(default_factory=set)
-    # The fields that go from each source to each of its sinks, and who drives each field of a sink.
+    # The fields that go from each source to each of its sinks, and the connection that drives each field of a sink.
     sinks: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)
     frames: dict[End, Frame] = field(default_factory=dict)
     driven: dict[End, dict[Names, Outgoing]] = field(default_factory=dict)
@@ -52,7 +52,7 @@ class Wiring:
     broken_sinks: set[str] = field(default_factory=set)
 
     def connect(self) -> tuple[Connection, ...]:
-        """One connection a message side that gives, in the order of the specification."""
+        """Make all connections, one for each giving message side, in the order of the specification."""
         for block in self.blocks.values():
             for outgoing in block.outgoing:
                 if not self._connect(block, outgoing):
@@ -70,7 +70,7 @@ class Wiring:
         )
 
     def _connect(self, block: Block, outgoing: Outgoing) -> bool:
-        """Make one connection; False where there is none, with the fault noted unless it is already."""
+        """Make one connection; False if it is impossible, with the fault noted."""
         if not self._are_known(block, outgoing):
             return False
         pairs = self._pairs(block, outgoing)
@@ -114,7 +114,7 @@ class Wiring:
         return block.name in self.outputs and name in self.inputs
 
     def _pairs(self, block: Block, outgoing: Outgoing) -> dict[Pair, frozenset[Names]]:
-        """The sides at both ends that carry the same message, each with the fields that go this way."""
+        """The pairs of sides with the same message, each with the fields that this connection carries."""
         gives, takes = self.outputs[block.name], self.inputs[outgoing.name]
         alike = [(given, taken) for given in gives for taken in takes if given.kind == taken.kind]
         if not alike:
@@ -141,12 +141,12 @@ class Wiring:
         return pairs
 
     def _rivals(self, outgoing: Outgoing, pair: Pair, names: Iterable[Names]) -> tuple[Names, Outgoing] | None:
-        """A field that the sink gets already, and by which connection."""
+        """A field that another connection already drives, with this connection."""
         driven = self.driven.get(self._sink(outgoing, pair), {})
         return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
 
     def _chosen(self, block: Block, free: Sequence[Pair]) -> Pair:
-        """The first pair with an output that goes nowhere yet; else the last output that fits gets one more sink."""
+        """The first pair whose output is unused; otherwise the last matching output gets a further sink."""
         unused = [pair for pair in free if self._source(block, pair) not in self.sinks]
         last = free[-1][0]
         return unused[0] if unused else next(pair for pair in free if pair[0] == last)
@@ -166,7 +166,7 @@ class Wiring:
                     self._check_sink(block, side)
 
     def _check_sink(self, block: Block, side: MessageSide) -> None:
-        """A publisher sends defaults for fields that it does not get; an accelerator needs all of its input."""
+        """Check that a sink is driven; a publisher sends defaults for missing fields, an accelerator needs all."""
         driven = self.driven.get(End(str(block.name), side.prefix), {})
         missing = sorted(dotted(name) for name in _names(side.frame) - driven.keys())
         if not driven:
@@ -194,8 +194,8 @@ class Wiring:
                     )
 
     def _check_cycles(self) -> None:
-        """A message cannot be waited for by what it is made of."""
-        # Lists, as the order in sets of strings differs from run to run.
+        """Check that no message depends on itself."""
+        # Lists, since the order in sets of strings differs from run to run.
         graph: dict[str, list[str]] = {}
         for source, sinks in self.sinks.items():
             for sink in sinks:
@@ -205,28 +205,28 @@ class Wiring:
             start = min(range(len(cycle)), key=lambda position: order.index(cycle[position]))
             way = [*cycle[start:], *cycle[: start + 1]]
             self.faults.error(f"these blocks wait for each other: {' -> '.join(way)}", self.blocks[way[0]].name.source)
-            # Without this step it is no cycle; there may be others.
+            # Removing this edge breaks the cycle; there may be others.
             graph[way[1]] = [block for block in graph[way[1]] if block != way[0]]
 
 
 def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
-    """The blocks of a cycle in the direction of its messages, each once; empty if there is none."""
+    """The blocks of a cycle in the direction of its messages, each once; empty if there is no cycle."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
-        # Each is the predecessor of the next; the first comes again at the end.
+        # Each block is the predecessor of the next one; the first one is repeated at the end.
         return list(error.args[1][:-1])
     return []
 
 
 def _fields(outgoing: Outgoing, given: MessageSide, taken: MessageSide) -> frozenset[Names]:
-    """The fields that go from one side to another. Raises `InputError` for a path that is none."""
+    """The fields that go from one side to another; raises `InputError` for an unknown path."""
     chosen = select(given.frame, *(places(paths) for paths in (outgoing.include, outgoing.exclude)))
     return _names(given.frame) & _names(taken.frame) & _names(chosen)
 
 
 def places(paths: Iterable[Text]) -> Paths:
-    """The paths of `include` or `exclude`, as `select` takes them."""
+    """The paths of `include` or `exclude`, in the form that `select` expects."""
     return {path: path.source for path in paths}
 
 
@@ -239,7 +239,7 @@ def _messages(sides: Sequence[MessageSide]) -> str:
 
 
 def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
-    """The key that an accelerator lacks which has no message at this side; empty if it has one."""
+    """The key that an accelerator without a message at this side lacks; empty if it has one."""
     return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
 
 

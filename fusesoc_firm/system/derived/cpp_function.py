@@ -1,11 +1,12 @@
 """Accelerators written as a C++ function for high-level synthesis.
 
-Such an accelerator is a kernel with the `ap_ctrl_hs` handshake that HLS tools give a function, and a wrapper that
-gives it the message sides of an accelerator. In synthesis the kernel is what the HLS tool makes. In simulation it is
-an entity of the same name and ports that calls the user's function itself, compiled to a shared library.
+Such an accelerator consists of a kernel with the `ap_ctrl_hs` handshake, which HLS tools give a function, and a wrapper
+with the message sides of an accelerator. In synthesis, the kernel is the output of the HLS tool. In simulation, it is
+an entity of the same name and ports that calls the user's function, compiled to a shared library.
 
-The function is called after its file. It takes the inputs' fields by value, then the outputs' by pointer or
-reference, in wire order; its parameters should be called `<field>_in` and `<field>_out`, which become the ports.
+The function has the name of its file. Its parameters are the inputs' fields by value, followed by the outputs' fields
+by pointer or reference, in wire order. They should have the names `<field>_in` and `<field>_out`, which become the
+ports.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ _CPP_TYPES = {
 class Argument:
     """A parameter of the C++ function.
 
-    `port` is the kernel's, `signal` the accelerator's; `word` is the first of the words of 32 bits that carry it.
+    `port` is the kernel's port and `signal` the accelerator's; `word` is the index of the first 32-bit word that
+    carries it.
     """
 
     port: str
@@ -47,38 +49,38 @@ class Argument:
 
     @property
     def bits(self) -> int:
-        """Bits of the kernel's port."""
+        """The width of the kernel's port."""
         return self.field.width or 1
 
     @property
     def words(self) -> int:
-        """Words of 32 bits that carry it."""
+        """The number of 32-bit words that carry the argument."""
         return -(-self.bits // WORD_BITS)
 
 
 def function_name(accelerator: AcceleratorType) -> str:
-    """The C++ function: named after the first source file."""
+    """The C++ function's name, which is that of the first source file."""
     return PurePosixPath(accelerator.accelerator.sources[0]).stem
 
 
 def kernel_entity(accelerator: AcceleratorType) -> str:
-    """The entity around the function, which the wrapper instantiates: an IP, or in simulation what calls the C++.
+    """The entity around the function: an IP or, in simulation, an entity that calls the C++ function.
 
-    Not the function's own name: that is a module within the IP.
+    The wrapper instantiates it. It does not have the function's own name, which belongs to a module within the IP.
     """
     return f"{function_name(accelerator)}_kernel"
 
 
 def library_name(accelerator: AcceleratorType) -> str:
-    """The shared library that simulation loads from its work folder."""
+    """The shared library that the simulation loads from its work folder."""
     return f"lib{function_name(accelerator)}.so"
 
 
 def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:
-    """The function's inputs and outputs, of an accelerator that `check_kernel` has no fault to note in."""
+    """The function's inputs and outputs; the accelerator must have passed `check_kernel`."""
     inputs = [(side, field) for side in accelerator.inputs for field in field_ports(side.frame)]
     outputs = [(side, field) for side in accelerator.outputs for field in field_ports(side.frame)]
-    # `in_` gives `x_in`, and `in1_` gives `x_in1`.
+    # `in_` becomes `x_in`, and `in1_` becomes `x_in1`.
     names = distinct_identifiers([(field.name, side.prefix) for side, field in inputs + outputs], AP_PORTS)
     return _arguments(inputs, names), _arguments(outputs, names[len(inputs) :])
 
@@ -92,7 +94,7 @@ def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[
 
 
 def prototype(accelerator: AcceleratorType) -> str:
-    """The function as it must be declared."""
+    """The required declaration of the function."""
     inputs, outputs = arguments(accelerator)
     parameters = [f"{cpp_type(item)} {item.port}" for item in inputs]
     parameters += [f"{cpp_type(item)} *{item.port}" for item in outputs]
@@ -100,7 +102,7 @@ def prototype(accelerator: AcceleratorType) -> str:
 
 
 def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
-    """Note what keeps an accelerator from being a function: its name, or messages that no plain parameters carry."""
+    """Note an illegal function name, and messages that cannot be passed in plain parameters."""
     name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
     function = function_name(accelerator)
     if identifier(function) != function:
@@ -121,7 +123,7 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
 
 
 def _problems(frame: Frame) -> list[str]:
-    """What of a message no parameter carries, behind what one does."""
+    """The parts of a message that no parameter can carry."""
     try:
         check_fixed_size(frame)
     except InputError as error:

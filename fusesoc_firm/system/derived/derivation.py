@@ -1,7 +1,7 @@
 """Specification -> derived System: data types and data flow.
 
-Resolves every message, gives out ids, and has `connections` find which port of which block each connection means. What
-does not fit is reported where it was written; as much as can be checked is checked before anything is raised.
+Resolves every message, assigns ids, and uses `connections` to find the port and block that each connection refers to.
+Faults are reported at their place in the specification; as many checks as possible run before anything is raised.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def derive(
     *,
     needs_sources: bool = True,
 ) -> DerivedSystem:
-    """The system that a specification in `folder` describes; unless it `needs_sources`, those may be missing.
+    """Derive the system of a specification in `folder`; unless it `needs_sources`, source files may be missing.
 
     Raises `InputError` with the faults found here and those already in `faults`.
     """
@@ -123,10 +123,10 @@ def source_files(specification: Specification, folder: Path) -> list[Path]:
 
 @dataclass
 class _Analysis:
-    """The state of one analysis: what has been resolved so far.
+    """The state of one analysis: everything resolved so far.
 
-    `blocks` are those that connections can mean: the first of each name. A block whose messages are not known, by a
-    fault that is noted, has neither inputs nor outputs in the tables.
+    `blocks` are the possible ends of connections: the first block of each name. If a fault leaves the messages of a
+    block unknown, its inputs and outputs are missing from the tables.
     """
 
     specification: Specification
@@ -149,7 +149,7 @@ class _Analysis:
     def _check_distinct(self, what: str, names: Iterable[Text]) -> None:
         seen: dict[str, Text] = {}
         for name in filter(None, names):
-            # VHDL knows no case, so names that differ in it alone would meet there.
+            # VHDL ignores case, so names that differ only in case would collide.
             twin = seen.setdefault(identifier(name).lower(), name)
             if twin is not name and twin == name:
                 self.faults.error(f"a second {what} is called '{name}'; the first is at {twin.source}", name.source)
@@ -190,7 +190,7 @@ class _Analysis:
                 self.faults.error(f"'{source}' is not a source of type {accelerator.type}", source.source, hint)
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
-        """The message sides of an interface, numbered if there are several; None if a message is wrong."""
+        """The message sides of an interface, numbered if there are several; None if a message has a fault."""
         frames = [self._frame(item.middleware, item.message, item.include, item.exclude) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
         sides = [
@@ -204,7 +204,7 @@ class _Analysis:
         return output_length(item, frame, self.faults) if isinstance(item, OutputType) else None
 
     def _frame(self, middleware: Text, message: Text, include: Sequence[Text], exclude: Sequence[Text]) -> Frame | None:
-        """The frame of a message's fields, or None where it has a fault, which is noted at the specification's word."""
+        """The frame of a message's fields; None if a fault was noted, at the message's name in the specification."""
         if not middleware or not message:
             return None
         library = self.libraries[MIDDLEWARES[middleware]]
@@ -230,7 +230,7 @@ class _Analysis:
                 self._resolve_accelerator_block(block)
             else:
                 self._resolve_converter(block)
-        # With software, what is hardware is not known yet.
+        # With software, the hardware part is not known yet.
         if not any(accelerator.is_software for accelerator in self.specification.accelerators):
             for mode in MODES:
                 self._check_count(mode)
@@ -238,7 +238,7 @@ class _Analysis:
     def _resolve_accelerator_block(self, block: Block) -> None:
         assert block.type is not None
         names = [accelerator.name for accelerator in self.specification.accelerators]
-        # One that could not be read may be the one that is meant.
+        # A block may refer to an accelerator that could not be read.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
             hint = nearest(block.type, names) or "there is none under 'accelerators'"
@@ -257,7 +257,7 @@ class _Analysis:
     def _resolve_converter(self, block: Block) -> None:
         missing = [key for key in CONVERTER_KEYS if getattr(block, key) is None]
         if missing:
-            # What is wrong with a block that could not be read is noted already.
+            # The faults of a block that could not be read are noted already.
             if block.is_sound:
                 words = ", ".join(f"'{key}'" for key in missing)
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)
@@ -293,7 +293,7 @@ class _Analysis:
             )
 
     def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
-        """The topics of all converters, and of software elsewhere, whose messages have `names`."""
+        """The topics of all converters and of software in other programs; `names` are its messages' names."""
         for name, block in self.blocks.items():
             is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
             if block.type is not None and not is_elsewhere:
@@ -305,7 +305,7 @@ class _Analysis:
                     yield TopicUse(topic, is_published, block.topic.source if block.topic else block.name.source)
 
     def wiring(self) -> Wiring:
-        """The blocks to connect."""
+        """The wiring of the resolved blocks."""
         blocks = self.specification.blocks
         lost = [block for block in blocks if self.blocks.get(block.name) is not block]
         unsound = [block for block in self.blocks.values() if not block.is_sound]
@@ -328,7 +328,7 @@ class _Analysis:
         return Parting(self.blocks, software, self.inputs, self.outputs, connections, names).parts()
 
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
-        """The accelerators' blocks, as far as their types are known, in one part of the system."""
+        """The accelerators' blocks with known types, in one part of the system."""
         found = [
             AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
             for block in self.blocks.values()
@@ -338,7 +338,7 @@ class _Analysis:
 
 
 def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
-    """The converters with the fields that connections carry: what nobody takes or drives needs no port."""
+    """The converters with the fields that connections carry; unconnected fields need no ports."""
     names: dict[str, set[Names]] = {}
     for connection in connections:
         for sink, frame in zip(connection.sinks, connection.frames, strict=True):
@@ -350,7 +350,7 @@ def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> t
     for number, name in enumerate(parts.of_mode(mode)):
         whole = select(sides[name][0].frame)
         frame = with_names_in_use(whole, names[name])
-        # Blocks of the same fields share the entity of the first.
+        # Blocks with the same fields share the first one's entity.
         suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(name).lower()}")
         given_name = str(parts.blocks[name].topic or "")
         software = parts.crossings.get(name)

@@ -1,8 +1,8 @@
-"""How the length of a payload is known ahead of it, and which publishers store their frames whole.
+"""The way in which the length of each payload is known in advance, and the publishers that store whole frames.
 
-A length is computed from those of the parts, given by the accelerator, or counted in a buffer behind the publisher. A
-buffer also stands where several publishers wait for the same stream: as only one of them sends at a time, the others
-would hold up its stream for ever.
+A length is computed from the lengths of the parts, given by the accelerator, or counted in a buffer after the
+publisher. Publishers that share a source stream also have buffers: only one of them sends at a time, so the others
+would block the stream forever.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fusesoc_firm.system.written.specification import Block, OutputType
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import identifier
 
-# More than any FPGA has on the chip.
+# More than the on-chip memory of any FPGA.
 _LARGEST_BUFFER = 2**24
 _ADD_BUFFER = "add 'buffer: <bytes of its longest payload>'"
 
@@ -30,7 +30,7 @@ def with_lengths(
     blocks: Mapping[str, Block],
     faults: Diagnostics,
 ) -> tuple[Connection, ...]:
-    """The connections with how the lengths of their payloads are known."""
+    """The connections, with the sources of their payloads' lengths."""
     found: list[Connection] = []
     suffixes: dict[Frame, str] = {}
     for connection in connections:
@@ -43,7 +43,7 @@ def with_lengths(
         is_sent = any(blocks[sink.block].type is None for sink in connection.sinks)
         length = side.length or _subscriber_length(connection.frame, is_sent=is_sent)
         if connection.frame != select(connection.frame):
-            # Outputs of the same parts share the entity of the first.
+            # Outputs with the same parts share the first one's entity.
             suffix = suffixes.setdefault(connection.frame, f"_{identifier(source.block).lower()}")
             length = replace(length, suffix=suffix)
         found.append(replace(connection, length=length))
@@ -57,7 +57,7 @@ def _check_whole(
     blocks: Mapping[str, Block],
     faults: Diagnostics,
 ) -> None:
-    """Note a message of variable size that is taken apart: where its segments end depends on its fields."""
+    """Note a message of variable size that is split: its segment boundaries depend on its fields."""
     names = [names_in_use(frame) for frame in connection.frames]
     whole = names[0] if blocks[connection.source.block].type is None else names_in_use(side.frame)
     message = connection.frame.message
@@ -73,9 +73,10 @@ def _check_whole(
 
 
 def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
-    """How the length of what a subscriber gives is known: it has that of the whole message.
+    """The length of a subscriber's output, which is the length of the whole message.
 
-    Without all its parts a message that is sent on (`is_sent`) has another one; to an accelerator it is what came.
+    If some of its parts are missing, a forwarded message (`is_sent`) has a different length; at an accelerator, the
+    received length is valid.
     """
     unused = [node for node in all_nodes(frame.nodes) if isinstance(node, Data | Loop) and not node.is_used]
     if not unused or not is_sent:
@@ -88,7 +89,7 @@ def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
 
 
 def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> PayloadLength | None:
-    """How the length of an accelerator's output is known; None if it is always the same, or with the fault noted."""
+    """The source of the length of an accelerator's output; None if the length is constant or if a fault was noted."""
     if frame.is_fixed_size:
         if item.length is not None:
             message = f"'length' is given for {frame.message}, which is of fixed size"
@@ -109,7 +110,7 @@ def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> Payloa
 def publisher_buffers(
     connections: Sequence[Connection], publishers: Mapping[str, Block], faults: Diagnostics
 ) -> dict[str, int]:
-    """The bytes of the longest payload of each publisher that stores its frames whole."""
+    """The longest payload in bytes of each publisher that stores whole frames."""
     needs = _needs(connections, publishers)
     buffers: dict[str, int] = {}
     for connection in connections:
@@ -124,14 +125,14 @@ def publisher_buffers(
 
 @dataclass(frozen=True)
 class _Need:
-    """Why a publisher must store its frames, and what can be done about it."""
+    """The reason why a publisher must store its frames, and possible remedies."""
 
     reason: str
     hint: str
 
 
 def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics) -> int | None:
-    """The size of a publisher's buffer; None if it has none, or with the fault noted."""
+    """The size of a publisher's buffer; None if it has no buffer or if a fault was noted."""
     if frame.is_fixed_size:
         if block.buffer is not None:
             message = f"'{block.name}' has a 'buffer', but {frame.message} is of fixed size"
@@ -171,7 +172,7 @@ def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -
 
 
 def _blocks_behind(ends: Iterable[End], connections: Sequence[Connection]) -> set[str]:
-    """All blocks that messages of variable size reach from `ends`, `ends` included."""
+    """All blocks that messages of variable size reach from `ends`, including `ends`."""
     found: set[str] = set()
     for end in ends:
         found.add(end.block)
@@ -182,7 +183,7 @@ def _blocks_behind(ends: Iterable[End], connections: Sequence[Connection]) -> se
 
 
 def _doubt(length: Length) -> str:
-    """Why the lengths at the ports do not determine the payload's."""
+    """The reason why the lengths at the ports do not determine the payload's length."""
     outer = next(term for term in length.terms if isinstance(term, Repeat) and term.stride is None)
     inner = next(term for term in outer.body if isinstance(term, Repeat))
     name = "" if inner.part.path == outer.part.path else f", '{dotted(inner.part.names)}'"

@@ -1,4 +1,4 @@
-"""How frames get between the host and a system: the specification's `interconnect`."""
+"""The link between the host and a system: the specification's `interconnect`."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from fusesoc_firm.system.derived.model import Link, LinkKind, Scheduling
 from fusesoc_firm.system.written.specification import AXI_STREAM, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# Beyond it the generic CLOCK_HZ is no integer of VHDL.
+# A higher frequency exceeds VHDL's integers in the generic CLOCK_HZ.
 _FASTEST = 10**9
 
 
 def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
-    """The link between the host and a system; None where the system's streams are its ports. Faults are noted.
+    """The link between the host and a system; None if the system's streams are its ports; faults are noted.
 
     `clock` is the frequency of clk in Hz, if it is given.
     """
@@ -30,7 +30,7 @@ def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, fa
 
 
 def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:
-    """The clock's frequency as an integer; 0 where it is not given."""
+    """The clock's frequency as an integer; 0 if it is not given."""
     if project.clock is None or clock is None:
         if project.interconnect == LinkKind.UART.value:
             faults.error(

@@ -1,6 +1,6 @@
-"""The derived System: every converter, accelerator, id and connection, with nothing left to decide.
+"""The derived System: all converters, accelerators, ids and connections, with all decisions made.
 
-It is what `analysis` makes of a specification and what all templates, and `firm system show`, are filled from.
+`analysis` derives it from a specification. All templates and `firm system show` use it as their data.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def absolute_name(topic: str) -> str:
 
 @dataclass(frozen=True)
 class Topic:
-    """A message between the system and others; unless it has a `given_name`, its topic is called as the block."""
+    """A message between the system and others; without a `given_name`, its topic has the block's name."""
 
     block: str
     frame: Frame
@@ -33,18 +33,18 @@ class Topic:
 
     @property
     def ros_name(self) -> str:
-        """The topic as a node calls it: without a leading `/` it is relative to the node's namespace."""
+        """The topic's name as a node uses it: without a leading `/`, it is relative to the node's namespace."""
         return self.given_name or identifier(self.block, avoid=())
 
     @property
     def name(self) -> str:
-        """The topic of a node without a namespace, and so in bags."""
+        """The topic's name for a node without a namespace, and in bags."""
         return absolute_name(self.ros_name)
 
 
 @dataclass(frozen=True)
 class End:
-    """One end of a connection: a block, and the prefix of the message there (empty at a converter)."""
+    """One end of a connection: a block, and the prefix of the message's ports there (empty at a converter)."""
 
     block: str
     prefix: str = ""
@@ -52,12 +52,7 @@ class End:
 
 @dataclass(frozen=True)
 class Converter(Topic):
-    """An instance of a converter; `id` counts subscribers and publishers apart, from 0, in the order of the blocks.
-
-    The fields that are used in `frame` are its ports. One without all of them has an entity with a `suffix`. `buffer`
-    are the bytes of the longest payload of a publisher that stores its frames whole, 0 of any other. Those that the
-    specification does not have come last: each stands between hardware and a message side of a block in `software`.
-    """
+    """An instance of a converter; `id` counts subscribers and publishers separately, from 0, in the blocks' order."""
 
     id: int
     suffix: str = ""
@@ -66,7 +61,7 @@ class Converter(Topic):
 
 
 class LengthSource(Enum):
-    """Where the length of a payload of variable size comes from."""
+    """The source of the length of a payload of variable size."""
 
     COMPUTED = "computed"
     GIVEN = "given"
@@ -75,9 +70,9 @@ class LengthSource(Enum):
 
 @dataclass(frozen=True)
 class PayloadLength:
-    """How a publisher learns the length of its payloads, and why so.
+    """The way in which a publisher learns the length of its payloads, with the reason.
 
-    `suffix` is that of the entity that computes it.
+    `suffix` is the suffix of the entity that computes the length.
     """
 
     source: LengthSource
@@ -87,10 +82,7 @@ class PayloadLength:
 
 @dataclass(frozen=True)
 class MessageSide:
-    """A message at a block: its ports begin with `prefix` (`in_`, `out1_`, nothing at a converter).
-
-    An accelerator's output of variable size has a `length`.
-    """
+    """A message at a block: its ports begin with `prefix` (`in_`, `out1_`, empty at a converter)."""
 
     prefix: str
     frame: Frame
@@ -98,13 +90,13 @@ class MessageSide:
 
     @property
     def kind(self) -> tuple[MessageName, Middleware]:
-        """What connects two sides: the message, whichever fields of it they use."""
+        """The key by which two sides match: the message, regardless of the fields that they use."""
         return self.frame.message, self.frame.ros
 
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with its messages resolved; its streams have `width` bits, which it is told if `has_width`."""
+    """An accelerator with its messages resolved; its streams have `width` bits, its WIDTH if `has_width` is set."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
@@ -120,18 +112,18 @@ class AcceleratorType:
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether it is software that others run, which is reached by topics."""
+        """Whether it is software that runs in another program and is reached by topics."""
         return self.accelerator.is_software and not self.accelerator.sources
 
     @property
     def is_component(self) -> bool:
-        """Whether the top level declares it, since it is no entity: a module in Verilog."""
+        """Whether the top level declares it as a component: a Verilog module is not an entity."""
         return self.accelerator.type == "Verilog"
 
 
 @dataclass(frozen=True)
 class AcceleratorBlock:
-    """An instance of an accelerator; `clock` is the name of the one it runs at, empty for that of the system."""
+    """An instance of an accelerator; `clock` is the name of its clock, empty for the system's clock."""
 
     block: str
     type: AcceleratorType
@@ -140,10 +132,10 @@ class AcceleratorBlock:
 
 @dataclass(frozen=True)
 class Connection:
-    """A message's way from where it arises to all who take it, in the order of the specification.
+    """The way of a message from its source to all its sinks, in the order of the specification.
 
-    `frames` is the message for each sink: the fields that are used in it go there from here. A message of variable size
-    is the same for all sinks, and has a `length`.
+    `frames` has the message for each sink; its used fields are those that this connection carries there. A message of
+    variable size is the same for all sinks, and has a `length`.
     """
 
     source: End
@@ -153,15 +145,16 @@ class Connection:
 
     @property
     def frame(self) -> Frame:
-        """The message, as the first sink has it."""
+        """The message for the first sink."""
         return self.frames[0]
 
 
 @dataclass(frozen=True)
 class PublisherTimes:
-    """What is known of a publisher's times, in cycles.
+    """The known times of a publisher, in cycles.
 
-    From message to message, to send a frame, and from the request to send it until it is to be sent.
+    These are the times from message to message, for sending a frame, and from the request to the deadline for sending
+    it.
     """
 
     period: int | None
@@ -171,10 +164,10 @@ class PublisherTimes:
 
 @dataclass(frozen=True)
 class Scheduling:
-    """Who may send to the host next: a policy, with the times of the publishers in the order of their ids.
+    """The scheduler that chooses the next frame to the host: its policy, with the publishers' times by id.
 
-    A preemptive policy interrupts a frame after `shortest_run` beats at the soonest. Its times have `time_bits`. If the
-    policy was not given but chosen, `reasons` say why so.
+    A preemptive policy interrupts a frame after `shortest_run` beats at the earliest. The times have `time_bits`. If
+    the policy was chosen automatically, `reasons` explain the choice.
     """
 
     policy: str
@@ -186,7 +179,7 @@ class Scheduling:
 
 
 class LinkKind(Enum):
-    """What carries bytes between the host and a board without a processor."""
+    """The kind of link that carries bytes between the host and a board without a processor."""
 
     UART = "uart"
     SPI = "spi"
@@ -194,7 +187,7 @@ class LinkKind(Enum):
 
 @dataclass(frozen=True)
 class Link:
-    """The link between the host and the system, and the frequency of clk where it is needed or known."""
+    """The link between the host and the system, and the frequency of clk if it is needed or known."""
 
     kind: LinkKind
     clock_hz: int
@@ -202,11 +195,11 @@ class Link:
 
 @dataclass(frozen=True)
 class Software:
-    """The host's part of a system: `blocks` in software, and all connections that a message takes on the host.
+    """The host's part of a system: `blocks` in software, and all connections whose messages travel on the host.
 
-    It comes from one of the `subscribers`, from the hardware's publisher that stands for a block's input, or from a
-    block; and goes to a block, to the hardware's subscriber that stands for a block's output, or to one of the
-    `publishers`. A subscriber may be in hardware as well; a publisher is only here.
+    The source of a connection is one of the `subscribers`, a block, or the hardware's publisher that represents a
+    block's input. Its sinks are blocks, the `publishers`, or the hardware's subscribers that represent blocks' outputs.
+    A subscriber may be in hardware as well; a publisher is only here.
     """
 
     blocks: tuple[AcceleratorBlock, ...] = ()
@@ -216,13 +209,13 @@ class Software:
 
     @property
     def types(self) -> tuple[AcceleratorType, ...]:
-        """Every type that has an instance, once."""
+        """All types with an instance, each once."""
         return tuple(dict.fromkeys(block.type for block in self.blocks))
 
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock beside that of the system: its `frequency` in Hz, and `ratio` of its edges to those of clk."""
+    """A clock other than the system's: its `frequency` in Hz, and the `ratio` of its edges to those of clk."""
 
     name: str
     frequency: Fraction
@@ -230,23 +223,24 @@ class Clock:
 
     @property
     def port(self) -> str:
-        """The clock at the top level."""
+        """The clock's port at the top level."""
         return f"clk_{self.name}"
 
     @property
     def reset(self) -> str:
-        """The reset of its domain, synchronous and low."""
+        """The reset of its domain, synchronous and active-low."""
         return f"rst_{self.name}_n"
 
 
 @dataclass(frozen=True)
 class DerivedSystem:
-    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` those beside clk.
+    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` all clocks other than clk.
 
     `clock` is the frequency of clk in Hz, if it is given.
 
-    Without a `link` its streams are ports. Converters, accelerators and connections are those of the hardware. `names`
-    are what messages at accelerators are called outside of these: `<block>_in`, `<block>_out1` and so on.
+    Without a `link`, the streams are ports of the system. Converters, accelerators and connections are those of the
+    hardware. `names` are the names of the accelerators' messages outside of the accelerators: `<block>_in`,
+    `<block>_out1` and so on.
     """
 
     name: str
@@ -264,12 +258,12 @@ class DerivedSystem:
     clocks: tuple[Clock, ...] = ()
 
     def clock_of(self, block: str) -> Clock | None:
-        """The clock that a block runs at; None for that of the system."""
+        """The clock of a block; None for the system's clock."""
         name = self._accelerators[block].clock if block in self._accelerators else ""
         return next((clock for clock in self.clocks if clock.name == name), None)
 
     def width_of(self, block: str) -> int:
-        """The bits of a block's streams."""
+        """The width of a block's streams in bits."""
         return self._accelerators[block].type.width if block in self._accelerators else self.width
 
     @cached_property
@@ -278,7 +272,7 @@ class DerivedSystem:
 
     @property
     def entity(self) -> str:
-        """The top level's name."""
+        """The name of the top level."""
         return f"{self.name}_system"
 
     @property
@@ -289,7 +283,7 @@ class DerivedSystem:
 
     @property
     def computed_lengths(self) -> dict[Frame, str]:
-        """Every frame whose payload's length is computed, with the suffix of the entity that does so."""
+        """Every frame with a computed payload length, with the suffix of the entity that computes it."""
         return {
             item.frame: item.length.suffix
             for item in self.connections
@@ -297,20 +291,20 @@ class DerivedSystem:
         }
 
     def length_to(self, publisher: Converter) -> PayloadLength | None:
-        """How a publisher learns the length of its payloads; None if it is always the same."""
+        """The way in which a publisher learns the length of its payloads; None if the length is constant."""
         return next(item.length for item in self.connections if End(publisher.block) in item.sinks)
 
     @property
     def frames(self) -> tuple[Frame, ...]:
-        """Every frame of a converter, once."""
+        """All frames of converters, each once."""
         return tuple(dict.fromkeys(converter.frame for converter in (*self.subscribers, *self.publishers)))
 
     @property
     def kernels(self) -> tuple[AcceleratorType, ...]:
-        """The types in C++, of which an HLS tool makes hardware."""
+        """The types in C++ that an HLS tool turns into hardware."""
         return tuple(type_ for type_ in self.accelerator_types if type_.accelerator.type == "HLS")
 
     @property
     def accelerator_types(self) -> tuple[AcceleratorType, ...]:
-        """Every type that has an instance, once."""
+        """All types with an instance, each once."""
         return tuple(dict.fromkeys(block.type for block in self.accelerators))

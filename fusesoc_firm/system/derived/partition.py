@@ -1,9 +1,9 @@
-"""Which part of a system is software, and how messages get from one part to the other.
+"""The partition of a system into software and hardware, and the messages between the two.
 
-A specification says what goes where, and the type of an accelerator whether it is hardware. A message that goes from
-hardware to a block in software leaves through a publisher that is made for it, one that goes from such a block to
-hardware enters through a subscriber. All other messages of software stay on the host: a subscriber that feeds nothing
-else is no converter, nor is a publisher that gets nothing else.
+A specification defines the connections; the type of an accelerator decides between hardware and software. A message
+from hardware to a block in software leaves through an added publisher. A message from such a block to hardware enters
+through an added subscriber. All other messages of software stay on the host. So a subscriber that feeds only software,
+or a publisher that only software feeds, is not a converter.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ MOST_CONVERTERS = 256
 
 @dataclass(frozen=True)
 class Parts:
-    """A system in its two parts: `software`, and the hardware's blocks by name, message sides and connections.
+    """A partitioned system: `software`, and the hardware's blocks by name, message sides and connections.
 
-    `crossings` are the converters among these blocks that the specification does not have, each with the message side
-    in software that it stands for. They come last, in the order of the specification's blocks.
+    `crossings` are the added converters among these blocks, each with the message side in software that it represents.
+    They come last, in the order of the specification's blocks.
     """
 
     blocks: Mapping[str, Block]
@@ -47,7 +47,7 @@ class Parts:
         return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == mode}
 
     def check(self, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
-        """Note what keeps the hardware of a specification with these `blocks` from being one."""
+        """Note the faults of the hardware of a specification with these `blocks`."""
         first = next(iter(blocks.values())).name.source
         if not self.blocks:
             hint = "an accelerator, or a message that goes from a subscriber to a publisher, must stay there"
@@ -68,7 +68,7 @@ class Parts:
 
 
 def message_names(blocks: Mapping[str, Block], inputs: Sides, outputs: Sides) -> dict[End, str]:
-    """A name for each message side of each accelerator, `<block>_in`, that no block has."""
+    """A name for each message side of each accelerator, `<block>_in`, that differs from all names of blocks."""
     ends = [
         End(name, side.prefix)
         for name, block in blocks.items()
@@ -81,7 +81,7 @@ def message_names(blocks: Mapping[str, Block], inputs: Sides, outputs: Sides) ->
 
 @dataclass(frozen=True)
 class Parting:
-    """A system that is to be parted: it is known which blocks are `software`; `names` as `message_names` has them."""
+    """A system before its partition, with its blocks in `software`; `names` are those of `message_names`."""
 
     blocks: Mapping[str, Block]
     software: Sequence[AcceleratorBlock]
@@ -91,7 +91,7 @@ class Parting:
     names: Mapping[End, str]
 
     def parts(self) -> Parts:
-        """Hardware and software, each with its connections."""
+        """The hardware and the software, each with its connections."""
         hardware = tuple(self._hardware_connections())
         host = tuple(self._host_connections())
         ends = {end.block for connection in hardware for end in (connection.source, *connection.sinks)}
@@ -107,7 +107,7 @@ class Parting:
         )
 
     def _software(self, connections: tuple[Connection, ...]) -> Software:
-        """The host's part; publishers have the fields that they get."""
+        """The host's part; its publishers have the fields that are driven."""
         sources = {connection.source.block for connection in connections}
         subscribers = [
             self._topic(name, self.outputs[name][0].frame) for name in self._converters(SUBSCRIBER) if name in sources
@@ -143,10 +143,10 @@ class Parting:
 
     @cached_property
     def _hardware_sinks(self) -> frozenset[End]:
-        """The ends whose message is in hardware: all of it, even if a part comes from the host.
+        """The ends whose whole message is in hardware, even if a part of it comes from the host.
 
-        Those of accelerators there, those in software that get something from such accelerators, and publishers that
-        get something from hardware, be it from a subscriber.
+        These are the accelerators in hardware, all sinks of such accelerators, and the publishers that subscribers
+        drive.
         """
         return frozenset(
             sink
@@ -158,12 +158,12 @@ class Parting:
         )
 
     def _entering(self) -> Iterator[tuple[End, MessageSide]]:
-        """The outputs in software that something in hardware takes."""
+        """The outputs in software that feed hardware."""
         sources = {connection.source for connection in self.connections if any(self._in_hardware(connection))}
         return self._sides(self.outputs, sources)
 
     def _leaving(self) -> Iterator[tuple[End, MessageSide]]:
-        """The inputs in software that come from hardware."""
+        """The inputs in software that are driven by hardware."""
         return self._sides(self.inputs, self._hardware_sinks)
 
     def _sides(self, sides: Sides, wanted: Iterable[End]) -> Iterator[tuple[End, MessageSide]]:
@@ -176,7 +176,7 @@ class Parting:
     # --- connections -----------------------------------------------------------------------------------------------
 
     def _in_hardware(self, connection: Connection) -> Iterator[tuple[End, Frame]]:
-        """The sinks in hardware, with what they get."""
+        """The sinks in hardware, with their messages."""
         return (pair for pair in _pairs(connection) if pair[0] in self._hardware_sinks)
 
     def _hardware_connections(self) -> Iterator[Connection]:
@@ -197,11 +197,11 @@ class Parting:
                 yield _connection(connection.source, pairs)
 
     def _crossing(self, end: End) -> End:
-        """The end in hardware that stands for one in software; any other end itself."""
+        """The end in hardware that represents an end in software; other ends stay unchanged."""
         return End(self.names[end]) if end.block in self._in_software else end
 
     def _converter(self, end: End, side: MessageSide) -> Block:
-        """The block of a converter that stands for a side; a publisher has the block's keys of publishers."""
+        """The block of the converter that represents a side; a publisher gets the block's publisher keys."""
         block = self.blocks[end.block]
         made = Block(name=Text(self.names[end], block.name.source), source=block.source, places=block.places)
         if side in self.outputs[end.block]:
@@ -209,7 +209,7 @@ class Parting:
         keys = {key: getattr(block, key) for key in keys_only_of(Block, PUBLISHER)}
         leaving = [side.frame for other, side in self._leaving() if other.block == end.block]
         if side.frame.is_fixed_size and not all(frame.is_fixed_size for frame in leaving):
-            # It is meant for the others.
+            # The buffer belongs to the inputs of variable size.
             del keys["buffer"]
         return replace(made, mode=Text(PUBLISHER), **keys)
 
@@ -223,7 +223,7 @@ def _check_no_publisher_keys(block: Block, faults: Diagnostics) -> None:
 
 
 def _bare(side: MessageSide) -> MessageSide:
-    """The side as a converter has it."""
+    """The side without a prefix, as a converter has it."""
     return MessageSide("", side.frame)
 
 
@@ -236,6 +236,6 @@ def _connection(source: End, pairs: Sequence[tuple[End, Frame]]) -> Connection:
 
 
 def _joined(frames: Sequence[Frame]) -> Frame:
-    """A message with all fields that are used in one of several."""
+    """A message with all fields that are used in any of several frames."""
     names = reduce(frozenset.union, (names_in_use(frame) for frame in frames))
     return with_names_in_use(frames[0], names)

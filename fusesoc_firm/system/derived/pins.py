@@ -1,4 +1,4 @@
-"""The pins of accelerators: ports that belong to no message and lead out of the system."""
+"""The pins of accelerators: ports that belong to no message and that the top level exports."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from fusesoc_firm.system.written.specification import SOFTWARE, Pin
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import identifier
 
-# As many as the largest array has that a port of a message holds.
+# The width of the largest array that fits a message's port.
 _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
-# What accelerators of some types lack.
+# The kinds of ports that accelerators of some types lack.
 _WITHOUT_PINS = {"HLS": "ports but those of its messages", SOFTWARE: "ports"}
 
 

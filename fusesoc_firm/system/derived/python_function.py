@@ -1,9 +1,9 @@
-"""An accelerator in software: a Python function that takes its messages and gives its answers.
+"""An accelerator in software: a Python function that takes its messages and returns its responses.
 
     def mix(message0, message1):
         return {"x": message0["x"] + message1["x"], "y": 0.0, "z": 0.0}
 
-Here its file is only read, never run.
+This module only reads the file and never runs it.
 """
 
 from __future__ import annotations
@@ -25,23 +25,23 @@ _KEYWORDS = frozenset(word.lower() for word in keyword.kwlist)
 
 
 def function_name(type_: AcceleratorType) -> str:
-    """The function: named after the accelerator."""
+    """The function's name, which is that of the accelerator."""
     return identifier(type_.accelerator.name, avoid=_KEYWORDS, suffix="function")
 
 
 def parameter_names(type_: AcceleratorType) -> list[str]:
-    """What the function's parameters could be called: one an input, in their order."""
+    """Suggested names for the function's parameters, one for each input, in order."""
     count = len(type_.inputs)
     return ["message"] if count == 1 else [f"message{number}" for number in range(count)]
 
 
 def prototype(type_: AcceleratorType) -> str:
-    """The function as it must be declared."""
+    """The required declaration of the function."""
     return f"def {function_name(type_)}({', '.join(parameter_names(type_))})"
 
 
 def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> None:
-    """Note what keeps the file at `path`, the first of the sources, from holding the function; it may be missing."""
+    """Note faults of the function in the file at `path`, which is the first of the sources; the file may be missing."""
     accelerator = type_.accelerator
     if not type_.inputs:
         message = f"'{accelerator.name}' takes no message, so nothing would call its function"
@@ -68,30 +68,30 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
 
 
 def _shown(source: Text) -> str:
-    """A source as it is called from where the specification is."""
+    """The path of a source, relative to the specification."""
     return str(Path(source.source.file).parent / source) if source.source else str(source)
 
 
 @dataclass(frozen=True)
 class _File:
-    """The text of a source, and what it is called in messages."""
+    """The text of a source, with its name in messages."""
 
     name: str
     text: str
 
     def place(self, line: int, column: int) -> SourceRef:
-        """A place in it."""
+        """A place in the file."""
         lines = self.text.split("\n")
         return SourceRef(self.name, line, column, lines[line - 1] if line <= len(lines) else "")
 
 
 def _definition(module: ast.Module, name: str) -> ast.stmt | None:
-    """The last statement of a module that gives something a name: the one that holds."""
+    """The last statement of a module that binds a name, which determines its value."""
     return next((found for found in reversed([*_statements(module.body)]) if name in _bound(found)), None)
 
 
 def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
-    """All statements of a module's own scope, also those that hang on a condition."""
+    """All statements in a module's own scope, including conditional ones."""
     for statement in body:
         yield statement
         for block in ("body", "orelse", "finalbody"):
@@ -100,7 +100,7 @@ def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _bound(statement: ast.stmt) -> set[str]:
-    """The names that a statement gives to something that may be called."""
+    """The names that a statement binds to something that may be callable."""
     match statement:
         case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
             return {name}
@@ -114,7 +114,7 @@ def _bound(statement: ast.stmt) -> set[str]:
 
 
 def _takes(arguments: ast.arguments, count: int) -> bool:
-    """Whether a function can be called with so many values by their order."""
+    """Whether a function can be called with this number of positional arguments."""
     positional = len(arguments.posonlyargs) + len(arguments.args)
     fewest = positional - len(arguments.defaults)
     needs_keywords = None in arguments.kw_defaults

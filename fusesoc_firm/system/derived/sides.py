@@ -30,9 +30,9 @@ class SidePort:
 
 @dataclass(frozen=True)
 class Handshake:
-    """A pair of `valid` and `ready`; what it is about, `part`, is empty for the message itself.
+    """A pair of `valid` and `ready`; `part` is the part that it belongs to, empty for the message itself.
 
-    `segment_valid` of `segments` bits, if there is any, goes with it: it falls with `ready`.
+    If there is a `segment_valid`, it has `segments` bits and falls with `ready`.
     """
 
     part: str
@@ -43,10 +43,10 @@ class Handshake:
 
 
 def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> list[SidePort]:
-    """The ports of a message side; `gives` tells whether its block is where the message comes from.
+    """The ports of a message side; `gives` tells whether its block is the source of the message.
 
-    `has_valid`: whoever gets a message from a converter also learns by `msg_valid` that all of it came. In messages of
-    variable size everybody does.
+    With `has_valid`, the sink of a converter also learns from `msg_valid` that the message is complete. In messages of
+    variable size, every sink does.
     """
     ports = [
         SidePort(port.name, port.width, gives is not port.is_reverse, port.comment)
@@ -60,9 +60,9 @@ def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> lis
 
 
 def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]]:
-    """Every port of an accelerator's message sides with its prefix, in the order of the interface.
+    """All ports of an accelerator's message sides with their prefixes, in the order of the interface.
 
-    The length of what it gives is one only if the accelerator is where that comes from.
+    An output's length is a port only if the accelerator provides it.
     """
     taken = [
         (side.prefix, port)
@@ -79,7 +79,7 @@ def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]
 
 
 def handshakes(frame: Frame) -> Iterator[Handshake]:
-    """Every handshake of a message of variable size."""
+    """All handshakes of a message of variable size."""
     side = message_side(frame)
     yield Handshake("", "msg_valid", "msg_ready", "segment_valid", side.segments)
     for part in side.parts:

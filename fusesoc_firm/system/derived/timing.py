@@ -1,8 +1,8 @@
-"""What the scheduler must know of the publishers' times, in cycles of `clk`.
+"""The publishers' times that the scheduler needs, in cycles of `clk`.
 
-A time of the specification is a number of cycles, or one with a unit, which the project's `clock` makes cycles of.
-How long a frame takes to be sent (its WCET in the dissertation's section 6.3.2) follows from its size where that
-is known.
+A time in the specification is a number of cycles, or a number with a unit that the project's `clock` converts to
+cycles. The duration of sending a frame (its WCET in the dissertation's section 6.3.2) follows from the frame's size, if
+the size is known.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from fusesoc_firm.text.yaml_text import Text
 if TYPE_CHECKING:
     from fusesoc_firm.scheduling.analysis import Bound, Channel
 
-# Bytes of a frame before its payload: id and length.
+# The bytes of a frame before its payload: id and length.
 _HEADER_BYTES = 5
-# A scheduler's times are a few bits wider than the longest deadline, so that it can tell early from late (cores/sched).
+# A scheduler's times are some bits wider than the longest deadline, to distinguish early from late (cores/sched).
 _SPARE_TIME_BITS = 3
 _FEWEST_TIME_BITS, _MOST_TIME_BITS = 8, 31
 _LONGEST_TIME = 2 ** (_MOST_TIME_BITS - _SPARE_TIME_BITS) - 1
@@ -35,12 +35,12 @@ _LONGEST_TIME = 2 ** (_MOST_TIME_BITS - _SPARE_TIME_BITS) - 1
 _SECONDS = {"ns": Fraction(1, 10**9), "us": Fraction(1, 10**6), "ms": Fraction(1, 1000), "s": Fraction(1)}
 _HERTZ = {"Hz": 1, "kHz": 1000, "MHz": 10**6, "GHz": 10**9}
 _QUANTITY = re.compile(r"(\d{1,20}(?:\.\d{1,20})?)\s*([A-Za-z]*)", re.ASCII)
-# In Hz: slower is no clock, faster is no FPGA.
+# In Hz: the legal range of an FPGA's clock.
 _SLOWEST, _FASTEST = 1, 10**10
-# VHDL's largest integer, to which the scheduler counts.
+# VHDL's largest integer is the limit of the scheduler's counters.
 _LONGEST_RUN = 2**31 - 1
 
-# What to add to a publisher that lacks a time.
+# The hint for a publisher that lacks a time.
 _PERIOD = "add 'period: <cycles, a time, or a rate>', such as 'period: 100 Hz'"
 _WCET = "add 'wcet: <cycles or a time>', or 'buffer: <bytes of its longest payload>'"
 
@@ -54,7 +54,7 @@ def scheduling_of(
     publishers: Sequence[Converter],
     faults: Diagnostics,
 ) -> Scheduling:
-    """The scheduler of a system with these publishers, whose `blocks` say their times; what is wrong is noted.
+    """The scheduler of a system with these publishers; their `blocks` define the times, and faults are noted.
 
     `clock` is the frequency of clk in Hz, if it is given.
     """
@@ -69,7 +69,7 @@ def scheduling_of(
 
 
 def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
-    """The publishers' tasks, in the order of their ids. Raises `InputError` for every time that is not known."""
+    """The publishers' tasks, in the order of their ids; raises `InputError` for every unknown time."""
     faults = Diagnostics()
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
@@ -84,16 +84,16 @@ def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
 
 
 def channel_of(system: DerivedSystem) -> Channel:
-    """What the publishers share."""
+    """The channel that the publishers share."""
     from fusesoc_firm.scheduling.analysis import Channel
 
     return Channel(system.width // 8, system.scheduling.shortest_run)
 
 
 def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
-    """What is certain of each publisher under the system's scheduler, in the order of their ids.
+    """The bounds for each publisher under the system's scheduler, in the order of their ids.
 
-    Nothing, unless all their times are known.
+    The result is empty unless all times of all publishers are known.
     """
     tasks = _tasks(system.publishers, system.scheduling.times)
     if len(tasks) < len(system.publishers):
@@ -104,7 +104,7 @@ def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
 
 
 def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> tuple[Task, ...]:
-    """The tasks of those publishers of which all times are known."""
+    """The tasks of the publishers whose times are all known."""
     return tuple(
         Task(publisher.block, item.period, item.transfer_time, item.deadline or item.period)
         for publisher, item in zip(publishers, times, strict=True)
@@ -115,37 +115,37 @@ def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> 
 def _chosen(
     project: Project, publishers: Sequence[Converter], times: Sequence[PublisherTimes]
 ) -> tuple[str, tuple[str, ...]]:
-    """The smallest scheduler that holds all deadlines, as far as times are known, and why it is this one."""
-    # With NumPy it takes longer to load than most systems take to be generated.
+    """The smallest scheduler that meets all deadlines, as far as times are known, with the reasons."""
+    # Imported here, since loading NumPy takes longer than generating most systems.
     from fusesoc_firm.scheduling.analysis import Channel, Criterion, choose
 
     tasks = _tasks(publishers, times)
     if len(tasks) < len(publishers) or project.shortest_run < 1:
         return DEFAULT, ()
     channel = Channel(project.width // 8, project.shortest_run)
-    # Publishers have their priorities by their ids, which the host knows: these stay as they are.
+    # The priorities follow from the publishers' ids, which the host knows and which must not change.
     choice = choose(tasks, Criterion.LUTS, channel, is_ordered=True)
     return choice.best.policy, choice.reasons
 
 
 def frame_beats(payload_bytes: int, width: int) -> int:
-    """Beats of a frame on a stream of `width` bits."""
+    """The beats of a frame on a stream of `width` bits."""
     return -(-(_HEADER_BYTES + payload_bytes) * 8 // width)
 
 
 def _time_bits(times: Iterable[PublisherTimes]) -> int:
-    """Bits of the scheduler's time: all deadlines fit, and everybody's frame may still come in between."""
+    """The bits of the scheduler's time: enough for all deadlines with a frame of every other publisher in between."""
     reach = max((item.deadline or 0 for item in times), default=0) + sum(item.transfer_time or 0 for item in times)
     return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
 
 
 def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
-    """The clock's frequency in Hz; None if it is not given, or wrong, which is noted."""
+    """The clock's frequency in Hz; None if it is missing or if a fault was noted."""
     return None if project.clock is None else frequency("clock", project.clock, faults)
 
 
 def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
-    """A frequency in Hz, or None if what stands at `key` is none, which is noted."""
+    """A frequency in Hz; None if the value of `key` is not a frequency, which is noted."""
     found = _QUANTITY.fullmatch(text)
     hertz = Fraction(found[1]) * _HERTZ[found[2]] if found and found[2] in _HERTZ else Fraction(0)
     if not _SLOWEST <= hertz <= _FASTEST:
@@ -162,12 +162,12 @@ def _check_shortest_run(project: Project, faults: Diagnostics) -> None:
 
 
 def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[PublisherTimes], faults: Diagnostics) -> None:
-    """Note what a policy must know of a publisher and is not said."""
+    """Note the missing times of a publisher that a policy requires."""
     is_auto = policy == AUTO_SCHEDULER
     has_deadlines = not is_auto and POLICIES[policy].has_deadlines
     has_transfer_times = is_auto or POLICIES[policy].has_transfer_times
     for block, item in zip(blocks, times, strict=True):
-        # What cannot be read is noted already.
+        # Faults of unreadable blocks are noted already.
         if is_auto and item.period is None and block.period is None:
             faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
         if has_deadlines and item.deadline is None and block.period is None and block.deadline is None:
@@ -180,13 +180,13 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads times. The clock is in Hz, if it is given."""
+    """Reads times; `clock` is in Hz, if it is given."""
 
     clock: Fraction | None
     faults: Diagnostics
 
     def times(self, block: Block, publisher: Converter, width: int) -> PublisherTimes:
-        """A publisher's times; early ones are rounded down, late ones up, so that no deadline is missed by rounding."""
+        """A publisher's times; early ones are rounded down and late ones up, so rounding never hides a late frame."""
         period = self._cycles(block.period, "period", floor)
         transfer_time = self._cycles(block.wcet, "wcet", ceil)
         if block.wcet is None:
@@ -195,7 +195,7 @@ class _Reader:
         return PublisherTimes(period, transfer_time, deadline)
 
     def _cycles(self, time: Text | None, key: str, rounded: Rounding) -> int | None:
-        """A time in cycles, or None if there is none or it is wrong, which is noted."""
+        """A time in cycles; None if it is missing or if a fault was noted."""
         if time is None:
             return None
         found = _QUANTITY.fullmatch(time)
@@ -224,6 +224,6 @@ class _Reader:
 
 
 def _beats_at_most(publisher: Converter, width: int) -> int | None:
-    """Beats of a publisher's longest frame; None if it has no bound."""
+    """The beats of a publisher's longest frame; None if its size is unbounded."""
     longest = publisher.buffer or length_of(publisher.frame).maximum
     return None if longest is None else frame_beats(longest, width)

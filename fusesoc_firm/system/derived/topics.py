@@ -1,4 +1,4 @@
-"""What topics may be called, and which blocks of a system meet on one."""
+"""The legal names of topics, and the topics that several blocks of a system share."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.text.diagnostics import Diagnostics, SourceRef
 from fusesoc_firm.text.yaml_text import Text
 
-# What both ROS 1 and ROS 2 accept.
+# The names that both ROS 1 and ROS 2 accept.
 _WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
 _NAME = re.compile(rf"/?{_WORD}(?:/{_WORD})*")
 _LEGAL = "legal here: /arm/left, or arm/left, which is relative to the node's namespace; letters, digits and single '_'"
@@ -18,7 +18,7 @@ _LEGAL = "legal here: /arm/left, or arm/left, which is relative to the node's na
 
 @dataclass(frozen=True)
 class TopicUse:
-    """A topic of a system, which publishes on it or subscribes to it, and the place of that in the specification."""
+    """The use of a topic: its name and type, whether the system publishes or subscribes, and the place of the use."""
 
     topic: Topic
     is_published: bool
@@ -26,7 +26,7 @@ class TopicUse:
 
 
 def check_topic_name(name: Text, faults: Diagnostics) -> None:
-    """Note a name that ROS 1 or ROS 2 does not accept, and a private one."""
+    """Note a private name, and a name that ROS 1 or ROS 2 does not accept."""
     if name.startswith("~"):
         message = f"topic '{name}' depends on the node's name, which a node is only given when it is started"
         faults.error(message, name.source, _LEGAL)
@@ -35,9 +35,9 @@ def check_topic_name(name: Text, faults: Diagnostics) -> None:
 
 
 def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
-    """Note each topic of two types, and warn of each that the system both publishes on and subscribes to.
+    """Note each topic with two types, and warn of each topic that the system both publishes and subscribes to.
 
-    Topics of ROS 1 and of ROS 2 never meet. A relative name is compared as it is without a namespace.
+    Topics of ROS 1 and of ROS 2 are always distinct. Relative names are compared without a namespace.
     """
     met: dict[tuple[object, str], list[TopicUse]] = {}
     for use in uses:
@@ -56,7 +56,7 @@ def _check_type(name: str, first: TopicUse, other: TopicUse, faults: Diagnostics
 
 
 def _check_loop(name: str, uses: Iterable[TopicUse], faults: Diagnostics) -> None:
-    """Warn of a message that comes back."""
+    """Warn of a message that returns to the system."""
     uses = tuple(uses)
     taking = next((use for use in uses if not use.is_published), None)
     giving = next((use for use in uses if use.is_published), None)

@@ -1,8 +1,8 @@
 """Derived System -> template configuration: the top level and its test bench as plain dictionaries.
 
-The message side of a block is the same few ports everywhere: the fields, `segment_valid`, `msg_valid` and
-`msg_ready`. Every block has a signal for each of its ports, called `<block>_<port>` (`names`); `instances` connects
-blocks to them, and `wires` one with another.
+All blocks have the same few ports on their message sides: the fields, `segment_valid`, `msg_valid` and `msg_ready`.
+Every block has a signal `<block>_<port>` for each port (`names`); `instances` connects blocks to these signals, and
+`wires` connects signals with each other.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fusesoc_firm.system.hardware.scheduler import scheduler_configuration
 from fusesoc_firm.system.hardware.wires import connections
 from fusesoc_firm.text.render import Context
 
-# Of the simulated host's clock, in ps.
+# The period of the simulated host's clock, in ps.
 _HOST_PERIOD = 10_000
 
 SYSTEM_TEMPLATE = "vhdl/system.vhd"
@@ -57,17 +57,17 @@ def system_configuration(system: DerivedSystem) -> Context:
 
 
 def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
-    """The test bench that compares with files, or the one that does what a pipe says."""
+    """The test bench that compares with files, or the live one that is controlled through a pipe."""
     return f"{system.entity}_live" if is_live else f"{system.entity}_tb"
 
 
 def test_bench_configuration(
     system: DerivedSystem, seed: int, stall_percent: int, environment: str | None, *, is_live: bool
 ) -> Context:
-    """The configuration of the test bench: the simulated host beside the system, and at its pins the `environment`.
+    """The configuration of the test bench: the system with the simulated host, and the `environment` at its pins.
 
-    That is an entity with `clk`, `rst_n` and the pins, each in the other direction. If it `is_live`, the host is at the
-    end of a pipe, and joins no bursts.
+    The environment is an entity with `clk`, `rst_n` and the pins in the opposite directions. If `is_live` is set, the
+    host is at the other end of a pipe, and joins no bursts.
     """
     pins = pin_groups(Names(system), system)
     formals = [
@@ -102,7 +102,7 @@ def test_bench_configuration(
 
 
 def _clocks(system: DerivedSystem) -> list[Context]:
-    """Every further clock as a port of the top level."""
+    """All clocks other than clk, as ports of the top level."""
     return [
         {
             "port": clock.port,
@@ -114,7 +114,7 @@ def _clocks(system: DerivedSystem) -> list[Context]:
 
 
 def _resets(system: DerivedSystem) -> Context | None:
-    """The resets of further clocks: each domain sees it, one after the other, and clk's; then all let go."""
+    """The resets of the further clocks: the domains, clk's included, see the reset in turn, then all release it."""
     if not system.clocks:
         return None
     before = ""
@@ -133,7 +133,7 @@ def _reset(clock: str, release: str, reset: str) -> Context:
 
 
 def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
-    """What the pins of blocks are called at the top level, by block and name."""
+    """The top level's names for the pins of blocks, by block and name."""
     names = Names(system)
     return {
         (block.block, pin.name): names.port(block.block, pin.name)
@@ -143,7 +143,7 @@ def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
 
 
 def pin_groups(names: Names, system: DerivedSystem) -> list[Context]:
-    """The pins of each block that has some, as ports of the top level."""
+    """The pins of each block with pins, as ports of the top level."""
     return [
         {
             "block": block.block,

@@ -1,8 +1,8 @@
-"""Where the two ends of a connection differ, in their clocks or in the widths of their streams, and what stands there.
+"""The instances between the ends of a connection whose clocks or stream widths differ.
 
-A message and each of its elements is a scope: a handshake, fields that hold while it lasts, and streams and elements
-within. A handshake and its fields cross in a `firm_cdc_message`, a stream in a `firm_cdc_stream`. Where only widths
-differ, streams pass a `firm_axis_resize`, which holds nothing back, and all else is wired.
+A message and each of its elements is a scope: a handshake, fields that are stable during it, and nested streams and
+elements. A handshake and its fields cross in a `firm_cdc_message`, a stream in a `firm_cdc_stream`. If only the widths
+differ, streams pass through a `firm_axis_resize`, which causes no stall, and all other signals are wired.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from fusesoc_firm.frame.model import Data, Fixed, Frame, Loop, Node
 from fusesoc_firm.system.derived.model import Clock, Connection, DerivedSystem, End
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, Handshake
 
-# A field's port and its bits, None for a `std_logic`.
+# A field's port and its width in bits, None for a `std_logic`.
 Field = tuple[str, int | None]
 
 
 @dataclass(frozen=True)
 class Scope:
-    """A message, or an element of an array: its handshake, and the ports of its fields and streams.
+    """A message or an element of an array: its handshake, and the ports of its fields and streams.
 
-    `parent` is the handshake of what it lies within.
+    `parent` is the handshake of the enclosing scope.
     """
 
     handshake: Handshake
@@ -34,13 +34,13 @@ class Scope:
 
     @property
     def bits(self) -> int:
-        """Of all fields."""
+        """The width of all fields together."""
         return sum(width or 1 for _, width in self.fields)
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Two ends of a connection that differ; a clock is None where it is that of the system."""
+    """Two different ends of a connection; a clock is None if it is the system's clock."""
 
     source: End
     sink: End
@@ -57,23 +57,23 @@ class Crossing:
 
     @property
     def scopes(self) -> list[Scope]:
-        """The message, and behind it the elements of its arrays in wire order."""
+        """The message, followed by the elements of its arrays in wire order."""
         return _scopes(self.frame)
 
     @property
     def clocks(self) -> str:
-        """The ports of both clocks, as words; empty if they are the same."""
+        """The ports of both clocks, as words; empty if they are equal."""
         return f"{port_of(self.source_clock)} to {port_of(self.sink_clock)}" if self.is_clocked else ""
 
     @property
     def widths(self) -> str:
-        """The widths of the streams at both ends, as words; empty if they are the same or there is no stream."""
+        """The stream widths at both ends, as words; empty if they are equal or there is no stream."""
         has_streams = any(scope.streams for scope in self.scopes)
         is_resized = has_streams and self.source_width != self.sink_width
         return f"{self.source_width} to {self.sink_width} bits" if is_resized else ""
 
     def signals(self) -> Iterator[tuple[str, int | None]]:
-        """What is declared for it: the word of each signal and its bits."""
+        """The declared signals: the word and the width of each."""
         if not self.is_clocked:
             return
         if self.frame.is_fixed_size:
@@ -90,7 +90,7 @@ class Crossing:
             yield from ((word(f"{stream}_axis", "idle"), None) for stream in scope.streams)
 
     def instances(self) -> Iterator[str]:
-        """The word of each instance's label."""
+        """The word in each instance's label."""
         for scope in self.scopes:
             if self.is_clocked:
                 yield word(scope.handshake.part, "crossing")
@@ -99,12 +99,12 @@ class Crossing:
 
 
 def port_of(clock: Clock | None) -> str:
-    """The clock at the top level."""
+    """The top level's port for the clock."""
     return clock.port if clock else "clk"
 
 
 def word(part: str, name: str) -> str:
-    """What a signal or a label is called beside the two ends."""
+    """A part's name joined with the name of a signal or label."""
     return f"{part}_{name}" if part else name
 
 
@@ -115,12 +115,12 @@ def parts_of(scope: Scope, scopes: Sequence[Scope]) -> list[str]:
 
 
 def crossings(system: DerivedSystem, connection: Connection) -> list[Crossing | None]:
-    """For each sink of a connection what stands before it; None where both ends are alike."""
+    """The crossing before each sink of a connection; None if both ends are alike."""
     return [_crossing(system, connection, sink) for sink in connection.sinks]
 
 
 def all_crossings(system: DerivedSystem) -> list[Crossing]:
-    """Every crossing of a system, in the order of its connections."""
+    """All crossings of a system, in the order of its connections."""
     return [found for item in system.connections for found in crossings(system, item) if found]
 
 
@@ -129,7 +129,7 @@ def _crossing(system: DerivedSystem, connection: Connection, sink: End) -> Cross
     found = Crossing(
         connection.source,
         sink,
-        # The parts of a message of variable size are the same for all sinks.
+        # In a message of variable size, all sinks get the same parts.
         connection.frame,
         system.clock_of(source),
         system.clock_of(target),
@@ -149,12 +149,12 @@ def _scopes(frame: Frame) -> list[Scope]:
 
 
 def _collect(side: MessageSide, nodes: Sequence[Node], scope: Scope) -> Iterator[Scope]:
-    """Put fields and streams into their scope, and give the scopes within it."""
+    """Put fields and streams into their scope, and add the nested scopes."""
     for node in nodes:
         match node:
             case Fixed():
                 ports = (side.field(leaf) for leaf in node.fields if leaf.count and leaf.is_used)
-                # Padding may part the elements of a leaf.
+                # Padding may separate the elements of a leaf.
                 scope.fields.extend(
                     dict.fromkeys((p.name, p.width) for p in ports if (p.name, p.width) not in scope.fields)
                 )

@@ -25,7 +25,7 @@ SHIM_TEMPLATE = "hls/kernel.cpp"
 
 
 def wrapper_configuration(accelerator: AcceleratorType) -> Context:
-    """The configuration of the wrapper that gives the kernel the message sides of an accelerator."""
+    """The configuration of the wrapper, which gives the kernel the message sides of an accelerator."""
     inputs, outputs = arguments(accelerator)
     return {
         "entity": accelerator.entity,
@@ -49,13 +49,13 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Context:
 
 
 def _kernel_port(argument: Argument) -> Context:
-    """A port of the kernel, which has a vector for a single bit."""
+    """A port of the kernel; a single bit is a vector there."""
     is_bit = argument.field.width is None
     return {"port": argument.port, "signal": argument.signal, "bits": argument.bits, "is_bit": is_bit}
 
 
 def kernel_configuration(accelerator: AcceleratorType) -> Context:
-    """The configuration of the kernel that simulation calls the C++ function through, and of the shim between them."""
+    """The configuration of the simulated kernel, and of the shim between it and the C++ function."""
     inputs, outputs = arguments(accelerator)
     column = max(len(name) for name in [*AP_PORTS, *(f"{argument.port}_ap_vld" for argument in [*inputs, *outputs])])
     return {

@@ -1,4 +1,4 @@
-"""The top level's side of the host: streams as ports, or the link that they end at, as plain data."""
+"""The top level's host side as plain data: streams as ports, or the link that they end at."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
 
-# The pins of a link at the top level, as its core calls them. A board may leave open what has a default.
+# The pins of a link at the top level, with the names in its core; a board may leave pins with a default unconnected.
 LINK_PINS = {
     LinkKind.UART: (
         ("uart_rxd", "in", "std_logic"),
@@ -25,7 +25,7 @@ LINK_PINS = {
 
 
 def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """The streams as ports of the top level, or the link that they end at."""
+    """The streams as ports of the top level, or the link at which they end."""
     if system.link is None:
         return {"has_streams": True, "link": None}
     return {

@@ -1,4 +1,4 @@
-"""What the top level calls things: a signal for each port of each block, labels, and what stands between blocks."""
+"""The names in the top level: a signal for each port of each block, labels, and the instances between blocks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fusesoc_firm.system.derived.sides import (
 from fusesoc_firm.system.hardware.crossings import Crossing, all_crossings
 from fusesoc_firm.text.naming import distinct_identifiers
 
-# Names of the top level's own, and of its test bench: no block's signal or pin may be called so.
+# Names of the top level and its test bench, which no signal of a block and no pin may have.
 _TAKEN = """
     clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
     s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
@@ -36,14 +36,14 @@ _TAKEN = """
     std standard std_logic std_logic_vector
 """.split()
 AXIS = ("tdata", "tkeep", "tvalid", "tlast", "tready")
-# Low until every clock domain has been reset.
+# Low until all clock domains have been reset.
 RELEASED = "domains_rst_n"
 # Between a publisher and its buffer.
 FRAME_SIGNALS = tuple(f"frame_{word}" for word in (*AXIS, "error", "error_code"))
 
 
 class Names:
-    """The signal of each port of each block, those of what stands between blocks, and the labels."""
+    """The signals of all ports of all blocks, the signals of instances between blocks, and the labels."""
 
     def __init__(self, system: DerivedSystem) -> None:
         found = blocks(system)
@@ -66,7 +66,7 @@ class Names:
         entities |= {item.entity for item in system.accelerator_types}
         entities |= {length_entity(frame, suffix) for frame, suffix in system.computed_lengths.items()}
         reserved = {*_TAKEN, system.entity, *entities, *label_names, *clock_names(system)}
-        # What stands between blocks has keys of three parts, so no field of a message can have the same.
+        # Keys of instances between blocks have three parts, so they differ from the keys of all fields.
         ports = [(block, f"{prefix}{port.name}") for block, sides in found for prefix, port in sides]
         signals: list[tuple[str, ...]] = [
             _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
@@ -74,7 +74,7 @@ class Names:
         signals += [(block, "", word) for block in buffered for word in FRAME_SIGNALS]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
         signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
-        # Pins first: who connects them should find them under the names they ask for.
+        # Pins come first, so that they get the requested names.
         pins = [(block.block, pin.name) for block in system.accelerators for pin in block.type.accelerator.pins]
         keys: list[tuple[str, ...]] = [*pins, *ports, *signals]
         self._signals: Mapping[tuple[str, ...], str] = dict(
@@ -82,11 +82,11 @@ class Names:
         )
 
     def label(self, *words: str) -> str:
-        """The label of a block, or of what the further words call."""
+        """The label of a block, or of an instance that further words identify."""
         return self._labels["u", *words]
 
     def port(self, block: str, port: str) -> str:
-        """The signal of a block's port, or the top level's port that is a pin."""
+        """The signal of a block's port, or the top level's port for a pin."""
         return self._signals[block, port]
 
     def at(self, end: End, port: str) -> str:
@@ -94,11 +94,11 @@ class Names:
         return self._signals[end.block, f"{end.prefix}{port}"]
 
     def fork(self, end: End, fork: Handshake) -> str:
-        """The label of the fork behind an output."""
+        """The label of the fork after an output."""
         return self._labels["u", *_fork_key(end, fork, "fork")]
 
     def forked(self, end: End, fork: Handshake, word: str) -> str:
-        """The signal with the `valid`, `ready` or `segment_valid` of all that stand behind a fork."""
+        """The signal with the `valid`, `ready` or `segment_valid` of all sinks of a fork."""
         return self._signals[_fork_key(end, fork, f"fork_{word}")]
 
     def length(self, connection: Connection) -> str:
@@ -142,12 +142,12 @@ def forked(connection: Connection) -> Iterator[Handshake]:
 
 
 def is_found_out(connection: Connection) -> bool:
-    """Whether the length of a connection's payloads does not come from its source."""
+    """Whether the length of a connection's payloads comes from a separate instance instead of its source."""
     return connection.length is not None and connection.length.source is not LengthSource.GIVEN
 
 
 def clock_names(system: DerivedSystem) -> list[str]:
-    """What the top level has for further clocks: ports, resets, and the labels of what makes these."""
+    """The names for further clocks: ports, resets, and the labels of the instances that make the resets."""
     if not system.clocks:
         return []
     resets = [RELEASED, *(name for clock in system.clocks for name in (clock.reset, seen_reset(clock)))]
@@ -155,12 +155,12 @@ def clock_names(system: DerivedSystem) -> list[str]:
 
 
 def reset_label(reset: str) -> str:
-    """The label of what makes a reset."""
+    """The label of the instance that makes a reset."""
     return f"u_{reset.removesuffix('_n')}"
 
 
 def seen_reset(clock: Clock) -> str:
-    """Low until a clock domain, and those before it, have been reset."""
+    """The signal that is low until a clock domain, and all domains before it, have been reset."""
     return f"seen_{clock.name}_n"
 
 

@@ -1,6 +1,6 @@
 """Derived System -> template configuration of its test bench in Verilog, for simulators that read a netlist.
 
-Where something is at the system's pins, an entity holds both: so all VHDL becomes one netlist.
+If the system's pins are connected to an environment, an entity contains both, so that all VHDL becomes one netlist.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from fusesoc_firm.text.render import Context
 VERILOG_BENCH_TEMPLATE = "verilog/test_bench.v"
 ENVIRONMENT_TEMPLATE = "vhdl/in_environment.vhd"
 
-# Room for files of the user's own, beside the generated ones.
+# Space for the user's own files next to the generated ones.
 _LEAST_FRAMES = 65536
 
 
@@ -24,9 +24,9 @@ def translated_unit(system: DerivedSystem, *, has_environment: bool) -> str:
 def verilog_bench_configuration(
     bench: Context, system: DerivedSystem, frames: int = 0, beats: int = 0, *, has_environment: bool
 ) -> Context:
-    """The configuration of the test bench; that of the one in VHDL, `bench`, is part of it.
+    """The configuration of the test bench, which includes the configuration `bench` of the VHDL test bench.
 
-    It has room for `frames` in each file, and for `beats` that wait for the ends of their frames.
+    Each file has space for `frames`; `beats` limits the beats that wait for the ends of their frames.
     """
     return {
         **bench,
@@ -38,7 +38,7 @@ def verilog_bench_configuration(
 
 
 def _open_pins(system: DerivedSystem) -> list[Context]:
-    """The pins where nothing is at them: inputs are low."""
+    """The pins of a system without an environment; inputs are low."""
     names = top_level_pins(system)
     return [
         {"name": names[block.block, pin.name], "is_input": pin.direction == "in", "bits": pin.bits or 1}

@@ -1,6 +1,6 @@
 """The connections of the top level as assignments between signals, as in the dissertation's listing 6.9.
 
-Between the signals stands what lets several blocks take a message, and what finds out the length of a payload.
+Between the signals are instances that distribute a message to several blocks or determine the length of a payload.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _LONGEST = 'x"FFFFFFFF"'
 
 
 def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
-    """The assignments of every connection. A sink of several sources takes their parts of a message together."""
+    """The assignments of all connections; a sink with several sources takes all parts of its message together."""
     waiting: dict[End, list[str]] = {}
     for connection in system.connections:
         if connection.frame.is_fixed_size:
@@ -35,14 +35,14 @@ def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
 def _connection(
     names: Names, connection: Connection, system: DerivedSystem, waiting: Mapping[End, list[str]]
 ) -> dict[str, Any]:
-    """The assignments of a connection; with several sinks, forks let each take the message in its own time.
+    """The assignments of a connection; forks let each of several sinks take the message independently.
 
-    `waiting` are the valids of all sources of each sink; what they make together is assigned with the last one.
+    `waiting` has the `valid` signals of all sources of each sink; their conjunction is assigned with the last one.
     """
     length = connection.length
     pairs: list[tuple[str, str]] = []
     if _is(LengthSource.BUFFERED, length):
-        # As long as it gets.
+        # The buffer determines the actual length, so the publisher gets the greatest one.
         pairs.append((names.length(connection), _LONGEST))
     if connection.frame.is_fixed_size:
         pairs += _fixed_pairs(names, system, connection, waiting)
@@ -84,7 +84,7 @@ def _fixed_pairs(
 
 
 def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> list[tuple[str, str]]:
-    """Where each sink of a message of fixed size has its valid from, and its ready goes to."""
+    """The source of `valid` and the target of `ready` for each sink of a message of fixed size."""
     return [
         (names.crossing(crossing, "valid"), names.crossing(crossing, "ready")) if crossing else handshake
         for crossing, handshake in zip(crossings(system, connection), _handshakes(names, connection), strict=True)
@@ -92,7 +92,7 @@ def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> li
 
 
 def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
-    """What the source of a message of fixed size shows each sink as valid, and takes as ready."""
+    """The `valid` for each sink of a message of fixed size and the `ready` from it, as seen by the source."""
     source = connection.source
     for fork in forked(connection):
         valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
@@ -103,7 +103,7 @@ def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
 def _pairs(
     names: Names, connection: Connection, number: int, system: DerivedSystem, crossing: Crossing | None
 ) -> list[tuple[str, str]]:
-    """The same of one of variable size between the source and a sink, as far as no instance stands there."""
+    """The assignments of a message of variable size between its source and a sink, unless an instance connects them."""
     sink, source = connection.sinks[number], _source_side(names, connection, number, system)
     if crossing and crossing.is_clocked:
         return list(field_pairs(names, crossing, source))
@@ -117,7 +117,7 @@ def _pairs(
 
 
 def _source_side(names: Names, connection: Connection, number: int, system: DerivedSystem) -> SourceSide:
-    """What the source shows a sink; a handshake that is forked goes by its fork."""
+    """The source's signals for a sink; forked handshakes use the signals of the fork."""
     source = connection.source
     if connection.frame.is_fixed_size:
         valid, ready = _handshakes(names, connection)[number]
@@ -141,7 +141,7 @@ def _source_side(names: Names, connection: Connection, number: int, system: Deri
 
 
 def _length(names: Names, connection: Connection) -> dict[str, Any]:
-    """What computes the length of an accelerator's payloads."""
+    """The instance that computes the length of an accelerator's payloads."""
     source = connection.source
     inputs = ((formal, names.at(source, formal)) for formal in length_ports(connection.frame))
     return {

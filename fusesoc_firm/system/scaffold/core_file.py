@@ -1,7 +1,7 @@
-"""The `.core` file of a system: what FuseSoC is told about it, with all targets that a system can have.
+"""The `.core` file of a system, with all targets that the system supports.
 
-Its upper part is written once and is its author's from then on. The targets are written anew from one template, so
-that a target that is new there comes to every system; those of the author's own, by other names, stay.
+Its upper part is generated once; then it belongs to its author. The targets are regenerated from a template, so that
+every system gets new targets. Targets that the author added under other names are kept.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from fusesoc_firm.tools.simulators import Simulator, default_simulator, fitting
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
 
-# Families of FPGAs as Yosys calls them, and the options of its synth command: a target synth_<name> for each.
+# Yosys' names of FPGA families, with the options of the synth command: each gets a target synth_<name>.
 FAMILIES = [
     {"name": "xilinx", "description": "Xilinx UltraScale+", "options": "[-family, xcup, -flatten, -abc9]"},
     {"name": "ecp5", "description": "Lattice ECP5", "options": "[-abc9]"},
     {"name": "ice40", "description": "Lattice iCE40 UltraPlus", "options": "[-abc9, -device, u, -dsp]"},
     {"name": "gowin", "description": "Gowin", "options": "[]"},
 ]
-# The instances of the generator that targets ask for.
+# The instances of the generator that targets use.
 _SYSTEM, _SIMULATION = "system", "simulation"
-# The core with the generator `far`, and the one that had it before version 0.2.0.
+# The core with the generator `far`, and the core that had it before version 0.2.0.
 _SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
-# A target with the comment above it; blank lines part them.
+# A target with the comment above it; blank lines separate targets.
 _TARGET = re.compile(r"^(?:  #[^\n]*\n)*  (\S+):[^\n]*\n(?:(?: {3,}[^\n]*| *)\n)*", re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class CoreOptions:
-    """What a new `.core` is to say beside what the specification does; paths are relative to it."""
+    """The options of a new `.core` that the specification does not determine; paths are relative to the core."""
 
     name: str = ""
     description: str = ""
@@ -57,9 +57,9 @@ class CoreOptions:
 
 
 def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
-    """The text of the `.core` in `path` for the system of a specification: of one that is there, with new targets.
+    """The text of the `.core` at `path` for the system of a specification; an existing core gets updated targets.
 
-    The `paths` of `options` are told from the current folder. Raises `InputError`.
+    The `paths` of `options` are relative to the current folder. Raises `InputError`.
     """
     if path.exists():
         return updated_core(loaded.system, path)
@@ -73,7 +73,7 @@ def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
-    """The text of a `.core` that is not there yet, for the specification `spec` beside it. Raises `InputError`."""
+    """The text of a new `.core` for the specification `spec` next to it; raises `InputError`."""
     if fault := text_fault(options.description):
         fail(f"--description {fault[0]}", hint=fault[1])
     further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
@@ -94,7 +94,7 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
 
 
 def updated_core(system: DerivedSystem, path: Path) -> str:
-    """The text of the `.core` in `path` with the targets of today. Raises `InputError` if it is none of a system."""
+    """The text of the `.core` at `path` with current targets; raises `InputError` if it is not the core of a system."""
     core = read_core(path)
     if not isinstance(core.data.get("generate"), dict):
         fail(f"{path} is no core with a section 'generate'")
@@ -126,7 +126,7 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
                 for is_live in ((False, True) if is_simulated else ())
                 for target in _simulations(system, unit, is_live=is_live)
             ],
-            # Only an HLS tool makes them, so there is no netlist of the whole.
+            # Kernels come from an HLS tool only, so there is no netlist of the whole system.
             "has_kernels": has_kernels,
             "families": [] if has_kernels else FAMILIES,
             "boards": [target for name in boards() if (target := _board(system, name, has_kernels=has_kernels))],
@@ -135,9 +135,9 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
 
 
 def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator[dict[str, object]]:
-    """The targets of simulations, or of live ones: the first simulator has the plain name.
+    """The targets of simulations, or of live ones: the first simulator has the name without a suffix.
 
-    Those that read no VHDL translate the design unit `unit` with all below it.
+    Simulators that do not read VHDL translate the design unit `unit` with all its subunits.
     """
     has_verilog = any(item.is_component for item in system.accelerator_types)
     sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
@@ -147,7 +147,7 @@ def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator
     for name, item in known.items():
         is_first, is_default = item is next(iter(known.values())), name == default_simulator()
         parameters = ["product: live"] * is_live + [f"simulator: {name}"] * (not is_default)
-        # A system that the default one cannot simulate has the first target by both names.
+        # If the default simulator does not support a system, the first target gets both names.
         anchor = (kind if is_live else name) if is_first and not is_default else ""
         yield {
             "target": kind if is_first else f"{kind}_{name}",
@@ -180,7 +180,7 @@ def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
 
 
 def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
-    """A board's target; None if it takes no kernels and the system has some."""
+    """A board's target; None if the system has kernels and the board does not support them."""
     board = read_board(name)
     if has_kernels and board.flow != VIVADO:
         return None
@@ -188,7 +188,7 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
         "frontends": ["ghdlsynth"] if board.is_linked else None,
         "part": board.part,
         "board_part": board.board_part,
-        # A block design refers to modules by name only where Vivado manages the sources.
+        # A block design can refer to modules by name only if Vivado manages the sources.
         "source_mgmt_mode": "All" if board.flow == VIVADO else None,
         "yosys_synth_options": board.synth_options,
         "nextpnr_options": board.nextpnr_options,
@@ -200,7 +200,7 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
     return {
         "name": name,
         "description": f"{product} for the board {board.description}",
-        # Of Quartus, Edalize has no flow.
+        # Edalize has no flow for Quartus.
         "is_tool": board.flow == QUARTUS,
         "flow": str(board.flow),
         "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],
@@ -214,5 +214,5 @@ def _value(value: str | Sequence[str]) -> str:
 
 
 def _paths(items: Sequence[str | Path]) -> str:
-    """A list on one line; nothing if it is empty."""
+    """A list on one line; an empty list gives an empty text."""
     return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

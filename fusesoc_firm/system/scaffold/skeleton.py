@@ -1,4 +1,4 @@
-"""A first version of an accelerator that has no source yet: the ports that its messages imply, and zeros as answers."""
+"""A first version of an accelerator without a source: the ports for its messages, and zeros as responses."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _FUNCTION_TEMPLATE = "hls/skeleton.cpp"
 _SOFTWARE_TEMPLATE = "python/skeleton.py"
 
 
-# What the architecture or module declares; a pin may have such a name.
+# Names that the architecture or module declares; a pin may have such a name.
 _SIGNALS = ("is_there", "is_sent", "sent_r", "done")
 
 
 @dataclass(frozen=True)
 class _Language:
-    """How a language of hardware declares ports."""
+    """The syntax of port declarations in a hardware language."""
 
     template: str
     directions: tuple[str, str]
@@ -59,11 +59,11 @@ _LANGUAGES = {
 
 
 def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
-    """A text for the first source of each accelerator none of whose sources is in `folder`."""
+    """A text for the first source of each accelerator that has no source file in `folder`."""
     texts = {}
     for type_ in (*system.accelerator_types, *system.software.types):
         paths = [folder / source for source in type_.accelerator.sources]
-        # Software elsewhere has none.
+        # Software in another program has no sources.
         if paths and not any(path.exists() for path in paths):
             texts[paths[0]] = skeleton(type_)
     return texts
@@ -123,7 +123,7 @@ def _entity(type_: AcceleratorType, language: _Language) -> Context:
 def _declarations(
     type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin], language: _Language
 ) -> list[Context]:
-    """The ports of each side, and the pins, as the entity or module declares them."""
+    """The port declarations of all sides and pins for the entity or module."""
     groups = [
         (
             f"{side.frame.message}",
@@ -156,7 +156,7 @@ def _declarations(
 
 
 def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Context:
-    """What an output does: its handshake with the message, the length of a message of zeros, zeros for the rest."""
+    """The assignments of an output: its handshake, the length of a message of zeros, and zeros elsewhere."""
     counts = _counts(side, number)
     by_name = {f"{side.prefix}{port.name}": port for port in ports}
     length = f"{side.prefix}{PAYLOAD_LENGTH}"
@@ -185,7 +185,7 @@ def _length(port: str, side: MessageSide) -> Context:
 
 
 def _counts(side: MessageSide, number: int) -> list[Context]:
-    """The arrays of fixed size that output `number` sends; their elements are counted, as the last one is marked."""
+    """The arrays of fixed size in output `number`; their elements are counted to mark the last one."""
     if side.frame.is_fixed_size:
         return []
     ports = message_side(side.frame)
@@ -208,7 +208,7 @@ def _counts(side: MessageSide, number: int) -> list[Context]:
 
 
 def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
-    """The arrays of fixed size that a message of zeros has elements of: no other array is around them."""
+    """The arrays of fixed size in a message of zeros; arrays of variable size are empty and need no search."""
     for node in nodes:
         if isinstance(node, Loop) and node.is_used and node.count and has_bytes(node):
             yield node
@@ -216,7 +216,7 @@ def _fixed_loops(nodes: Iterable[Node]) -> Iterator[Loop]:
 
 
 def _discards(inputs: Sequence[MessageSide], of_side: dict[str, list[SidePort]]) -> list[str]:
-    """The streams and elements of inputs, which must be taken to their ends."""
+    """The streams and elements of inputs, which must be read to their ends."""
     return [
         f"{side.prefix}{port.name}"
         for side in inputs

@@ -1,7 +1,7 @@
-"""`firm system new`: a specification by questions, along the grammar.
+"""`firm system new`: builds a specification from the answers to questions that follow the grammar.
 
-Which keys there are, what they mean and which answers are legal all comes from `specification`. An existing file is
-extended and keeps its comments; in a new one each key is explained where it stands for the first time.
+All keys, their meanings and their legal values come from `specification`. An existing file is extended and keeps its
+comments. In a new file, each key is explained at its first use.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ from fusesoc_firm.text.prompts import Asker, Question
 from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 from fusesoc_firm.text.yaml_text import LONGEST_NUMBER, read_yaml
 
-# All messages that can be named, by the specification's `paths`.
+# All messages that the specification's `paths` provide.
 MessageNames = Callable[[Sequence[str]], Sequence[str]]
 
 _YES, _NO = "yes", "no"
 
 
 def extend_specification(path: Path, asker: Asker, message_names: MessageNames) -> None:
-    """Ask for a specification and write it, or for more of one that is there."""
+    """Ask for a new specification, or for extensions of an existing one, and write the file."""
     check_output(path)
     is_new = not path.exists()
     if not is_new:
-        read_yaml(path)  # reports what is no YAML, at its place
+        read_yaml(path)  # reports invalid YAML, with its place
     before = "" if is_new else path.read_text(encoding="utf-8")
     content = CommentedMap() if is_new else _style(before).load(before)
     _Wizard(asker, message_names, content, is_new, path.parent).run()
@@ -55,21 +55,21 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
 
 
 def _style(text: str) -> YAML:
-    """YAML that is written as `text` is: with its quotes, and lists that stand as far in; as ours without any."""
+    """A YAML writer in the style of `text`: its quotes and the indentation of its lists; new files have no quotes."""
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.brace_single_entry_mapping_in_flow_sequence = True
     yaml.width = 10**6
-    # The dash of a list's item, and what comes after it, from where its key begins.
+    # The dash of a list item with the text after it, starting at the column of the list's key.
     _, item, dash = load_yaml_guess_indent(text) if text else (None, None, None)
     yaml.indent(sequence=item or 4, offset=2 if dash is None else dash)
     return yaml
 
 
 def _word(answer: str) -> Any:
-    """An answer as a scalar; in quotes where YAML, or a list around it, would take it for another value."""
+    """An answer as a scalar, in quotes if YAML or a list around it would misread it."""
     if answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer:
-        # A number is as good a word, and reads better without quotes.
+        # A number also serves as a word, and reads better without quotes.
         return int(answer)
     try:
         is_plain = pyyaml.safe_load(f"[{answer}]") == [answer]
@@ -79,7 +79,7 @@ def _word(answer: str) -> Any:
 
 
 def _words(answers: Sequence[str]) -> Any:
-    """Answers on one line: a word, or a list in brackets."""
+    """One line of answers: a word, or a list in brackets."""
     if len(answers) < 2:
         return _word(answers[0]) if answers else []
     words = CommentedSeq(map(_word, answers))
@@ -89,7 +89,7 @@ def _words(answers: Sequence[str]) -> Any:
 
 @dataclass
 class _Wizard:
-    """The state of one run: the specification as far as it is known; in a new one, which keys have been explained."""
+    """The state of one run: the specification so far and, for a new one, the keys explained so far."""
 
     asker: Asker
     message_names: MessageNames
@@ -99,7 +99,7 @@ class _Wizard:
     explained: set[str] = field(default_factory=set)
 
     def run(self) -> None:
-        """All questions, in the order of the grammar."""
+        """Ask all questions, in the order of the grammar."""
         if self.is_new:
             self.asker.tell("project")
             self.content["project"] = self._section(Project)
@@ -111,7 +111,7 @@ class _Wizard:
             self._connect_blocks()
 
     def _ask_paths(self) -> None:
-        """Where the messages of a new specification are defined, which decides how messages are completed."""
+        """Ask for the folders and cores with a new specification's messages, which also provide the completions."""
         entry = _key(Specification, "paths")
         question = Question("paths", entry.meaning, check=self._fault_of_path)
         if found := self._texts(question):
@@ -123,7 +123,7 @@ class _Wizard:
         return None if is_there else f"'{answer}' is neither a folder, a bag nor a core"
 
     def _connect_blocks(self) -> None:
-        """Further connections from blocks that the file has."""
+        """Ask for further connections from the file's existing blocks."""
         blocks = {str(block["name"]): block for block in self.content.get("blocks", [])}
         question = Question("block", "one that gets further connections", [*blocks], is_choice=True)
         while name := self.asker.ask(question):
@@ -133,7 +133,7 @@ class _Wizard:
     # --- sections --------------------------------------------------------------------------------------------------
 
     def _sections(self, name: str, entry: Key, owner: str = "") -> list[CommentedMap]:
-        """As many sections as are wanted, at least one where there must be one."""
+        """Ask for as many sections as the user wants; a mandatory list gets at least one."""
         assert entry.section
         question = Question(f"add to '{name}'", entry.meaning, (_YES, _NO), is_choice=True, default=_NO)
         found: list[CommentedMap] = []
@@ -143,7 +143,7 @@ class _Wizard:
         return found
 
     def _section(self, section: type[Section], siblings: Sequence[CommentedMap] = ()) -> CommentedMap:
-        """One section, key by key."""
+        """Ask for one section, key by key."""
         draft = _Draft(section, siblings)
         for name, (field_name, entry) in keys_of(section).items():
             if draft.has(entry) and (value := self._value(draft, name, field_name, entry)):
@@ -152,13 +152,13 @@ class _Wizard:
         return draft.made
 
     def _explain(self, made: CommentedMap, name: str, entry: Key) -> None:
-        """Say what a key means where it stands for the first time; a section's name says enough."""
+        """Explain a key at its first use; a section's name needs no explanation."""
         if self.is_new and entry.section is None and name not in self.explained:
             self.explained.add(name)
             made.yaml_add_eol_comment(entry.meaning, name, column=0)
 
     def _value(self, draft: _Draft, name: str, field_name: str, entry: Key) -> Any:
-        """A key's value; empty if it is left out."""
+        """Ask for a key's value; empty if the key is left out."""
         if entry.form == "sections":
             return self._sections(name, entry, str(draft.made.get("name", "")))
         if entry.form == "section":
@@ -182,7 +182,7 @@ class _Wizard:
         return _word(answer) if answer else None
 
     def _texts(self, question: Question) -> Any:
-        """One answer after the other, until an empty one."""
+        """Ask for one answer after the other, up to an empty one."""
         found: list[str] = []
         further = Question(f"one more of {question.name}", question.meaning, question.words, check=question.check)
         while answer := self.asker.ask(further if found else question):
@@ -192,7 +192,7 @@ class _Wizard:
     # --- answers ---------------------------------------------------------------------------------------------------
 
     def _words(self, section: type[Section], name: str, entry: Key) -> Sequence[str]:
-        """What an answer can be completed to."""
+        """The completions of an answer."""
         if entry.choices:
             return [str(choice) for choice in entry.choices]
         if name == "message":
@@ -211,7 +211,7 @@ class _Wizard:
         return [str(item["name"]) for item in self.content.get(name, [])]
 
     def _fault(self, draft: _Draft, name: str, entry: Key, answer: str) -> str | None:
-        """What makes an answer wrong, beyond the grammar's choices."""
+        """The fault of an answer, beyond the choices in the grammar."""
         if answer and (fault := entry.rule(answer)):
             return f"'{name}' {fault[0]}; {fault[1]}"
         if entry.form == "integer" and not answer.isdecimal():
@@ -225,14 +225,14 @@ class _Wizard:
 
 @dataclass
 class _Draft:
-    """A section on its way, beside those of its list that are made."""
+    """An unfinished section, with the finished sections of its list."""
 
     section: type[Section]
     siblings: Sequence[CommentedMap]
     made: CommentedMap = field(default_factory=CommentedMap)
 
     def has(self, entry: Key) -> bool:
-        """Whether a key is asked for, after the answers so far: what a block is decides which ones it has."""
+        """Whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
         if self.section is not Block or not entry.only_of:
             return True
         if entry.only_of == PUBLISHER:
@@ -240,7 +240,7 @@ class _Draft:
         return ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, name: str, entry: Key) -> bool:
-        """Whether a key must be there: what makes a converter, the grammar leaves open to a block."""
+        """Whether a key is mandatory; the keys of a converter are optional in a block's grammar."""
         return entry.is_needed(self.made) or (self.section is Block and name in CONVERTER_KEYS)
 
 

@@ -25,7 +25,7 @@ _CROSSING = {"style": "dashed"}
 
 
 def diagram(system: DerivedSystem) -> str:
-    """The system in Graphviz's language DOT. Raises `InputError` if the package graphviz is missing."""
+    """The system in Graphviz's language DOT; raises `InputError` if the package graphviz is missing."""
     try:
         import graphviz
     except ModuleNotFoundError:
@@ -42,7 +42,7 @@ def diagram(system: DerivedSystem) -> str:
 
 
 def _draw_blocks(graph: Digraph, system: DerivedSystem) -> None:
-    """The Manager on both its ways, converters and accelerators."""
+    """Draw the Manager in both directions, the converters and the accelerators."""
     graph.node(f"{_MANAGER}_in", "Manager", shape="box")
     graph.node(f"{_MANAGER}_out", f"Manager\n{system.scheduling.policy}", shape="box")
     for converter in (*system.subscribers, *system.publishers):
@@ -58,7 +58,7 @@ def _accelerator(block: AcceleratorBlock) -> str:
 
 
 def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
-    """The host, and the streams between it, the Manager and the converters with their ids."""
+    """Draw the host, and the streams between it, the Manager and the converters with their ids."""
     graph.node(f"{_HOST}_out", "host", shape="oval")
     graph.node(f"{_HOST}_in", "host", shape="oval")
     graph.edge(f"{_HOST}_out", f"{_MANAGER}_in", **_STREAM)
@@ -70,11 +70,11 @@ def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
 
 
 def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
-    """The blocks on the host, and their messages: from and to the Manager, topics, and each other."""
+    """Draw the blocks on the host, and their messages from and to the Manager, topics, and each other."""
     blocks = {block.block for block in system.software.blocks}
     for block in system.software.blocks:
         graph.node(_node(block.block), _accelerator(block), **_SOFTWARE)
-    # Whatever else a message comes from or goes to is a topic.
+    # All other ends of messages are topics.
     starts = {item.block: f"{_MANAGER}_out" for item in system.publishers} | {name: _node(name) for name in blocks}
     ends = {item.block: f"{_MANAGER}_in" for item in system.subscribers} | {name: _node(name) for name in blocks}
     for connection in system.software.connections:
@@ -86,7 +86,7 @@ def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
 
 
 def _differences(system: DerivedSystem, block: AcceleratorBlock) -> str:
-    """In what a block is not as the system, a line each."""
+    """The differences between a block and its system, one on each line."""
     clock = system.clock_of(block.block)
     at_clock = f"\n{clock.port}: {float(clock.frequency / 10**6):g} MHz" if clock else ""
     return at_clock + (f"\n{block.type.width} bits" if block.type.width != system.width else "")
@@ -113,5 +113,5 @@ def _with(streams: Iterable[str]) -> str:
 
 
 def _node(block: str) -> str:
-    """A block's node: none of these is called like the host's or the Manager's, and no colon names a port of it."""
+    """The node name of a block, which differs from those of host and Manager and has no colon, DOT's mark of a port."""
     return f"block {quote(block, safe=' ')}"

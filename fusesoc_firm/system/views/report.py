@@ -1,4 +1,4 @@
-"""How much is written and how much is generated: the dissertation's table 6.2, for any system."""
+"""The amounts of written and generated code: the dissertation's table 6.2, for any system."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from fusesoc_firm.system.system_core import LoadedSystem, Part, artifacts
 
 @dataclass(frozen=True)
 class Report:
-    """Lines of code of a system: what its author wrote, and what is made of it.
+    """The lines of code of a system: those of its author, and the generated ones.
 
-    Empty lines and lines of comment do not count. `software` are those of functions that stand where hardware could,
-    `configuration` those of the templates' data, as YAML.
+    Empty lines and comment lines do not count. `software` counts functions in software that could be hardware, and
+    `configuration` counts the templates' data as YAML.
     """
 
     name: str
@@ -29,12 +29,12 @@ class Report:
 
     @property
     def generated(self) -> int:
-        """All that is made."""
+        """The number of all generated lines."""
         return self.configuration + self.wrappers + self.converters + self.components
 
     @property
     def ratio(self) -> float:
-        """Lines made for each line written."""
+        """The number of generated lines for each written line."""
         return self.generated / (self.written + self.software)
 
     def __str__(self) -> str:
@@ -54,7 +54,7 @@ class Report:
 
 
 def report(specification: Path, loaded: LoadedSystem) -> Report:
-    """Count the lines of a system and of its specification. Raises `InputError`."""
+    """Count the lines of a system and of its specification; raises `InputError`."""
     lines: Counter[Part] = Counter()
     configuration = 0
     for item in artifacts(loaded):

@@ -1,4 +1,4 @@
-"""The derived System as plain data: the content of the dissertation's listings 6.7 and 6.9."""
+"""The derived System as plain data, with the content of the dissertation's listings 6.7 and 6.9."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
-    """Converters, accelerators and every connection between two ports, as `block/port`."""
+    """Converters, accelerators and all connections between two ports, as `block/port`."""
     pins = top_level_pins(system)
     return {
         "System": {
@@ -74,7 +74,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
 
 
 def counts(system: DerivedSystem) -> str:
-    """How many blocks of each kind a system has, in words."""
+    """The number of blocks of each kind in a system, in words."""
     found = [
         (len(system.subscribers), "subscriber"),
         (len(system.accelerators), "accelerator"),
@@ -87,20 +87,20 @@ def counts(system: DerivedSystem) -> str:
 
 
 def _clocks(system: DerivedSystem) -> dict[str, Any]:
-    """The further clocks, each with its port and its frequency in Hz."""
+    """All clocks other than clk, with port and frequency in Hz."""
     clocks = [{"name": item.name, "port": item.port, "hertz": float(item.frequency)} for item in system.clocks]
     return {"clocks": clocks} if clocks else {}
 
 
 def _domain(system: DerivedSystem, block: AcceleratorBlock) -> dict[str, Any]:
-    """In what a block is not as the system: its clock, and the width of its streams."""
+    """The differences between a block and its system: its clock, and the width of its streams."""
     clock = system.clock_of(block.block)
     shown: dict[str, Any] = {"clock": clock.port} if clock else {}
     return shown | ({"width": block.type.width} if block.type.width != system.width else {})
 
 
 def _crossings(system: DerivedSystem) -> dict[str, Any]:
-    """Where the ends of a connection differ."""
+    """The differences between the ends of a connection."""
     found = []
     for item in all_crossings(system):
         ends = {"from": _side(item.source), "to": _side(item.sink)}
@@ -113,7 +113,7 @@ def _side(end: End) -> str:
 
 
 def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict[str, Any]:
-    """The pins of a block, with the ports of the top level that they are."""
+    """The pins of a block, with the corresponding ports of the top level."""
     pins = [
         {
             "name": str(pin.name),
@@ -127,7 +127,7 @@ def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict
 
 
 def _software(system: DerivedSystem) -> dict[str, Any]:
-    """The blocks in software, and the ways of their messages on the host."""
+    """The blocks in software, with the ways of their messages on the host."""
     blocks = [
         {
             "name": block.block,
@@ -147,13 +147,13 @@ def _function(block: AcceleratorBlock) -> dict[str, Any]:
 
 
 def _taken(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
-    """A message that software takes: where it is from."""
+    """A message that software takes, with its source."""
     sources = [item.source for item in system.software.connections if end in item.sinks]
     return {**_message(end, side, system), "from": [_place(source, system.publishers, system) for source in sources]}
 
 
 def _given(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
-    """A message that software gives: where it goes."""
+    """A message that software gives, with its sinks."""
     sinks = [sink for item in system.software.connections if item.source == end for sink in item.sinks]
     return {**_message(end, side, system), "to": [_place(sink, system.subscribers, system) for sink in sinks]}
 
@@ -163,7 +163,7 @@ def _message(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, An
 
 
 def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> dict[str, Any]:
-    """What a message of software comes from or goes to: another block, a converter of the hardware, or a topic."""
+    """The other end of a message of software: another block, a converter of the hardware, or a topic."""
     if end.prefix:
         return {"block": end.block, "message": system.names[end]}
     crossing = [item for item in converters if item.block == end.block]
@@ -190,7 +190,7 @@ def _payload_bytes(frame: Frame) -> int | str:
 
 
 def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any]:
-    """How a publisher learns the length of its payloads and why so, and what it stores of them."""
+    """The way in which a publisher learns the length of its payloads, with the reason, and the size of its buffer."""
     if length is None:
         return {}
     buffer = {"buffer": publisher.buffer} if publisher.buffer else {}
@@ -205,13 +205,13 @@ def _scheduling(scheduling: Scheduling) -> dict[str, Any]:
 
 
 def _times(times: PublisherTimes) -> dict[str, int]:
-    """A publisher's times in cycles, as far as they are known."""
+    """The known times of a publisher, in cycles."""
     found = {"periodCycles": times.period, "wcetCycles": times.transfer_time, "deadlineCycles": times.deadline}
     return {name: cycles for name, cycles in found.items() if cycles is not None}
 
 
 def _bound(bound: Bound | None) -> dict[str, int | str]:
-    """What is certain of a publisher's frames, and what its accelerator may have to keep while one is late."""
+    """The bounds on a publisher's frames, and the bytes that its accelerator may have to store if a frame is late."""
     if bound is None:
         return {}
     if bound.response is None or bound.lateness is None or bound.buffer is None:

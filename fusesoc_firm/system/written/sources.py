@@ -1,4 +1,4 @@
-"""What the sources of an accelerator tell about it."""
+"""Properties of an accelerator that are read from its sources."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from fusesoc_firm.text.naming import identifier
 
 @dataclass(frozen=True)
 class _Language:
-    """How a language writes a comment, the parameters of a unit, and one called WIDTH among these.
+    """The syntax of comments, of a unit's parameters, and of a parameter named WIDTH in a language.
 
-    `parameters` has the unit's name to be filled in, and a group of what stands between name and ports.
+    `parameters` has a placeholder for the unit's name, and a group for the text between name and ports.
     """
 
     comment: re.Pattern[str]
@@ -26,14 +26,14 @@ class _Language:
 
 
 _LANGUAGES = {
-    # Between `generic (` and `port (`; VHDL knows no case.
+    # Between `generic (` and `port (`; VHDL ignores case.
     "VHDL": _Language(
         re.compile(r"--.*"),
         r"\bentity\s+{unit}\s+is\s+generic\s*\((.*?)\)\s*;\s*(?:port\b|end\b)",
         re.compile(r"(?:^|[;,])\s*(?:constant\s+)?width\s*[:,]", re.IGNORECASE),
         re.IGNORECASE | re.DOTALL,
     ),
-    # In the header, or within the module as before Verilog-2001.
+    # In the header, or within the module as in Verilog before 2001.
     "Verilog": _Language(
         re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL),
         r"\bmodule\s+{unit}\b(.*?)\bendmodule\b",
@@ -44,9 +44,9 @@ _LANGUAGES = {
 
 
 def declares_width(accelerator: Accelerator, sources: Iterable[Path]) -> bool:
-    """Whether the accelerator is an entity with a generic WIDTH, or a module with a parameter: the streams' bits.
+    """Whether the accelerator is an entity with a generic WIDTH, or a module with a parameter WIDTH.
 
-    A source that cannot be read is the analysis' concern, not this one's.
+    WIDTH is the width of the streams in bits. Analysis, not this module, reports unreadable sources.
     """
     if (language := _LANGUAGES.get(accelerator.type)) is None:
         return False

@@ -1,7 +1,7 @@
 """The system specification as its author wrote it: the grammar of the dissertation's listing 6.6.
 
-This is the one source of the grammar. A section is a class, a key a field; spelling, form, legal values and meaning
-stand at the field. What the sections say together (names that must be known, connections) is for `analysis`.
+This module is the single source of the grammar. A section is a class and a key is a field, which defines the key's
+spelling, form, legal values and meaning. Rules across sections (known names, connections) are part of `analysis`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 
 # The type of an accelerator that is a function on the host.
 SOFTWARE = "ROS-SW"
-# The types of accelerators, each with the endings of its sources' names.
+# The types of accelerators, with the suffixes of their source files.
 SOURCE_SUFFIXES = {
     "HLS": (".cpp", ".cc", ".cxx", ".c", ".hpp", ".h"),
     "VHDL": (".vhd", ".vhdl"),
@@ -31,26 +31,26 @@ SOURCE_SUFFIXES = {
 }
 ACCELERATOR_TYPES = tuple(SOURCE_SUFFIXES)
 SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
-# A block that is no accelerator, and one that is.
+# The two kinds of blocks.
 CONVERTER, ACCELERATOR = "converter", "accelerator"
-# What makes a block a converter.
+# The keys that make a block a converter.
 CONVERTER_KEYS = ("middleware", "mode", "message")
-# The smallest of the schedulers that holds all deadlines.
+# The word for the smallest scheduler that meets all deadlines.
 AUTO_SCHEDULER = "auto"
-# How frames get between the host and the system: the top level's own streams, or a link of bytes (cores/board).
+# The ways of frames between the host and the system: the top level's own streams, or a byte link (cores/board).
 AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
 DIRECTIONS = ("in", "out")
-# `vendor:library:name`, maybe with a version.
+# `vendor:library:name`, with an optional version.
 _CORE = re.compile(r"[^:/]*:[^:/]*:[^:/]+(:[^:/]+)?")
 
-# Tools read the names of sources in makefiles, scripts and command lines, where most of them quote nothing.
+# Tools write the names of sources into makefiles, scripts and command lines, mostly without quotes.
 _SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}")
 
 
 def source_fault(text: str) -> tuple[str, str] | None:
-    """What keeps `text` from being a source file's name; None if nothing does."""
+    """The reason why `text` is not a legal name of a source file; None if it is."""
     if fault := text_fault(text, LONGEST_PATH):
         return fault
     legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
@@ -68,7 +68,7 @@ _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
 @dataclass(frozen=True)
 class ClockDomain(Section):
-    """A clock beside that of the system."""
+    """A clock other than the system's."""
 
     name: Text = key("the clock's name; its port at the top level is clk_<name>", is_required=True)
     frequency: Text = key("its frequency, such as 150 MHz", is_required=True)
@@ -76,10 +76,10 @@ class ClockDomain(Section):
 
 @dataclass(frozen=True)
 class Project(Section):
-    """What holds for the whole system."""
+    """Settings of the whole system."""
 
     name: Text = key("the system's name; the top level is <name>_system", is_required=True)
-    # The dissertation's listings 6.1, 6.6 and 5.1 spell it in three ways.
+    # The dissertation's listings 6.1, 6.6 and 5.1 use three spellings.
     fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
     width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
     scheduler: Text = key(
@@ -129,7 +129,7 @@ class Interface(Section):
 
 @dataclass(frozen=True)
 class Pin(Section):
-    """A port of an accelerator that is none of a message: it leads out of the system."""
+    """A port of an accelerator that belongs to no message; the top level exports it."""
 
     name: Text = key("the port's name; at the top level it is <block>_<name>", is_required=True)
     direction: Text = key("direction of the port at the accelerator", is_required=True, choices=DIRECTIONS)
@@ -161,7 +161,7 @@ class Accelerator(Section):
 
 @dataclass(frozen=True)
 class Outgoing(Section):
-    """A connection from the block it stands in."""
+    """A connection from the block that contains it."""
 
     name: Text = key("the block that receives the message", is_required=True)
     include: tuple[Text, ...] = key(**_INCLUDE)
@@ -215,17 +215,17 @@ class Specification(Section):
     )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
-    # The file stops being YAML somewhere, so there may be more of everything.
+    # The file is invalid YAML from some place on, so any section may have more items.
     is_cut: bool = False
 
     @property
     def message_cores(self) -> dict[str, SourceRef | None]:
-        """The cores among `paths`, each with its place."""
+        """The cores among `paths`, with their places."""
         return {str(item): item.source for item in self.paths if is_core(item)}
 
     @property
     def middlewares(self) -> set[str]:
-        """The middlewares that it names, by its words."""
+        """The middlewares of the specification, by their words in it."""
         sides = [side for item in self.accelerators for side in (*item.interface.input, *item.interface.output)]
         words = [*(block.middleware for block in self.blocks), *(side.middleware for side in sides)]
         return {str(word) for word in words if word}
@@ -237,9 +237,9 @@ def is_core(path: str) -> bool:
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
-    """The specification in a file, called `file` in messages, with all that is wrong in it noted.
+    """The specification in a file, which messages call `file`, with all its faults noted.
 
-    Raises `InputError` if the file cannot be read, is empty, or is no YAML from the start.
+    Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
     text = read_yaml(path, file, faults)
     if text.root is None or is_null(text.root):

@@ -2,7 +2,7 @@
 -- sensor_msgs/PointCloud2 (ROS 1).
 --
 -- A constant has the bits that a field has at a converter's port; the comment gives its type, name and value in ROS.
--- Behind a message's name stand those of a message within.
+-- A message's name precedes the constants of a nested message.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
 library ieee;
@@ -10,7 +10,7 @@ use ieee.std_logic_1164.all;
 
 package sensor_msgs_pointcloud2_pkg is
 
-  -- By this, two ends of a topic tell that they mean the same message.
+  -- The signature, by which the two ends of a topic check that they use the same message.
   constant SIGNATURE : string(1 to 32) := "1158d486dd51d683ce2f1be655c3c181";
 
   constant POINTFIELD_INT8    : std_logic_vector(7 downto 0) := x"01"; -- uint8 sensor_msgs/PointField.INT8=1

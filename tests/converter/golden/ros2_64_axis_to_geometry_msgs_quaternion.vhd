@@ -1,8 +1,8 @@
 -- axis_to_geometry_msgs_quaternion: a frame of geometry_msgs/Quaternion (ROS 2) to its fields.
 --
--- s_axis carries the frame behind its id: length (4 bytes), payload (36 bytes). msg_valid rises
--- behind the last beat and stays, with the fields, until msg_ready.
--- A broken frame gives one cycle of frame_error instead, and the next frame is received as usual.
+-- s_axis carries the frame without its id: length (4 bytes), payload (36 bytes). msg_valid rises
+-- after the last beat and stays high, with the fields stable, until msg_ready.
+-- A broken frame causes one cycle of frame_error instead; then the subscriber receives the next frame.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
 library ieee;
@@ -13,7 +13,7 @@ entity axis_to_geometry_msgs_quaternion is
   port (
     clk              : in  std_logic;
     rst_n            : in  std_logic;
-    -- the frame: the lowest lane of its first beat held the id and is void
+    -- the frame; the lowest lane of its first beat held the id and is void
     s_axis_tdata     : in  std_logic_vector(63 downto 0);
     s_axis_tkeep     : in  std_logic_vector(7 downto 0);
     s_axis_tvalid    : in  std_logic;
@@ -28,8 +28,8 @@ entity axis_to_geometry_msgs_quaternion is
     segment_valid    : out std_logic_vector(0 downto 0);
     msg_valid        : out std_logic;
     msg_ready        : in  std_logic;
-    -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it went on behind its length,
-    -- 4 its encoding is unknown; the code counts while frame_error is high
+    -- a broken frame: 1 its length is not that of the message, 2 it ended early, 3 it continued after its length,
+    -- 4 its encoding is unknown; the code is valid while frame_error is high
     frame_error      : out std_logic;
     frame_error_code : out std_logic_vector(3 downto 0)
   );
@@ -45,11 +45,11 @@ architecture rtl of axis_to_geometry_msgs_quaternion is
   constant BAD_ENCODING : code_t := "100";
   constant NO_LENGTH    : std_logic_vector(3 downto 0) := (others => '0');
 
-  -- The beat on s_axis, counted from the length's. From BROKEN on it is no beat, but tells what became of the frame:
-  -- BROKEN + code    it has a fault, and is skipped up to its end
-  -- ENDED + code     it has ended, and its fault is told
-  -- COMPLETE         its message waits to be taken; a frame that ended early is not skipped, so that code is free
-  -- Two bits hold a code.
+  -- The beat on s_axis, counted from the length's first beat. Values from BROKEN on are states after the last beat:
+  -- BROKEN + code    the frame has a fault, and is skipped up to its end
+  -- ENDED + code     the frame has ended, and its fault is reported
+  -- COMPLETE         the message waits to be accepted; a frame that ended early is not skipped, so this code is free
+  -- A code has two bits.
   subtype position_t is unsigned(3 downto 0);
   constant BROKEN       : position_t := "1000";
   constant ENDED        : position_t := "1100";
@@ -61,13 +61,13 @@ architecture rtl of axis_to_geometry_msgs_quaternion is
   signal is_waiting     : std_logic;
   signal is_told        : std_logic;
 
-  -- Which length the bytes so far can be: bit k that of the payload's 36 bytes and k more behind them.
+  -- The possible lengths so far: bit k stands for k bytes more than the payload's 36 bytes.
   signal match_r        : std_logic_vector(3 downto 0) := (others => '0');
   signal match          : std_logic_vector(3 downto 0);
   signal fault          : code_t;
   signal ready          : std_logic;
   signal beat           : std_logic;
-  -- The bytes of the fields; those of a new beat push the others down.
+  -- The bytes of the fields; the bytes of a new beat shift the older ones down.
   signal store_0    : std_logic;
   signal fields_0_r : std_logic_vector(31 downto 0);
   signal store_1    : std_logic;
@@ -80,7 +80,7 @@ begin
   is_told    <= beyond and position_r(2);
   is_first   <= '1' when position_r = 0 or is_waiting = '1' else '0';
 
-  -- The next frame starts in the cycle in which the message is taken, but not in the one in which a fault is told.
+  -- The next frame starts in the cycle in which the message is accepted, but not in the one that reports a fault.
   ready         <= not is_told and (msg_ready or not is_waiting);
   beat          <= s_axis_tvalid and ready;
   s_axis_tready <= ready;
@@ -91,7 +91,7 @@ begin
   store_1 <= '1' when
       (position_r >= 1 and position_r <= 4) else '0';
 
-  -- Each field as it lies among the bytes that were stored.
+  -- Each field from its bytes in the stores.
   x(55 downto 0)  <= fields_1_r(55 downto 0);
   x(63 downto 56) <= fields_0_r(7 downto 0);
   y(55 downto 0)  <= fields_1_r(111 downto 56);
@@ -190,7 +190,7 @@ begin
   follow : process (position_r, beyond, is_first, s_axis_tlast, fault)
   begin
     if beyond = '1' and is_first = '0' then
-      -- The first fault of a frame is the one that is told.
+      -- The first fault of a frame is the one reported.
       next_position <= position_r;
       if s_axis_tlast = '1' then
         next_position <= position_r or ENDED;

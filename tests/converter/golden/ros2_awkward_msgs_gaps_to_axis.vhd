@@ -1,7 +1,7 @@
 -- awkward_msgs_gaps_to_axis: the fields of awkward_msgs/Gaps (ROS 2) to a frame.
 --
--- The frame is id (1 byte), length (4 bytes), payload (92 bytes). segment_valid says that the fields hold;
--- they must do so until msg_ready, which comes with the frame's last beat. Nothing is stored but the position.
+-- The frame is id (1 byte), length (4 bytes), payload (92 bytes). segment_valid signals valid fields, which
+-- must be stable until msg_ready in the cycle of the frame's last beat. The publisher stores only its position.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
 library ieee;
@@ -11,7 +11,7 @@ library firm;
 
 entity awkward_msgs_gaps_to_axis is
   generic (
-    -- the id that the host knows this publisher by: 0 to 255
+    -- the publisher's id at the host: 0 to 255
     ID : natural := 0
   );
   port (
@@ -43,7 +43,7 @@ architecture rtl of awkward_msgs_gaps_to_axis is
   constant FIRST_POSITION : natural := 3;
   constant LAST_POSITION  : natural := 99;
 
-  -- The whole frame, its first byte lowest; the first beat is number FIRST_POSITION.
+  -- The whole frame, with its first byte lowest; the first beat has the number FIRST_POSITION.
   signal frame         : std_logic_vector(799 downto 0);
   -- The beat on m_axis.
   signal position_r    : unsigned(6 downto 0) := to_unsigned(FIRST_POSITION, 7);

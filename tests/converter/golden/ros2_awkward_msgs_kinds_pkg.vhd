@@ -2,9 +2,9 @@
 -- awkward_msgs/Kinds (ROS 2).
 --
 -- A constant has the bits that a field has at a converter's port; the comment gives its type, name and value in ROS.
--- Behind a message's name stand those of a message within.
+-- A message's name precedes the constants of a nested message.
 --
--- A text is a string of UTF-8, a character a byte; its length and bytes, the first lowest, are those of a field.
+-- A text is a string of UTF-8, one byte in each character; its length and bytes, the first lowest, are as in a field.
 --
 -- Generated from the message's definition by robot:firm; changes belong there.
 library ieee;
@@ -12,7 +12,7 @@ use ieee.std_logic_1164.all;
 
 package awkward_msgs_kinds_pkg is
 
-  -- By this, two ends of a topic tell that they mean the same message.
+  -- The signature, by which the two ends of a topic check that they use the same message.
   constant SIGNATURE : string(1 to 71) := "RIHS01_9587b6f6d66b3faab2d996fe09f5325375bf6929b77180471678b5471d4946e0";
 
   constant IN_VALUE  : std_logic_vector(7 downto 0)  := x"01";               -- uint8 IN=1

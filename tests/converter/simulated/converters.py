@@ -255,7 +255,7 @@ class Pair:
 
 
 def troubled_frames(pair: Pair, count: int, source: random.Random) -> list[Sent]:
-    """Good and broken frames by turns of chance; `Pair.is_good` tells which is which."""
+    """Good and broken frames at random; `Pair.is_good` distinguishes them."""
     return [_troubled_frame(pair, source) for _ in range(count)]
 
 
@@ -265,12 +265,12 @@ def _troubled_frame(pair: Pair, source: random.Random) -> Sent:
     match source.randrange(12):
         case 0:  # ends early
             return Sent(bytes(body[: source.randrange(len(body))]))
-        case 1:  # goes on behind its length
+        case 1:  # continues after its length
             return Sent(bytes(body) + source.randbytes(source.choice((1, 2, 3, 4, 5, 300))))
-        case 2:  # a length that lies, close by or far off
+        case 2:  # a wrong length, close to the right one or not
             lie = max(0, len(payload) + source.choice((-256, -4, -3, -2, -1, 1, 2, 3, 4, 256, 2**24)))
             return Sent(lie.to_bytes(LENGTH_BYTES, "little") + payload)
-        case 3:  # a bit of the length turned
+        case 3:  # a flipped bit of the length
             body[source.randrange(LENGTH_BYTES)] ^= 1 << source.randrange(8)
             return Sent(bytes(body))
         case 4:  # a true length, but not this message's

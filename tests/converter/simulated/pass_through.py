@@ -1,6 +1,6 @@
-"""Systems in which every message goes from its subscriber straight to its publisher, and bags for them.
+"""Systems in which every message goes from its subscriber directly to its publisher, and bags for them.
 
-What is in the bags rosbags has serialised, and what comes back is compared byte by byte: no code of ours judges it.
+rosbags serialises the bags' messages, and the responses are compared with them byte by byte, independently of our code.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from tests.replay.replays import Item, read, write
 _STORES = {"noetic": Stores.ROS1_NOETIC, "humble": Stores.ROS2_HUMBLE}
 # A subscriber and a publisher do without a pause.
 QUIET = 50
-# GHDL takes its time for all converters in every cycle, so that several systems are sooner done than one.
+# GHDL evaluates all converters in every cycle, so several small systems finish sooner than a single large one.
 _MESSAGES_A_SYSTEM = 18
 
 
@@ -55,7 +55,7 @@ class PassThrough:
         return path
 
     def items(self) -> list[Item]:
-        """The messages of the bag, by turns."""
+        """The messages of the bag, in turn."""
         payloads = self._payloads()
         turns = [(name, payloads[name][number]) for number in range(self.count) for name in self.names]
         return [

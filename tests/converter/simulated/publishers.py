@@ -67,7 +67,7 @@ class PublisherBench:
         return self.publishers[key]
 
     def of_frame(self, ros: Middleware, name: str, frame: Frame, width: int, suffix: str = "") -> Publisher:
-        """The publisher of a message of which not all may be used."""
+        """The publisher of a message with any selection of fields."""
         library = Library(f"ros{ros.number}_{width}{suffix}", self.directory)
         publisher = Publisher(library, self.oracles[ros], name, frame, width)
         publisher.analyse()
@@ -84,10 +84,10 @@ class Beat:
 
 @dataclass(frozen=True)
 class Message:
-    """What is given to a publisher for one frame, and what must come of it.
+    """The inputs of a publisher for one frame, with the expected output.
 
     `beats` and `elements` are, for each part by its number, the bytes of each stream and (last, bits) of each element.
-    A frame is `payload` from its first byte up to the place `exact`, and there may turn to zeros.
+    The frame equals `payload` up to the place `exact`, and may turn to zeros from there on.
     """
 
     bits: str
@@ -318,13 +318,13 @@ class Publisher:
     def with_short_stream(
         self, value: Mapping[str, Any], message: Message, part: int, place: int, source: random.Random
     ) -> Message:
-        """A stream ends early: its rest are zeros."""
+        """A stream that ends early; zeros replace its rest."""
         data = b"".join(beat.data for beat in message.streams[part][place])
         size = source.randrange(len(data))
         zeroed = copy.deepcopy(value)
         self._zero(self.frame.nodes, zeroed, 0, self.streams[part].part, [place], size)
         found = list(message.streams[part])
-        # What holds no byte is still closed.
+        # A part without bytes still has an end.
         found[place] = self.beats(data[:size]) or [Beat(b"", True)]
         return replace(message, streams={**message.streams, part: found}, payload=self._payload(zeroed), error=SHORT)
 
@@ -347,14 +347,14 @@ class Publisher:
                 value[name] = _zeroed(part, value[name], left, size)
 
     def with_long_stream(self, message: Message, part: int, place: int, source: random.Random) -> Message:
-        """A stream goes on behind its length: that is dropped."""
+        """A stream that continues after its length; the excess is dropped."""
         data = b"".join(beat.data for beat in message.streams[part][place])
         found = list(message.streams[part])
         found[place] = self.beats(data + source.randbytes(source.choice((1, 2, 9, 70, 200))))
         return replace(message, streams={**message.streams, part: found}, error=LONG)
 
     def without_last(self, message: Message, part: int, source: random.Random) -> Message:
-        """The last element of an array does not say so."""
+        """The last element of an array lacks its `last`."""
         elements = list(message.elements[part])
         place = source.choice([place for place, (is_last, _) in enumerate(elements) if is_last])
         elements[place] = False, elements[place][1]
@@ -400,7 +400,7 @@ class Publisher:
                     played.elements[number].append((place == len(found) - 1, bits))
 
     def beats(self, data: bytes) -> list[Beat]:
-        """Full beats but the last."""
+        """Full beats, except for the last one."""
         lanes = self.width // 8
         starts = range(0, len(data), lanes)
         return [Beat(data[start : start + lanes], start + lanes >= len(data)) for start in starts]

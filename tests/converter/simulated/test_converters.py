@@ -104,7 +104,7 @@ def test_no_cycle_is_lost_without_stalls(
     found = traffic(result.output)
     beats = sum(map(pair.beats, frames))
     assert (found.beats_in, found.beats_out) == (beats, beats)
-    # The last message is sent when it has come wholly.
+    # The last message is sent after it has arrived completely.
     assert found.cycles <= beats + pair.beats(frames[-1]) + PIPELINE_CYCLES
 
 
@@ -127,7 +127,7 @@ def test_a_message_that_waits_loses_nothing(
 def test_broken_frames_hurt_no_other(
     bench: ConverterBench, tmp_path: Path, ros: Middleware, name: str, width: int, flow: str
 ) -> None:
-    """Every good frame is delivered, none else is, and each broken one gives one error with its code."""
+    """Every good frame is delivered and no other; each broken one causes one error with its code."""
     pair = bench.pair(ros, name, width)
     print(f"seed {SEED}")
     frames = troubled_frames(pair, 150, random.Random(f"{SEED} {name} {flow}"))
@@ -154,7 +154,7 @@ def test_every_length_of_a_frame(bench: ConverterBench, tmp_path: Path, ros: Mid
     honest = [pair.sent(longer[:size]) for size in range(len(longer) + 1) if size < 12 or size > len(longer) - 12]
     frames = [*cut, *extended, *honest]
     assert sum(map(pair.is_good, frames)) == (2 if ros is ROS1 else 5)
-    # A good one behind each, so that nothing a broken one leaves behind stays unseen.
+    # A good frame follows each of them, to reveal the effects of a broken one.
     mixed = [each for sent in frames for each in (sent, pair.sent(pair.payload(source)))]
     pair.run(tmp_path, mixed, SEED=SEED, STALL_PERCENT=20)
 

@@ -275,9 +275,9 @@ def troubled(ros: Middleware, payload: bytes, chance: random.Random) -> bytes:
     match chance.randrange(11):
         case 0:  # ends early
             return bytes(body[: chance.randrange(len(body))])
-        case 1:  # goes on behind its length
+        case 1:  # continues after its length
             return bytes(body) + chance.randbytes(chance.choice((1, 2, 3, 4, 9, 70)))
-        case 2:  # a length that lies
+        case 2:  # a wrong length
             lie = max(0, len(payload) + chance.choice((-9, -4, -1, 1, 4, 9, 2**20)))
             return lie.to_bytes(LENGTH_BYTES, "little") + payload
         case 3:  # any byte is another one: a count, mostly

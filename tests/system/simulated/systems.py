@@ -1,4 +1,4 @@
-"""Generate a system and its simulation into a folder, and run it: what FuseSoC does, without FuseSoC."""
+"""Generate a system and its simulation into a folder and run it, like FuseSoC but without FuseSoC."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class GeneratedSystem:
         return result.exit_code == 0 and result.output.splitlines()[-1].startswith("PASS ")
 
     def replace_by_netlist(self) -> None:
-        """From here on the top level is the netlist that GHDL makes of it."""
+        """Replace the top level by the netlist that GHDL makes of it."""
         self.work.replace_by_netlist(self.entity)
         self.work.analyse([self.folder / f"{self.entity}_tb.vhd"])
 

@@ -1,4 +1,4 @@
-"""First versions of accelerators: they are legal VHDL, C++ and Python, and a system of them answers with zeros.
+"""First versions of accelerators: they are legal VHDL, C++ and Python, and a system of them responds with zeros.
 
 Messages of all kinds: of fixed size, of a length that is computed, given or counted, and with elements that are sent
 one by one. One accelerator takes none, and one has a pin that is called as a signal of the others.
