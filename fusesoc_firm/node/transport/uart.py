@@ -88,7 +88,7 @@ class UartTransport:
                     rest = rest[self._write(rest) :]
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """Return the next frame as a burst. Raises `TransportError`, `TransportResetError` for bytes without a frame."""
+        """Return the next frame as a burst. Raises `TransportError`, `TransportResetError` for illegal bytes."""
         with self._receiving:
             return self._receive(timeout)
 
