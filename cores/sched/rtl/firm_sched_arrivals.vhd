@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Which tasks have come: a task is accepted once and stays `known` until it finishes; accepted ones leave one a cycle.
+-- Detects new tasks: a task is accepted once and stays `known` until it finishes; accepted tasks leave one per cycle.
 --
--- The requesters stand in rows. When no accepted task is here, the next row in which somebody asks is looked at, and
--- all of its new requests are accepted at once; they leave lowest index first. Rows take turns, so nobody waits for
--- ever behind lower indices that come again and again, and a lone request is accepted in the cycle in which it comes.
+-- The requesters are arranged in rows. When no accepted task is left, the next row with a request is read, and all its
+-- new requests are accepted at once; they leave lowest index first. Rows take turns, so that lower indices that return
+-- again and again cannot starve others. A lone request is accepted in the cycle in which it arrives.
 --
 -- What is known lies in distributed RAM, a row a word: a requester is known where its bits in `accepted` and
 -- `finished` differ. So the row that is accepted and the task that finishes write to memories of their own.
