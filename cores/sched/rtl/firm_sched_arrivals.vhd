@@ -31,9 +31,9 @@ entity firm_sched_arrivals is
     id     : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
     leaves : in  std_logic;
 
-    -- A requester finishes a task, which may be known or not. If it has not left, it is forgotten.
+    -- A requester finishes a task, known or not. If the task has not left, it is dropped.
     finished       : in std_logic;
-    finished_known : in std_logic;  -- it is known and has left; read with `finished` only
+    finished_known : in std_logic;  -- it is known and has left; only valid with `finished`
     finished_id    : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
   );
 end entity firm_sched_arrivals;
@@ -51,18 +51,18 @@ architecture rtl of firm_sched_arrivals is
   subtype columns_t is std_logic_vector(COLUMNS-1 downto 0);
   subtype requesters_t is std_logic_vector(ROWS*COLUMNS-1 downto 0);
 
-  signal cleared_r : unsigned(ROW_BITS downto 0);  -- the next row to be made equal; the highest bit: all are
+  signal cleared_r : unsigned(ROW_BITS downto 0);  -- the next row to equalise; the highest bit: all are done
   signal clearing  : std_logic;
 
-  signal batch_r : columns_t;  -- accepted and still here
-  signal row_r   : row_t;      -- their row; after they have left the last one
+  signal batch_r : columns_t;  -- accepted, but not yet left
+  signal row_r   : row_t;      -- their row, or the last one if all have left
 
   signal asks          : std_logic_vector(ROWS*COLUMNS-1 downto 0);
   signal rows_that_ask : rows_t;
   signal rows_above    : rows_t;
   signal found_row     : row_t;
   signal next_row      : row_t;
-  signal row_asks      : columns_t;  -- of the next row
+  signal row_asks      : columns_t;  -- requests of the next row
   signal row_accepted  : columns_t;
   signal row_finished  : columns_t;
   signal row_known     : columns_t;
@@ -71,7 +71,7 @@ architecture rtl of firm_sched_arrivals is
   signal load          : std_logic;
   signal accept_row    : std_logic;
 
-  signal first   : column_t;  -- who leaves next
+  signal first   : column_t;  -- the requester that leaves next
   signal next_id : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
 
   signal padded_id       : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
@@ -143,7 +143,7 @@ begin
       write_word   => new_accepted
     );
 
-  -- Whoever is known no longer is. A task that is forgotten is known, too.
+  -- A finished requester is no longer known. A task that is dropped was known, too.
   forgets      <= any_of(batch_r and finished_column) when row_r = finished_row else '0';
   finish_task  <= finished and (finished_known or forgets);
   new_finished <= old_finished xor finished_column;
