@@ -5,9 +5,9 @@
 -- new requests are accepted at once; they leave lowest index first. Rows take turns, so that lower indices that return
 -- again and again cannot starve others. A lone request is accepted in the cycle in which it arrives.
 --
--- What is known lies in distributed RAM, a row a word: a requester is known where its bits in `accepted` and
--- `finished` differ. So the row that is accepted and the task that finishes write to memories of their own.
--- The RAM keeps what was there before a reset: after it the rows are made equal, one a cycle.
+-- The set of known tasks is in distributed RAM, one row per word: a requester is known if its bits in `accepted` and
+-- `finished` differ. Accepted rows and finished tasks can therefore write to separate memories.
+-- The RAM keeps its content during a reset: afterwards the rows are made equal, one per cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,11 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host beside the hardware, for simulation: makes clock and reset, sends the frames of a stimulus file, compares
--- what comes back with an expected file, and reports. docs/reference/simulation-host.md says what the files and the
--- report look like.
+-- The simulated host: it generates clock and reset, sends the frames of a stimulus file, compares responses with an
+-- expected file, and reports. docs/reference/simulation-host.md describes the files and the report.
 --
--- One process does all of it once a cycle: it reads the inputs as they are before the rising edge, and what it
--- drives changes HOLD after the edge, so no order of delta cycles matters. Where a stream carries nothing, the host
--- drives 'X'.
+-- One process does everything, once per cycle: it samples the inputs before the rising edge, and its outputs change
+-- HOLD after the edge, so the order of delta cycles does not matter. A stream without a beat carries 'X'.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host of firm_sim_pipe.vhd for simulators of Verilog: the same requests, reports and stalls, cycle by cycle. SEED and
-// STALL_PERCENT can be set anew where the simulator is started, as in +SEED=7. It is SystemVerilog for its queues alone,
+// The host of firm_sim_pipe.vhd for simulators of Verilog: the same requests, reports and stalls, cycle by cycle. SEED
+// and STALL_PERCENT can be set at the start of the simulator, as in +SEED=7. It is SystemVerilog only for its queues,
 // since frames have any size.
 //
-// Inputs are read before the rising edge; what the host drives changes with the falling edge, so no order of events
-// matters. Where a stream carries nothing, it drives 'x'.
+// Inputs are sampled before the rising edge. Outputs change at the falling edge, so the order of events does not
+// matter. A stream without a beat carries 'x'.
 
 `timescale 1ns / 1ps
 

@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host beside the hardware at the end of a pipe: makes clock and reset, and does what is requested on file
--- descriptor 3: it takes frames for the system, and runs so many cycles. What happened in them is reported on file
--- descriptor 4. docs/reference/transports.md says what requests and reports look like.
+-- The simulated host at the end of a pipe: it generates clock and reset, and serves the requests on file descriptor 3:
+-- it takes frames for the system, and runs for a number of cycles. It reports the events in them on file descriptor 4.
+-- docs/reference/transports.md describes requests and reports.
 --
--- Between two requests no time passes, so a simulation depends on the requests, on SEED and STALL_PERCENT alone. What
--- breaks a rule ends it with a message. As in firm_sim_host, one process reads the inputs before the rising edge, and
--- what it drives changes HOLD after it.
+-- No time passes between two requests, so a simulation depends only on the requests, SEED and STALL_PERCENT. A violated
+-- rule ends it with a message. As in firm_sim_host, one process samples the inputs before the rising edge, and
+-- its outputs change HOLD after it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
