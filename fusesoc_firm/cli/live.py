@@ -47,8 +47,8 @@ def add_live(commands: Any) -> None:
 
 def _live(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.node.description import describe
+    from fusesoc_firm.node.reopening import at_address, of_simulator
     from fusesoc_firm.node.run import run_node, run_options
-    from fusesoc_firm.node.transports import at_address, of_simulator
     from fusesoc_firm.text.outputs import check_output
 
     loaded = load(arguments)
@@ -65,7 +65,7 @@ def _live(arguments: argparse.Namespace) -> None:
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.node.steps import are_steps
+    from fusesoc_firm.node.cpp_trace import are_steps
     from fusesoc_firm.node.trace_picture import draw_trace
 
     table: Path = arguments.table
@@ -78,8 +78,8 @@ def _draw_trace(arguments: argparse.Namespace) -> None:
 
 def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
     """Convert a table of steps to a table of ways beside it; return the path of the latter."""
+    from fusesoc_firm.node.cpp_trace import write_ways
     from fusesoc_firm.node.description import describe
-    from fusesoc_firm.node.steps import write_ways
 
     if not arguments.system:
         fail(f"{steps} is of a node in C++, whose table has no names", hint="--system SPEC says what its ids mean")

@@ -43,7 +43,7 @@ def _load_converters(request: Request) -> LoadedRequest:
 
 
 def _load_system(request: Request) -> LoadedRequest:
-    from fusesoc_firm.node import package
+    from fusesoc_firm.node import cpp_package
     from fusesoc_firm.simulation import simulation_core
     from fusesoc_firm.system import system_core
 
@@ -51,7 +51,7 @@ def _load_system(request: Request) -> LoadedRequest:
         for warning in loaded.warnings:
             print(warning, file=sys.stderr)
         core = system_core.system_core(loaded)
-        return replace(core, files={**core.files, **package.generated_files(loaded)})
+        return replace(core, files={**core.files, **cpp_package.generated_files(loaded)})
 
     loaded = system_core.load_requested(request)
     make: Callable[[Request, system_core.LoadedSystem], GeneratedCore]
@@ -60,7 +60,7 @@ def _load_system(request: Request) -> LoadedRequest:
     elif _is_simulation(request):
         inputs, make = simulation_core.inputs(request, loaded), simulation_core.simulation_core
     else:
-        inputs, make = [*system_core.inputs(request, loaded), *package.headers()], make_system
+        inputs, make = [*system_core.inputs(request, loaded), *cpp_package.headers()], make_system
     return LoadedRequest(request, inputs, lambda: make(request, loaded), loaded.definitions)
 
 
@@ -71,7 +71,7 @@ def _simulator_programs(request: Request) -> Sequence[str]:
 def _compiler(request: Request) -> Mapping[str, str]:
     if not _is_simulation(request):
         return {}
-    from fusesoc_firm.simulation.kernel import toolchain
+    from fusesoc_firm.simulation.kernel_library import toolchain
 
     return toolchain()
 
@@ -86,9 +86,9 @@ _MESSAGES = Parameter(
     "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
 )
 
-_DISTRO = Parameter("distro", "str", "the ROS distribution whose standard messages are meant")
+_DISTRO = Parameter("distro", "str", "the ROS distribution of standard messages")
 
-_LOCKED = Parameter("locked", "str", "a lock file, relative to the core: what differs from it is refused")
+_LOCKED = Parameter("locked", "str", "a lock file, relative to the core; any difference from it is an error")
 
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
@@ -99,17 +99,19 @@ GENERATORS: Mapping[str, Generator] = {
                 "the type of a message, service or action, such as geometry_msgs/Quaternion",
                 is_required=True,
             ),
-            Parameter("ros", "int", "the ROS version whose wire format is spoken", is_required=True, choices=(1, 2)),
-            Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
+            Parameter("ros", "int", "the version of ROS", is_required=True, choices=(1, 2)),
+            Parameter(
+                "direction", "str", "converters to generate", "both", choices=("subscriber", "publisher", "both")
+            ),
             Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
             Parameter(
                 "name",
                 "str",
-                "what the names of all generated units begin with, such as left; a second core of a message needs one",
+                "prefix of the names of all generated units, such as left; required for a second core of a message",
                 rule=(PREFIX_RULE, is_prefix),
             ),
-            Parameter("include", "list", "fields that get ports, such as pose.position; all unless given"),
-            Parameter("exclude", "list", "fields that get none of these; a publisher sends their defaults"),
+            Parameter("include", "list", "fields with ports, such as pose.position; default all fields"),
+            Parameter("exclude", "list", "fields without ports; a publisher sends their defaults"),
             Parameter(
                 "config",
                 "str",
@@ -126,23 +128,25 @@ GENERATORS: Mapping[str, Generator] = {
     "far": Generator(
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
-            Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation", "live")),
-            Parameter("board", "str", "the board it is for: one of ours, or a YAML file relative to the core"),
+            Parameter("product", "str", "the product to generate", "system", choices=("system", "simulation", "live")),
+            Parameter("board", "str", "the board: the name of a supported one, or a YAML file relative to the core"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
-            Parameter("model", "str", "a Python file with the function that says what the system answers"),
+            Parameter("model", "str", "a Python file with a function that computes the system's answers"),
             Parameter(
-                "environment", "list", "VHDL files that play what is at the pins; the last is called as its entity"
+                "environment", "list", "VHDL files of the environment at the pins; the last has the name of its entity"
             ),
             Parameter(
                 "simulator",
                 "str",
-                "what shall run the simulation",
+                "the simulator",
                 default_simulator(),
                 choices=tuple(SIMULATORS),
             ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
-            Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
-            Parameter("files", "list", "further files that the model and functions in software read"),
+            Parameter(
+                "stall_percent", "int", "probability of a stall of a stream in a cycle, in percent", 25, bounds=(0, 99)
+            ),
+            Parameter("files", "list", "further files that the model or functions in software read"),
             _PATHS,
             _MESSAGES,
             _DISTRO,
