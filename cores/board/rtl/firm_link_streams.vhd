@@ -53,7 +53,7 @@ architecture rtl of firm_link_streams is
 
   constant LANES      : positive := WIDTH/8;
   constant COUNT_BITS : positive := clog2(LANES+1);
-  -- A number of one byte, and of none.
+  -- The counts of one byte and of zero bytes.
   constant ONE        : std_logic_vector(COUNT_BITS-1 downto 0) := (0 => '1', others => '0');
   constant NONE       : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
 

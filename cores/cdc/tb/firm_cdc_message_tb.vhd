@@ -19,7 +19,7 @@ entity firm_cdc_message_tb is
     MESSAGES    : integer := 300;  -- at most 65535
     -- The chance, each cycle, that an end does nothing.
     STALL_PERCENT : integer := 0;
-    -- The chance of a message that it is withdrawn at some time.
+    -- The chance that a message is withdrawn at some time.
     WITHDRAW_PERCENT : integer := 0;
     -- The chance of a message that a reset of one cycle meets it.
     RESET_PERCENT : integer := 0;
