@@ -50,8 +50,8 @@ package firm_sim_pkg is
 
   procedure print(text : in string);
 
-  -- A text with its used length and its capacity. It grows by doubling, so that a long frame is not copied for every
-  -- line.
+  -- Gives a text, of which `used` characters are in use, room for `wanted`. The text grows by doubling, so that a long
+  -- frame is not copied for every line.
   procedure make_room(text : inout line; used : in natural; wanted : in positive);
 
   -- A bench that writes results to a file can compare them at once. EXPECTED is the file with the right ones, or empty:
