@@ -41,14 +41,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        # Whoever read the output (`| head`) has seen enough. Nothing may be flushed into the closed pipe at exit.
+        # The reader of the output (`| head`) has closed the pipe. Nothing may be flushed into it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     return 0
 
 
 def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
-    """The command line; what remaps names for a node of ROS may stand anywhere in it."""
+    """Parse the command line; remappings for a ROS node may be anywhere in it."""
     parser = _parser()
     arguments, rest = parser.parse_known_args(argv)
     if rest and not hasattr(arguments, "remappings"):
@@ -91,5 +91,5 @@ def _parser() -> argparse.ArgumentParser:
 
 def _print_path(arguments: argparse.Namespace) -> None:
     folder = demos_root() if arguments.demos else docs_root() if arguments.docs else library_root()
-    # Both without links, so that the steps up lead where they seem to.
+    # Resolve links on both sides, so that `..` leads to the right folder.
     print(os.path.relpath(folder, Path.cwd().resolve()) if arguments.relative else folder)

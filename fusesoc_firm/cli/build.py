@@ -55,7 +55,7 @@ def _build(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.building.plan import make_plan
     from fusesoc_firm.plugin.build import How, build
 
-    # Processes are copied here, which goes well as long as there are no threads; this one only watches the bar.
+    # Build processes are forked, which is safe only without other threads; tqdm's monitor would be one.
     tqdm.monitor_interval = 0
     plan = make_plan(arguments.cores, arguments.targets, arguments.build_root)
     how = How(
@@ -79,7 +79,7 @@ def _build(arguments: argparse.Namespace) -> None:
 
 
 def _report(outcomes: Sequence[Outcome], seconds: float) -> None:
-    """Print what came of the builds. Raises `InputError` if one failed."""
+    """Print the results of the builds. Raises `InputError` if one failed."""
     from fusesoc_firm.text.outputs import shown
 
     failed = [outcome for outcome in outcomes if not outcome.is_good]

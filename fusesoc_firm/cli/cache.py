@@ -1,4 +1,4 @@
-"""`firm cache`: the store of what was generated."""
+"""`firm cache`: the store of generated cores."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _verify_cache(_: argparse.Namespace) -> None:
 
 
 def _shown(size: float) -> str:
-    """A number of bytes for people to read."""
+    """Return a number of bytes in readable form."""
     if size < _UNIT:
         return f"{size} bytes"
     for unit in ("KiB", "MiB", "GiB"):

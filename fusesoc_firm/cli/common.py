@@ -1,4 +1,4 @@
-"""What the commands of `firm` share: how they are declared, and what most of them load and write."""
+"""The common part of the commands of `firm`: their declarations, and the loading and writing that most of them need."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Handler = Callable[[argparse.Namespace], None]
 def command(
     commands: Any, name: str, text: str, example: str, handler: Handler | None = None
 ) -> argparse.ArgumentParser:
-    """A command with its help, an example of it, and what it does."""
+    """Return a command's parser with its help, an example and a description."""
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         help=text,
@@ -35,12 +35,12 @@ def command(
 
 
 def positive(text: str) -> int:
-    """The type of an argument that counts something."""
+    """Parse an argument that is a positive integer."""
     return _at_least(1, text)
 
 
 def natural(text: str) -> int:
-    """The type of an argument that counts something, of which there may be none."""
+    """Parse an argument that is a non-negative integer."""
     return _at_least(0, text)
 
 
@@ -53,13 +53,13 @@ def _at_least(least: int, text: str) -> int:
 
 
 def add_definitions(parser: argparse.ArgumentParser) -> None:
-    """The arguments of commands about the messages of one ROS version."""
+    """Add the arguments of commands about the messages of one ROS version."""
     parser.add_argument("--ros", type=int, choices=(1, 2), default=2, help="the ROS version (default: 2)")
     add_sources(parser)
 
 
 def add_sources(parser: argparse.ArgumentParser) -> None:
-    """The arguments that say where message definitions are."""
+    """Add the arguments that tell where message definitions are."""
     parser.add_argument(
         "--path",
         type=Path,
@@ -72,7 +72,7 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
 
 
 def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
-    """The messages that the arguments mean."""
+    """Return the messages that the arguments select."""
     from fusesoc_firm.message.library import MessageLibrary
     from fusesoc_firm.message.middleware import middleware_of
 
@@ -80,7 +80,7 @@ def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
 
 
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
-    """The system of the specification that the arguments name, whose warnings are printed.
+    """Load the system of the specification in the arguments, and print its warnings.
 
     Unless it `needs_sources`, those of its accelerators may be missing.
     """
@@ -95,15 +95,15 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
 
 
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
-    """The folders of the messages of cores that FuseSoC knows here. Raises `InputError`."""
-    # FuseSoC is imported for those alone.
+    """Return the folders of message cores that FuseSoC knows here. Raises `InputError`."""
+    # Import FuseSoC only when it is needed.
     from fusesoc_firm.plugin.project import message_folders
 
     return message_folders(names) if names else ()
 
 
 def add_picture(parser: argparse.ArgumentParser) -> None:
-    """The arguments of commands that draw a graph, for `pictures.draw`."""
+    """Add the arguments of commands that draw a graph, for `pictures.draw`."""
     parser.add_argument(
         "-o",
         "--output",

@@ -1,4 +1,4 @@
-"""`firm live`: a simulated system as a node of a running ROS. `firm trace`: the ways of its messages as a picture."""
+"""`firm live`: a simulated system as a node of a running ROS. `firm trace`: a picture of its messages' stages."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _live(arguments: argparse.Namespace) -> None:
     description = describe(loaded)
     options = run_options(arguments, arguments.remappings, description, arguments.ros)
     if arguments.trace:
-        # It is opened when the simulator has been built.
+        # It is opened only after the simulator is built.
         check_output(arguments.trace)
     if arguments.transport:
         opener = at_address(arguments.transport)
@@ -77,7 +77,7 @@ def _draw_trace(arguments: argparse.Namespace) -> None:
 
 
 def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
-    """The table of ways beside one of steps, which is made."""
+    """Convert a table of steps to a table of ways beside it; return the path of the latter."""
     from fusesoc_firm.node.cpp_trace import write_ways
     from fusesoc_firm.node.description import describe
 

@@ -1,4 +1,4 @@
-"""`firm message`: definitions, their way to hardware, and the check of converters."""
+"""`firm message`: definitions of messages, their converters, and the verification of these."""
 
 from __future__ import annotations
 

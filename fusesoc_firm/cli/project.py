@@ -1,4 +1,4 @@
-"""`firm graph`, `firm affected` and `firm lock`: how the cores of a project hang together, and what they use."""
+"""`firm graph`, `firm affected` and `firm lock`: the dependencies between a project's cores, and their inputs."""
 
 from __future__ import annotations
 

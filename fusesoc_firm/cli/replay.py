@@ -1,4 +1,4 @@
-"""`firm replay`: a recorded bag through a simulated system."""
+"""`firm replay`: sends a recorded bag through a simulated system."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`firm simulator`: the simulator of a system, built for another program that starts it."""
+"""`firm simulator`: builds the simulator of a system for another program to start."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def add_simulator(commands: Any) -> None:
 
 
 def add_simulator_options(parser: argparse.ArgumentParser) -> None:
-    """The arguments of commands that simulate a system live; `built_simulator` reads them, with `spec`."""
+    """Add the arguments of commands that simulate a system live; `built_simulator` reads them, with `spec`."""
     tools, default = [*fitting(is_live=True)], default_simulator(is_live=True)
     parser.add_argument("--tool", choices=tools, default=default, help="default: %(default)s")
     parser.add_argument("--build-root", type=Path, metavar="DIR", help="where to build (default: in the user's cache)")
@@ -53,7 +53,7 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
 
 
 def built_simulator(arguments: argparse.Namespace) -> Any:
-    """The `BuiltSimulator` that the arguments ask for."""
+    """Build the simulator that the arguments describe, and return it as a `BuiltSimulator`."""
     from fusesoc_firm.simulation.simulator import CoreSources, build_simulator
 
     sources = CoreSources(arguments.path, arguments.distro or "", arguments.depend, arguments.environment, core_folders)

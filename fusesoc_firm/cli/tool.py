@@ -1,4 +1,4 @@
-"""`firm tool`: a program of a build, started for Edalize."""
+"""`firm tool`: starts a program of a build for Edalize."""
 
 from __future__ import annotations
 

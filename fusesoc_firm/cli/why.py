@@ -1,4 +1,4 @@
-"""`firm why`: which lines made a generated line."""
+"""`firm why`: the source lines of a generated line."""
 
 from __future__ import annotations
 

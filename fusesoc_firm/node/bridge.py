@@ -1,7 +1,7 @@
-"""A node of a running ROS that carries serialised messages between its topics and a socket.
+"""The ROS process of a Python node: it carries serialised messages between ROS topics and a socket.
 
-It runs under the Python that ROS is installed for, which is seldom ours: so it is a program of its own and needs
-nothing but ROS and the standard library of Python 3.8. `node/carrier.py` starts it.
+It runs under the Python that ROS is installed for, which is seldom the one that runs this package. It is therefore a
+separate program that needs only ROS and the standard library of Python 3.8. `node/carrier.py` starts it.
 
     python3 bridge.py SOCKET [ARGUMENT OF ROS ...]         # SOCKET is a file descriptor, a stream of parcels
 """
@@ -19,23 +19,25 @@ import time
 from abc import ABC, abstractmethod
 from typing import Any, NamedTuple
 
-# To the bridge: what it is to be. From the bridge: what the topics are called after remapping.
+# CONFIGURE, to the bridge: its configuration. READY, from the bridge: the names of the topics after remapping.
 CONFIGURE, READY = b"C", b"R"
-# A message: from a topic, or to be published on one. From the bridge: it is published, if this is asked for.
+# MESSAGE, both ways: a message from a topic, or one to publish. PUBLISHED, from the bridge: it is published (on
+# request).
 MESSAGE, PUBLISHED = b"M", b"P"
-# To the bridge: take no more messages. From the bridge: ROS wants the node to end.
+# STOP, to the bridge: take no more messages. From the bridge: ROS asks the node to end.
 STOP = b"S"
-# From the bridge: all that was taken before STOP is handed over. Or: what went wrong; it ends then.
+# DONE, from the bridge: all messages taken before STOP are handed over. FAULT, from the bridge: the error that ended
+# it.
 DONE, FAULT = b"D", b"E"
 
-# The kind, the topic's number, a time of the system's monotonic clock in ns, and how many bytes follow.
+# The kind, the number of the topic, a time of the system's monotonic clock in ns, and the number of bytes that follow.
 _HEADER = struct.Struct("<cHqI")
-# How long what was published may take to leave, in s.
+# The time that published messages may take to leave, in s.
 _FLUSH_SECONDS = 2.0
 
 
 class Parcel(NamedTuple):
-    """What goes over the socket at once."""
+    """The unit of transfer over the socket."""
 
     kind: bytes
     topic: int
@@ -44,7 +46,7 @@ class Parcel(NamedTuple):
 
 
 class Channel:
-    """One end of the socket. Any thread may send; one receives."""
+    """One end of the socket. Any thread may send; only one may receive."""
 
     def __init__(self, end: socket.socket) -> None:
         self._socket = end
@@ -52,7 +54,7 @@ class Channel:
         self._lock = threading.Lock()
 
     def send(self, kind: bytes, topic: int = 0, data: bytes = b"", time_ns: int = 0) -> None:
-        """Send a parcel; waits while the other end reads nothing. Raises OSError when the other end is gone."""
+        """Send a parcel; block while the other end does not read. Raises OSError if the other end has gone."""
         header = _HEADER.pack(kind, topic, time_ns, len(data))
         with self._lock:
             if len(data) < 1 << 16:
@@ -62,7 +64,7 @@ class Channel:
                 self._socket.sendall(data)
 
     def receive(self) -> Parcel | None:
-        """The next parcel; None when the other end is closed, or gone within a parcel."""
+        """Return the next parcel, or None if the other end has closed, even in the middle of a parcel."""
         try:
             header = self._file.read(_HEADER.size)
             if len(header) < _HEADER.size:
@@ -74,12 +76,12 @@ class Channel:
         return None if len(data) < size else Parcel(kind, topic, time_ns, data)
 
     def finish(self) -> None:
-        """Send no more; the other end learns of it."""
+        """Close the sending direction; the other end sees the end of the stream."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
 
     def is_closed(self) -> bool:
-        """Whether the other end is closed, and nothing is left to be received."""
+        """Return whether the other end is closed and nothing is left to receive."""
         try:
             return not self._socket.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -88,20 +90,20 @@ class Channel:
             return True
 
     def close(self) -> None:
-        """Close this end; whoever waits for something from it has waited long enough."""
+        """Close this end and wake all threads that wait for data from it."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
-        # The socket lives as long as its file.
+        # The socket stays open until its file is closed.
         self._file.close()
         self._socket.close()
 
 
 class BridgeError(Exception):
-    """ROS cannot do what is asked for."""
+    """ROS cannot do what the node asks for."""
 
 
 class Ros(ABC):
-    """What both versions of ROS have in common."""
+    """The common part of both versions of ROS."""
 
     def __init__(self, config: dict[str, Any], channel: Channel) -> None:
         self._config = config
@@ -110,7 +112,7 @@ class Ros(ABC):
         self._ended = threading.Event()
 
     def take(self, topic: int, payload: bytes) -> None:
-        """Hand over a message; waits while nobody takes it."""
+        """Hand over a message; block while the engine does not take it."""
         if not self._is_taking:
             return
         try:
@@ -119,12 +121,12 @@ class Ros(ABC):
             self._is_taking = False
 
     def end(self) -> None:
-        """Let `spin` return; any thread."""
+        """Make `spin` return; any thread may call it."""
         self._ended.set()
 
     @abstractmethod
     def names(self) -> dict[str, dict[int, str]]:
-        """What the topics are called after remapping."""
+        """Return the names of the topics after remapping."""
 
     @abstractmethod
     def publish(self, topic: int, payload: bytes) -> None:
@@ -132,23 +134,23 @@ class Ros(ABC):
 
     @abstractmethod
     def stop(self) -> None:
-        """Take no more messages, and say DONE when all that was taken is handed over."""
+        """Take no more messages, and send DONE when all messages taken so far are handed over."""
 
     @abstractmethod
     def spin(self) -> None:
-        """Work until `end`."""
+        """Handle messages until `end` is called."""
 
     @abstractmethod
     def close(self) -> None:
-        """Let leave what was published, and be no node any more."""
+        """Wait until published messages have left, then shut the ROS node down."""
 
 
 class Ros1(Ros):
-    """A node of ROS 1 by rospy; no message package need be installed."""
+    """A ROS 1 node through rospy; no message package need be installed."""
 
     def __init__(self, config: dict[str, Any], arguments: list[str], channel: Channel) -> None:
         super().__init__(config, channel)
-        # rospy looks for remappings here, some of them when it is imported.
+        # rospy reads remappings from here, some of them at import.
         sys.argv = [config["name"], *arguments]
         import rospy
 
@@ -173,22 +175,22 @@ class Ros1(Ros):
         self.take(topic, message._buff)  # noqa: SLF001 - rospy has no other name for it
 
     def _stopped_by_ros(self) -> None:
-        """Such as by `rosnode kill`; it is heard at every end, when nobody listens any more."""
+        """Report a stop by ROS, such as `rosnode kill`. ROS calls it at every shutdown; at others nobody listens."""
         with contextlib.suppress(OSError):
             self._channel.send(STOP)
 
     def names(self) -> dict[str, dict[int, str]]:
-        """What the topics are called after remapping."""
+        """Return the names of the topics after remapping."""
         return {
             "subscribers": {number: topic.resolved_name for number, topic in self._subscribers.items()},
             "publishers": {number: topic.resolved_name for number, topic in self._publishers.items()},
         }
 
     def publish(self, topic: int, payload: bytes) -> None:
-        """Publish a message; a connection whose queue is full loses its oldest one."""
+        """Publish a message; a connection whose queue is full drops its oldest message."""
         message = self._classes[topic]()
         message._buff = payload  # noqa: SLF001
-        with contextlib.suppress(self._rospy.ROSException):  # ROS has ended; on_shutdown has said so
+        with contextlib.suppress(self._rospy.ROSException):  # ROS has ended; on_shutdown has reported it
             self._publishers[topic].publish(message)
 
     def stop(self) -> None:
@@ -199,11 +201,11 @@ class Ros1(Ros):
         self._channel.send(DONE)
 
     def spin(self) -> None:
-        """Wait: rospy works in threads of its own."""
+        """Wait for `end`: rospy works in its own threads."""
         self._ended.wait()
 
     def close(self) -> None:
-        """Let leave what was published, and end the node."""
+        """Wait until published messages have left, then end the node."""
         latest = time.monotonic() + _FLUSH_SECONDS
         for publisher in self._publishers.values():
             for connection in list(publisher.impl.connections):
@@ -212,28 +214,28 @@ class Ros1(Ros):
 
 
 def _raw_class(rospy: Any, topic: dict[str, Any]) -> Any:
-    """A class whose messages are their bytes; peers see it as that of the topic."""
+    """Return a class whose messages are raw bytes; peers see the topic's type."""
     names = {"_type": topic["type"], "_md5sum": topic["signature"], "_full_text": topic["definition"], "__slots__": ()}
     return type("RawMessage", (rospy.AnyMsg,), names)
 
 
 def _flush(connection: Any, latest: float) -> None:
-    """Wait until a connection's own thread has sent what it was given.
+    """Wait until a connection's thread has sent all messages that were queued before the call.
 
-    It takes all that is there at once, and sends it then. So when it has taken nothing twice, it has sent what came
-    before the first.
+    The thread takes everything in the queue at once and then sends it. So when it has come back for more twice, it has
+    sent everything from before the first time.
     """
     for _ in range(2):
         try:
             connection.write_data(b"")
-        except Exception:  # noqa: BLE001 - the peer is gone, and rospy says so by several types
+        except Exception:  # noqa: BLE001 - the peer has gone, which rospy reports by several types
             return
         while getattr(connection, "_queue", None) and not connection.done and time.monotonic() < latest:
             time.sleep(0.005)
 
 
 class Ros2(Ros):
-    """A node of ROS 2 by rclpy, whose message packages must be installed: rmw describes types by their code."""
+    """A ROS 2 node through rclpy; the message packages must be installed, because rmw gets a type from their code."""
 
     def __init__(self, config: dict[str, Any], arguments: list[str], channel: Channel) -> None:
         super().__init__(config, channel)
@@ -272,7 +274,7 @@ class Ros2(Ros):
         return taken
 
     def _check_hashes(self) -> None:
-        """Raise BridgeError for a type that is installed as another one than the hardware's. Older ROS 2 cannot say."""
+        """Raise BridgeError if an installed type differs from the hardware's. Older ROS 2 has no hash to compare."""
         info = {
             "subscribers": self._node.get_subscriptions_info_by_topic,
             "publishers": self._node.get_publishers_info_by_topic,
@@ -291,7 +293,7 @@ class Ros2(Ros):
                         )
 
     def names(self) -> dict[str, dict[int, str]]:
-        """What the topics are called after remapping."""
+        """Return the names of the topics after remapping."""
         return {
             "subscribers": {number: topic.topic_name for number, topic in self._subscribers.items()},
             "publishers": {number: topic.topic_name for number, topic in self._publishers.items()},
@@ -302,7 +304,7 @@ class Ros2(Ros):
         self._publishers[topic].publish(payload)
 
     def stop(self) -> None:
-        """Have `spin` take what is already here, and no more."""
+        """Make `spin` take the messages that have already arrived, and no more."""
         self._stops_at = time.monotonic() + _FLUSH_SECONDS
         self._executor.wake()
 
@@ -319,12 +321,12 @@ class Ros2(Ros):
             self._ended.wait()
 
     def end(self) -> None:
-        """Let `spin` return."""
+        """Make `spin` return."""
         super().end()
         self._executor.wake()
 
     def close(self) -> None:
-        """Let leave what was published, and end the node."""
+        """Wait until published messages have left, then end the node."""
         from rclpy.duration import Duration
 
         if self._config["is_reliable"]:
@@ -351,7 +353,7 @@ def _message_class(name: str) -> Any:
 
 
 def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
-    """Do what the engine asks for, until it closes its end."""
+    """Carry out the engine's requests until it closes its end."""
     while True:
         parcel = channel.receive()
         if parcel is None:
@@ -366,18 +368,18 @@ def _serve(ros: Ros, channel: Channel, is_timed: bool) -> None:
 
 
 def main() -> int:
-    """Be the bridge."""
+    """Run the bridge."""
     channel = Channel(socket.socket(fileno=int(sys.argv[1])))
     first = channel.receive()
     if first is None or first.kind != CONFIGURE:
         return 2
     config = json.loads(first.data)
-    # rospy waits for its master for ever; whoever gives up closes the other end.
+    # rospy waits for its master without limit; an engine that gives up closes its end.
     ready = threading.Event()
     threading.Thread(target=_give_up, args=(channel, ready), daemon=True).start()
     try:
         ros = _VERSIONS[config["ros"]](config, sys.argv[2:], channel)
-    except Exception as error:  # noqa: BLE001 - whatever ROS raises, it is said
+    except Exception as error:  # noqa: BLE001 - whatever ROS raises is reported
         channel.send(FAULT, data=str(error).encode())
         return 1
     channel.send(READY, data=json.dumps(ros.names()).encode())
@@ -391,7 +393,7 @@ def main() -> int:
 
 
 def _give_up(channel: Channel, ready: threading.Event) -> None:
-    """End the process if the engine closes its end before ROS is there."""
+    """End the process if the engine closes its end before ROS is ready."""
     while not ready.wait(0.2):
         if channel.is_closed():
             os._exit(0)

@@ -1,13 +1,13 @@
-"""Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, 'Bursts').
+"""Joins the bursts of a preemptive Manager to frames (docs/reference/manager.md, 'Bursts').
 
     joiner = BurstJoiner(publishers=4, width=64)
-    for burst in bursts:                    # the bytes between two `tlast`, those that `tkeep` marks
+    for burst in bursts:                    # the bytes between two `tlast` that `tkeep` marks as valid
         if frame := joiner.push(burst):
             deliver(frame.id, frame.payload)
     joiner.close()
 
-Frames that nobody interrupted are bursts as well, so it serves a Manager without preemption, too. The same in C++ is
-`firm/bursts.hpp` in the folder `cpp` beside this file.
+An uninterrupted frame is one burst, so the class also serves a Manager without preemption. `cpp/firm/bursts.hpp` is the
+same in C++.
 """
 
 from __future__ import annotations
@@ -23,24 +23,25 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
 
 class BurstError(ValueError):
-    """A burst that no Manager sends. What was there of the frame it belongs to is dropped."""
+    """A burst that no Manager sends. The part of its frame received so far is dropped."""
 
 
 @dataclass(frozen=True)
 class JoinedFrame:
-    """A whole frame: the publisher it came from and its payload."""
+    """A complete frame: the id of its publisher and its payload."""
 
     id: int
     payload: bytes
 
 
 class BurstJoiner:
-    """Joins bursts by id until the length that a frame announces is reached; one for each stream."""
+    """Joins bursts by id until a frame has the length that its header announces; each stream needs its own joiner."""
 
     def __init__(self, publishers: int, width: int, longest: int | None = None) -> None:
-        """`publishers` of the Manager (1 to 256), `width` of the stream in bits, the `longest` payload in bytes.
+        """Create a joiner for a Manager with `publishers` (1 to 256) and a stream of `width` bits.
 
-        A frame that announces more than `longest` is refused when its header is there, before it takes the memory.
+        A frame that announces a payload of more than `longest` bytes is rejected as soon as its header is complete,
+        before it takes memory.
         """
         if not 1 <= publishers <= MOST_PUBLISHERS:
             raise ValueError(f"publishers is {publishers}; legal: 1 to {MOST_PUBLISHERS}")
@@ -52,13 +53,13 @@ class BurstJoiner:
 
     @property
     def unfinished(self) -> tuple[int, ...]:
-        """The ids of which a frame has begun and is not over, in ascending order."""
+        """Return the ids of incomplete frames in ascending order."""
         return tuple(sorted(self._begun))
 
     def push(self, burst: bytes, tid: int | None = None) -> JoinedFrame | None:
-        """Take a burst; the frame that it completes, if it does.
+        """Take a burst and return the frame that it completes, if any.
 
-        `tid` is the stream's, where the transport has one; it must repeat the id. Raises `BurstError`.
+        `tid` is the stream's `tid`, if the transport has one; it must equal the id. Raises `BurstError`.
         """
         identifier = self._id(burst, tid)
         begun = self._begun.pop(identifier, None)
@@ -67,7 +68,7 @@ class BurstJoiner:
         else:
             if len(burst) <= self._beat_bytes:
                 raise BurstError(f"the burst that resumes the frame of id {identifier} holds nothing but the id")
-            # Only these bytes were inserted; they are a beat, so that those behind it stay in their lanes.
+            # Only these bytes were inserted. They fill a beat, so that the bytes after them stay in their lanes.
             frame = begun
             frame += memoryview(burst)[self._beat_bytes :]
         whole = self._frame_bytes(identifier, frame)
@@ -82,7 +83,7 @@ class BurstJoiner:
         return None
 
     def close(self) -> None:
-        """Say that the stream is over. Raises `BurstError` if a frame is not."""
+        """End the stream. Raises `BurstError` if a frame is incomplete."""
         if not self._begun:
             return
         parts = ", ".join(f"{len(self._begun[identifier])} bytes of id {identifier}" for identifier in self.unfinished)
@@ -100,7 +101,7 @@ class BurstJoiner:
         return identifier
 
     def _frame_bytes(self, identifier: int, frame: bytearray) -> int | None:
-        """The bytes of the whole frame; None while its header is not complete."""
+        """Return the number of bytes of the whole frame; None while its header is incomplete."""
         if len(frame) < _HEADER_BYTES:
             return None
         length = int.from_bytes(frame[ID_BYTES:_HEADER_BYTES], "little")
@@ -115,10 +116,10 @@ class BurstJoiner:
 
 
 def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
-    """The bursts of a frame that is sent in runs of so many beats each; the last run takes what is left.
+    """Split a frame into bursts, as the Manager does: each takes the number of beats in `runs`, the last one the rest.
 
-    What the Manager does to a frame, for tests and models of it. The bits of an extra beat that mean nothing are zero.
-    Raises `ValueError` if a run has no beat, or if the runs are more than the frame has beats.
+    This serves tests and models of the Manager. The meaningless bits of an extra beat are zero.
+    Raises `ValueError` if a run has no beats, or if the runs have more beats than the frame.
     """
     _check_width(width)
     beat_bytes = width // 8

@@ -1,4 +1,4 @@
-"""A middleware as a node needs it, and ROS as one: a process of its own, under the Python that ROS is installed for."""
+"""The middleware as a node sees it, and ROS behind it: a process under the Python that ROS is installed for."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from fusesoc_firm.node import bridge
 from fusesoc_firm.node.description import NodeDescription, NodeTopic
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 
-# What the Python of each version of ROS can import.
+# The module that the Python of each version of ROS can import.
 _MODULES = {1: "rospy", 2: "rclpy"}
 _END_SECONDS = 5.0
 
 
 class CarrierError(Exception):
-    """The middleware is not there, cannot do what is asked for, or has ended."""
+    """The middleware is missing, cannot do what the node asks for, or has ended."""
 
 
 @dataclass(frozen=True)
 class Taken:
-    """A message from the topic of this number, and when it came, in ns of the system's monotonic clock."""
+    """A message from the topic with this number, and its time of arrival in ns of the system's monotonic clock."""
 
     topic: int
     payload: bytes
@@ -38,37 +38,37 @@ class Taken:
 
 @dataclass(frozen=True)
 class Published:
-    """A message of the topic of this number is published, at this time; they come in the order of `publish`."""
+    """A message of the topic with this number was published at this time; the order is that of `publish`."""
 
     topic: int
     time_ns: int
 
 
 class Carrier(Protocol):
-    """Topics of a middleware. They are numbered as in the description: subscribers and publishers apart."""
+    """Topics of a middleware. Subscribers and publishers are numbered separately, as in the description."""
 
     def receive(self) -> Iterator[Taken | Published]:
-        """What comes, until the carrier is closed or the middleware ends. Raises `CarrierError`."""
+        """Yield events until the carrier is closed or the middleware ends. Raises `CarrierError`."""
 
     def publish(self, topic: int, payload: bytes) -> None:
-        """Publish a message; any thread. What comes after the end of the middleware is dropped."""
+        """Publish a message; any thread may call it. After the end of the middleware, messages are dropped."""
 
     def stop(self) -> None:
         """Take no more messages."""
 
     def wait_until_stopped(self, timeout: float) -> bool:
-        """Wait until `receive` has given all that was taken before `stop`; whether it has."""
+        """Wait until `receive` has yielded all messages taken before `stop`; return whether it has."""
 
     def close(self) -> None:
-        """End when all that was published has left."""
+        """End the carrier after all published messages have left."""
 
 
 @dataclass(frozen=True)
 class RosOptions:
-    """How a node is to be seen in ROS.
+    """How a node appears in ROS.
 
-    `arguments` are ROS's own: remappings and so on. `depth` is that of ROS's queues, in messages. `python` is the one
-    that ROS is installed for, None looks for it.
+    `arguments` are ROS's own, such as remappings. `depth` is the depth of ROS's queues, in messages. `python` is the
+    interpreter that ROS is installed for; if it is None, the carrier searches for one.
     """
 
     name: str
@@ -83,12 +83,13 @@ class RosCarrier:
     """A process that is a node of a running ROS; see `Carrier`."""
 
     def __init__(self, ros: int, description: NodeDescription, options: RosOptions) -> None:
-        """Start it and wait until ROS knows it, or for `CarrierError`. ROS 1 waits for its master."""
+        """Start the process and wait until the ROS node is ready. Raises `CarrierError`. ROS 1 waits for its master."""
         self.title = f"ROS {ros}"
         self._python = options.python or _python_of(ros)
         mine, its = socket.socketpair()
         arguments = [*ros_arguments(ros, options.arguments)]
-        # A session of its own: Ctrl-C is for us, and the node has to publish what is still in the hardware.
+        # A session of its own, so that Ctrl-C reaches only this process: the bridge must still publish the last
+        # responses.
         try:
             self._process = subprocess.Popen(
                 [self._python, bridge.__file__, str(its.fileno()), *arguments],
@@ -123,7 +124,7 @@ class RosCarrier:
             raise
 
     def _wait_until_ready(self) -> tuple[dict[int, str], dict[int, str]]:
-        """The topics' names after remapping."""
+        """Wait for the bridge and return the names of the topics after remapping."""
         parcel = self._channel.receive()
         if parcel is None or parcel.kind == bridge.FAULT:
             raise self._fault(parcel)
@@ -134,7 +135,7 @@ class RosCarrier:
         return subscribers, publishers
 
     def receive(self) -> Iterator[Taken | Published]:
-        """What comes, until the carrier is closed, or ROS asks the node to end. Raises `CarrierError`."""
+        """Yield events until the carrier is closed or ROS asks the node to end. Raises `CarrierError`."""
         try:
             while parcel := self._channel.receive():
                 if parcel.kind == bridge.MESSAGE:
@@ -162,18 +163,18 @@ class RosCarrier:
         self._send(bridge.STOP)
 
     def wait_until_stopped(self, timeout: float) -> bool:
-        """Wait until all that was taken is handed over; whether it is."""
+        """Wait until all taken messages are handed over; return whether they are."""
         return self._stopped.wait(timeout)
 
     def close(self) -> None:
-        """End the process, when all that was published has left."""
+        """End the process after all published messages have left."""
         self._end(_END_SECONDS)
 
     def _send(self, kind: bytes, topic: int = 0, data: bytes = b"") -> None:
         try:
             self._channel.send(kind, topic, data)
         except OSError:
-            # It has ended; `receive` says so.
+            # It has ended; `receive` reports this.
             return
 
     def _end(self, seconds: float) -> None:
@@ -197,7 +198,7 @@ def _numbered(ros: int, topics: Sequence[NodeTopic]) -> list[dict[str, object]]:
 
 
 def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
-    """ROS's own arguments as a version has them: NAME:=VALUE is for both, all behind `--ros-args` for ROS 2."""
+    """Yield ROS's own arguments in the form of its version: NAME:=VALUE for both, all after `--ros-args` for ROS 2."""
     words = iter(arguments)
     if ros == 2:
         yield ROS_ARGUMENTS
@@ -210,12 +211,12 @@ def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
 
 @cache
 def _python_of(ros: int) -> str:
-    """The first Python that can import what ROS installs for it. Raises `CarrierError`."""
+    """Return the first Python that can import the modules of ROS. Raises `CarrierError`."""
     module = _MODULES[ros]
     found = [shutil.which("python3"), "/usr/bin/python3", sys.executable]
     candidates = [path for path in dict.fromkeys(found) if path and Path(path).exists()]
     for path in candidates:
-        # A find is not enough: a sourced ROS may be for another Python.
+        # Finding an interpreter is not enough: a sourced ROS may be for another Python.
         if not subprocess.run([path, "-c", f"import {module}"], capture_output=True, check=False).returncode:
             return path
     raise CarrierError(

@@ -1,7 +1,7 @@
-"""The software node of a system in C++: a package of ROS that carries messages between topics and the hardware.
+"""The software node of a system in C++: a ROS package that carries messages between topics and the hardware.
 
-It is a table of the system's topics beside the headers that do the work (`node/cpp`), so that it is built where nothing
-but ROS is installed: on the robot's own computer as here.
+It consists of a table of the system's topics and the headers that do the work (`node/cpp`). It therefore builds
+wherever ROS is installed, such as on the robot's own computer.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fusesoc_firm.text.quoting import lines_of
 from fusesoc_firm.text.render import render
 
 HEADERS = Path(__file__).resolve().parent / "cpp"
-# Messages in the queue of each subscriber, and in ROS' own.
+# Messages in the queue of each subscriber, and in ROS's own queues.
 _QUEUE_DEPTH = 10
 _SOURCE_TEMPLATE = "node/node.cpp"
 _PACKAGE_TEMPLATE = "node/package.xml"
@@ -31,10 +31,10 @@ _PACKAGE_TEMPLATE = "node/package.xml"
 
 @dataclass(frozen=True)
 class _Dialect:
-    """How the package of a version of ROS is written.
+    """The parts of a package that depend on the version of ROS.
 
     `header` and `middleware` are the carrier of bytes in C++; `build_tool`, `library` and `cmake` build it. Only ROS 2
-    asks an installed package for a message's type.
+    looks up a message's type in an installed package.
     """
 
     header: str
@@ -53,14 +53,15 @@ _DIALECTS = {
 
 
 def headers() -> list[Path]:
-    """The headers of nodes."""
+    """Return the paths of the C++ headers of nodes."""
     return sorted(HEADERS.rglob("*.hpp"))
 
 
 def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str, str]:
-    """The files of the node in C++, by path within the package.
+    """Return the files of the node in C++ by path within the package.
 
-    Raises `InputError` if the system's topics are not those of one version of ROS, or not of `ros` where it is given.
+    Raises `InputError` if the system's topics do not share one version of ROS, or do not belong to `ros` if it is
+    given.
     """
     description = describe(loaded)
     version = _only_version(description, ros)
@@ -84,7 +85,7 @@ def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str
 
 
 def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
-    """The node as a part of the generated system; nothing for a system that no one node in C++ can serve."""
+    """Return the node as a part of the generated system; empty if no single C++ node can serve the system."""
     system = loaded.system
     topics = (*system.subscribers, *system.publishers, *system.software.subscribers, *system.software.publishers)
     spoken = {item.frame.ros.number for item in topics}
@@ -94,7 +95,7 @@ def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
 
 
 def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
-    """The version of ROS that all topics have. Raises `InputError`."""
+    """Return the version of ROS that all topics share. Raises `InputError`."""
     found = description.versions
     if len(found) > 1:
         titles = " and ".join(middleware_of(version).title for version in found)
@@ -107,7 +108,7 @@ def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
 
 
 def _headers(dialect: _Dialect) -> dict[str, str]:
-    """All but those for other versions of ROS."""
+    """Return all headers except those for other versions of ROS."""
     others = {item.header for item in _DIALECTS.values()} - {dialect.header}
     return {
         f"include/{path.relative_to(HEADERS)}": path.read_text(encoding="utf-8")
@@ -117,7 +118,7 @@ def _headers(dialect: _Dialect) -> dict[str, str]:
 
 
 def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialect) -> dict[str, Any]:
-    """The table."""
+    """Return the configuration of the template of the table."""
     return {
         "name": description.name,
         "ros": middleware_of(description.versions[0]).title,
@@ -136,7 +137,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
 
 
 def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, Any] | None:
-    """Where the messages of the blocks in software come from and go to; None if there are no such blocks here."""
+    """Return the ends of the messages of blocks in software; None if no such blocks run on this host."""
     ports = software_ports(loaded.system)
     if not ports.inputs:
         return None
@@ -156,7 +157,7 @@ def _port(block: str, converters: Mapping[str, int], topics: Mapping[str, str]) 
 
 
 def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
-    """The text of each message's definition once; ROS 2 needs none."""
+    """Yield the text of each message's definition once; ROS 2 needs none."""
     texts = {topic.type: topic.definition for topic in (*description.subscribers, *description.publishers)}
     for name, text in texts.items():
         if text:
@@ -172,7 +173,7 @@ def _definitions(description: NodeDescription) -> Iterator[dict[str, Any]]:
 
 
 def _constant(message: str) -> str:
-    """The name of a definition's text: `kGeometryMsgsQuaternion`."""
+    """Return the constant's name for a definition's text: `kGeometryMsgsQuaternion`."""
     words = re.split("_+", identifier(message))
     return "k" + "".join(f"{word[0].upper()}{word[1:]}" for word in words)
 

@@ -1,8 +1,8 @@
-"""The steps that a node in C++ writes (`firm/trace.hpp`), a line each, as the table of ways that `Trace` makes.
+"""Converts the steps that a node in C++ writes (`firm/trace.hpp`), one per line, to the table that `Trace` writes.
 
     write_ways(Path("steps.csv"), Path("ways.csv"), describe(loaded))
 
-A step names converters by their ids alone, so the node's description says what they are called and what leads where.
+A step names converters by id only, so the node's description supplies their names and connections.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class _Step:
 
 
 def are_steps(table: Path) -> bool:
-    """Tell whether a table has lines for steps. Raises `InputError` if it cannot be read."""
+    """Return whether a table has lines for steps. Raises `InputError` if it cannot be read."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             return tuple(next(csv.reader(file), ())) == COLUMNS
@@ -42,20 +42,21 @@ def are_steps(table: Path) -> bool:
 
 
 def write_ways(steps: Path, table: Path, description: NodeDescription) -> None:
-    """Write the table of the ways that these steps are part of. Raises `InputError`."""
+    """Write the table of the ways that these steps form. Raises `InputError`."""
     _Fold(description, [*_read(steps, description)]).write(table)
 
 
 class _Fold:
-    """Tells a `Trace` what happened, at the times at which it did."""
+    """Replays the steps into a `Trace`, with their original times."""
 
     def __init__(self, description: NodeDescription, steps: list[_Step]) -> None:
         self._description = description
         self._steps = steps
         self._now = steps[0].time_ns if steps else 0
-        # By subscriber and number; those that are being sent stay, as simulated hardware may take them before or after.
+        # By subscriber and number. Messages being sent stay, since simulated hardware may take them before or after
+        # that step.
         self._entries: dict[tuple[int, int], Entry] = {}
-        # Of the frame that comes from each publisher: when its last burst came, and its cycles.
+        # For the current frame of each publisher: the time of its last burst, and its cycles.
         self._bursts: dict[int, tuple[int, tuple[int, int] | None]] = {}
 
     def write(self, table: Path) -> None:
@@ -79,12 +80,12 @@ class _Fold:
             self._entries[step.converter, step.message] = Entry(
                 step.converter, step.size, step.time_ns, queued_ns=step.time_ns
             )
-        # What was received before the trace began is not known.
+        # A message received before the trace began is unknown.
         elif entry := self._entries.get((step.converter, step.message)):
             self._go_on(trace, step, entry)
 
     def _go_on(self, trace: Trace, step: _Step, entry: Entry) -> None:
-        """The next step of a message on its way to the hardware."""
+        """Handle the next step of a message on its way to the hardware."""
         if step.event == "queued":
             entry.queued_ns = step.time_ns
             return

@@ -1,6 +1,6 @@
-"""What a node is told of its system: the topics, and which of them have a converter in the hardware.
+"""The system as its node sees it: the topics, and which of them have a converter in the hardware.
 
-A message lies on the wire as its middleware serialised it, so a table of names and ids is all that is needed.
+A payload is the message as its middleware serialised it, so the node needs only a table of names and ids.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from fusesoc_firm.text.diagnostics import fail
 
 @dataclass(frozen=True)
 class NodeTopic:
-    """A topic of a node; `block` is the specification's, `id` that of the converter, None where only software is.
+    """A topic of a node; `block` is the specification's, `id` the converter's, or None if only software uses it.
 
-    A relative `name` moves with the node's namespace. `signature` is that of the definition: ROS 1's MD5 sum, ROS 2's
-    hash. `definition` is its text with those of all messages within it; only ROS 1 announces it.
+    A relative `name` moves with the node's namespace. `signature` is that of the definition: ROS 1's MD5 sum or ROS 2's
+    hash. `definition` is its text with those of all nested messages; only ROS 1 announces it.
     """
 
     block: str
@@ -36,7 +36,7 @@ class NodeTopic:
 
 @dataclass(frozen=True)
 class Crossing:
-    """A converter between hardware and software on this host: it has an id, and no topic."""
+    """A converter between hardware and software on this host: it has an id, but no topic."""
 
     block: str
     id: int
@@ -46,10 +46,11 @@ class Crossing:
 class NodeDescription:
     """A system as its node sees it.
 
-    The node takes messages from the topics of `subscribers`, and gives some to those of `publishers`. `entering` and
-    `leaving` are what software on this host sends to the hardware and gets from it. `sources` are the ids of the
-    subscribers that each of the hardware's publishers gets its message from. `longest_payload` is that of a publisher,
-    in bytes, None if it has no bound; `clock_hz` is None where the specification has no clock.
+    The node takes messages from the topics of `subscribers` and publishes messages on those of `publishers`. Software
+    on this host sends to the hardware through `entering` and receives from it through `leaving`. For each of the
+    hardware's publishers, `sources` has the ids of the subscribers that its messages derive from. `longest_payload` is
+    the longest of a publisher, in bytes, or None if it has no bound. `clock_hz` is None if the specification has no
+    clock.
     """
 
     name: str
@@ -64,22 +65,22 @@ class NodeDescription:
 
     @property
     def inputs(self) -> tuple[NodeTopic | Crossing, ...]:
-        """All that the hardware, or software, gets: topics come first, by their numbers."""
+        """All inputs of the hardware or of software: topics first, in the order of their numbers."""
         return (*self.subscribers, *self.entering)
 
     @property
     def outputs(self) -> tuple[NodeTopic | Crossing, ...]:
-        """All that comes out of the hardware, or of software."""
+        """All outputs of the hardware or of software."""
         return (*self.publishers, *self.leaving)
 
     @property
     def versions(self) -> tuple[int, ...]:
-        """The versions of ROS that it has topics of."""
+        """The versions of ROS that the topics belong to."""
         return tuple(sorted({topic.ros for topic in (*self.subscribers, *self.publishers)}))
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:
-    """The node of a system. Raises `InputError` for a middleware that is no ROS."""
+    """Describe the node of a system. Raises `InputError` for a middleware other than ROS."""
     system, software = loaded.system, loaded.system.software
     here = {block.block for block in software.blocks if block.type.accelerator.sources}
     subscribers, entering = _parted(system.subscribers, here)
@@ -105,7 +106,7 @@ def describe(loaded: LoadedSystem) -> NodeDescription:
 
 
 def _parted(converters: Iterable[Converter], here: Collection[str]) -> tuple[list[Converter], tuple[Crossing, ...]]:
-    """Converters with topics, and those that software on this host has to do with."""
+    """Split converters into those with topics and those connected to software on this host."""
     topics: list[Converter] = []
     crossings: list[Crossing] = []
     for item in converters:
@@ -117,7 +118,7 @@ def _parted(converters: Iterable[Converter], here: Collection[str]) -> tuple[lis
 
 
 def _once(topics: Iterable[Topic]) -> list[Topic]:
-    """Each block's topic once, as a converter if there is one."""
+    """Return one topic per block, with its converter if it has one."""
     found: dict[str, Topic] = {}
     for topic in topics:
         found.setdefault(topic.block, topic)

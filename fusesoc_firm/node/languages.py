@@ -1,6 +1,6 @@
-"""What the node of a system is written in: a row and its writer for each language.
+"""The languages in which a system's node can be written, each with its writer.
 
-A writer imports what it needs when it is called: the command line names the languages whatever it is asked.
+A writer imports its modules when it is called: the command line lists the languages in every help text.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Place:
-    """The folder that a node is written to, the specification, and where messages are that it has to find again."""
+    """The folder of the node, the specification, and the folders in which the node must find messages again."""
 
     folder: Path
     specification: Path
@@ -36,7 +36,7 @@ def _python(loaded: LoadedSystem, ros: Middleware | None, place: Place) -> Mappi
     from fusesoc_firm.node.python_node import python_node
     from fusesoc_firm.system.message_sources import sources_of
 
-    # The node runs where FuseSoC may not be.
+    # The node may run where FuseSoC is not installed.
     own = place.core_folders(loaded.specification.message_cores)
     sources = sources_of(place.specification, [*own, *place.paths], core_folders=place.core_folders)
     return python_node(loaded, ros, place.specification, place.folder, sources.paths)
@@ -46,4 +46,4 @@ LANGUAGES: Mapping[str, Callable[[LoadedSystem, Middleware | None, Place], Mappi
     "cpp": _cpp,
     "python": _python,
 }
-"""The files of a node by path within its folder, of one version of ROS or of any: by the language's name."""
+"""By the language's name, a function that returns the files of a node by path, for one version of ROS or for any."""

@@ -1,13 +1,13 @@
-"""The node: messages from topics to the hardware as frames, and back; nothing on its way is parsed.
+"""The node: it carries messages from topics to the hardware as frames, and back, without parsing them.
 
     node = Node(description, open_transport, settings)
-    node.run({1: carrier})                 # until `node.stop()`, or until something is gone for good
+    node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails for good
 
-A message waits in the queue of its subscriber (section 6.3.3: one each, the least recently used one is next), is sent
-as a frame, and comes back as bursts that are joined. Where software is part of the system, its functions are called by
-the thread that brings the message: while one works, no more is taken from the hardware, which stops there, as at any
-accelerator that is not ready. What a function gives never waits, as it could wait for itself: where its queue to the
-hardware is full, a message is dropped and counted.
+A message waits in the queue of its subscriber (section 6.3.3: one queue each, the least recently used is next) and is
+sent as a frame. The response comes back as bursts, which are joined. If software is part of the system, the thread that
+brings a message calls its functions. While a function runs, nothing is taken from the hardware, which stalls as with
+any accelerator that is not ready. A function's output never waits for room, since it could wait for itself: if its
+queue to the hardware is full, a message is dropped and counted.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from fusesoc_firm.node.statistics import Statistics
 from fusesoc_firm.node.trace import Entry, Trace, converter_names
 from fusesoc_firm.node.transport.transport import Burst, Transport, TransportError, TransportResetError
 
-# How long one waits before it looks whether it is to end.
+# The interval at which waiting threads check whether to end.
 _POLL_SECONDS = 0.1
-# So often in a row a new transport may be gone before anything came from it.
+# The number of successive transports that may fail before they deliver anything.
 _MOST_RESTARTS = 5
-# So many lines on faults of the hardware; the others are counted.
+# The number of hardware faults that are reported; later ones are only counted.
 _MOST_REPORTS = 20
 
 
 class HardwareListener(Protocol):
-    """Hears what a transport has to say beside bursts; any thread may tell it."""
+    """Receives a transport's events other than bursts; any thread may call it."""
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
-        """Simulated hardware took the next one of the frames sent, in these cycles of clk."""
+        """Simulated hardware took the next sent frame in these cycles of clk."""
 
     def refused(self, converter: int | None) -> None:
-        """The hardware reports a fault of a converter, as `frame_error` counts them; None: of a frame's id."""
+        """The hardware reports a fault: of a converter, as `frame_error` counts them, or of a frame's id (None)."""
 
 
 OpenTransport = Callable[[HardwareListener], Transport]
@@ -52,11 +52,11 @@ OpenTransport = Callable[[HardwareListener], Transport]
 
 @dataclass(frozen=True)
 class NodeSettings:
-    """`depth` messages fit each queue; what a full one does is `overflow`.
+    """Each queue holds `depth` messages; `overflow` is its action when full.
 
-    At the end, what was received is processed: until the hardware has been silent for `settle` seconds, and does not
-    say that it still works, but for `drain` seconds at most. A transport that is gone is opened anew if it `restarts`.
-    `report` gets what people should read.
+    At the end, received messages are processed: until the hardware has been silent for `settle` seconds and does not
+    report work, but for `drain` seconds at most. If `restarts` is set, a failed transport is reopened.
+    `report` receives messages to the user.
     """
 
     depth: int = 10
@@ -76,7 +76,7 @@ class _Message:
 
 
 class _Hardware:
-    """The transport, from the moment it is opened until it is gone."""
+    """A transport from its opening to its failure or end."""
 
     def __init__(self, transport: Transport, description: NodeDescription) -> None:
         self.transport = transport
@@ -126,10 +126,10 @@ class Node:
     # --- the run ---------------------------------------------------------------------------------------------------
 
     def run(self, carriers: Mapping[int, Carrier]) -> bool:
-        """Work until `stop`, or a carrier ends; whether all that was received has been processed.
+        """Work until `stop` or the end of a carrier; return whether all received messages have been processed.
 
-        `carriers` have the topics of their version of ROS; they stay open. Raises `TransportError` or `CarrierError`
-        when one of them is gone for good.
+        `carriers` maps versions of ROS to the carriers of their topics; they stay open. Raises `TransportError` or
+        `CarrierError` if one of them fails for good.
         """
         self._carriers = carriers
         takers = [self._start(partial(self._take, carrier)) for carrier in carriers.values()]
@@ -145,7 +145,7 @@ class Node:
         self._queues.close()
         self.close()
         for thread in (sender, receiver, *takers):
-            # A taker's end is that of its carrier, which the caller closes.
+            # A taking thread ends with its carrier, which the caller closes.
             thread.join(_POLL_SECONDS)
         self._count_rest()
         if self._fault:
@@ -153,7 +153,7 @@ class Node:
         return self.statistics.unfinished == 0
 
     def stop(self) -> None:
-        """Let `run` end; any thread, or a signal's handler."""
+        """Make `run` return; any thread or signal handler may call it."""
         self._is_wanted_to_end.set()
 
     def close(self) -> None:
@@ -167,7 +167,7 @@ class Node:
         return thread
 
     def _fail(self, error: TransportError | CarrierError) -> None:
-        """End because of an error; that of something which is being closed does not count."""
+        """End because of an error; errors of a transport or carrier that is being closed do not count."""
         with self._lock:
             if not self._is_over.is_set():
                 self._fault = self._fault or error
@@ -181,7 +181,7 @@ class Node:
     # --- from topics to the hardware -------------------------------------------------------------------------------
 
     def _take(self, carrier: Carrier) -> None:
-        """What a carrier gives."""
+        """Handle the events of a carrier."""
         try:
             for event in carrier.receive():
                 if isinstance(event, Published):
@@ -199,7 +199,7 @@ class Node:
         self._put(taken.topic, taken.payload, taken.time_ns, None)
 
     def _put(self, number: int, payload: bytes, received_ns: int, timeout: float | None) -> None:
-        """Add a message to a queue; where a full one is to be waited for, `timeout` seconds at most."""
+        """Add a message to a queue; if a full queue blocks, wait `timeout` seconds at most."""
         item, entry = self._inputs[number], None
         counts = self.statistics.inputs[item.block]
         if self._trace and item.id is not None:
@@ -209,13 +209,13 @@ class Node:
             self._offered += 1
         is_there = self._queues.put(number, _Message(payload, entry), timeout)
         if not is_there and self._settings.overflow is Overflow.BLOCK:
-            # Nobody else counts it.
+            # No other thread counts it.
             with self._lock:
                 counts.dropped += 1
                 self._declined += 1
 
     def _waiting(self) -> int:
-        """How many messages are in queues, or being sent."""
+        """Return the number of messages in queues or being sent."""
         dropped = sum(self._queues.dropped(number) for number in range(len(self._inputs)))
         with self._lock:
             return self._offered - self._declined - self._handled - dropped
@@ -232,7 +232,7 @@ class Node:
                 self._handled += 1
 
     def _send_frame(self, subscriber: int, message: _Message) -> bool:
-        """Send a frame to the hardware; False when it is gone for good."""
+        """Send a frame to the hardware; return False if the hardware has failed for good."""
         hardware = self._hardware
         if self._trace and message.entry:
             self._trace.sending(message.entry)
@@ -245,7 +245,7 @@ class Node:
         return True
 
     def _run_software(self, block: str, payload: bytes) -> None:
-        """Let software have a message, and send what it makes of it on its way."""
+        """Pass a message to software, and send its outputs on their way."""
         if not self._software or block not in self._software.sources:
             return
         for name, made in self._software.take(block, payload):
@@ -275,7 +275,7 @@ class Node:
                 return
 
     def _is_at_rest(self, hardware: _Hardware) -> bool:
-        """Whether nothing is on its way any more, as far as the transport can know it."""
+        """Return whether all messages have been processed, as far as the transport can know."""
         if self._waiting() or hardware.joiner.unfinished:
             return False
         is_silent = time.monotonic() - self._last_traffic > self._settings.settle
@@ -324,12 +324,12 @@ class Node:
     # --- what hardware says of itself ------------------------------------------------------------------------------
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
-        """Simulated hardware took the next one of the frames sent; any thread."""
+        """Record that simulated hardware took the next sent frame; any thread."""
         if self._trace:
             self._trace.taken(first_cycle, last_cycle)
 
     def refused(self, converter: int | None) -> None:
-        """The hardware reports a fault of a converter; any thread."""
+        """Report a fault of a converter; any thread."""
         if converter is not None and converter in self._subscriber_names:
             block = self._subscriber_names[converter]
             self.statistics.inputs[block].refused += 1
@@ -341,12 +341,12 @@ class Node:
             self._report("the hardware refused a frame: " + ("its id" if converter is None else "a publisher's"))
 
     def _begin_anew(self, hardware: _Hardware, error: TransportError) -> bool:
-        """Open the transport anew if that is wanted; False if it is not, or does not help."""
+        """Reopen the transport if the settings allow it; return False if they do not, or if it fails."""
         with self._restarting:
             if self._is_over.is_set():
                 return False
             if hardware is not self._hardware:
-                # The other thread has done it.
+                # The other thread has reopened it.
                 return True
             hardware.transport.close()
             self._failed_restarts = 0 if hardware.has_answered else self._failed_restarts + 1
@@ -361,7 +361,7 @@ class Node:
             return True
 
     def _forget(self, transport: Transport, why: str) -> None:
-        """Go on with hardware that begins at this moment."""
+        """Continue with hardware that starts from reset; forget all messages in it."""
         self._report(f"{why}; it is started anew, and what was in it is lost")
         self.statistics.restarts += 1
         if self._trace:
@@ -370,7 +370,7 @@ class Node:
 
 
 class _Reporter:
-    """Passes on what people should read, but not without end: a broken link can say the same for hours."""
+    """Passes reports to the user, with a limit: a broken link can repeat the same fault for hours."""
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
@@ -385,5 +385,5 @@ class _Reporter:
 
 
 def _left(latest: float) -> float:
-    """The seconds until a time, which may be over."""
+    """Return the seconds until a time, or 0 if it is past."""
     return max(0.0, latest - time.monotonic())

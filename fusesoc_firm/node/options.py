@@ -1,4 +1,4 @@
-"""The command line of a node: its own options, and what is ROS's."""
+"""The command line of a node: its own options and those of ROS."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _REMAPPING = re.compile(r"[~/\w]+:=.*", re.DOTALL)
 
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
-    """The options of a node; what is left of a command line goes to `remappings`."""
+    """Add the options of a node to a parser; the rest of the command line is for `remappings`."""
     parser.add_argument("--name", metavar="NAME", help="the node's name (default: the system's)")
     parser.add_argument(
         "--qos",
@@ -55,7 +55,7 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
 
 
 def remappings(rest: Sequence[str], error: Callable[[str], object]) -> tuple[str, ...]:
-    """What a parser did not know, if all of it is ROS's; else `error` is told."""
+    """Return the arguments that the parser left, if all belong to ROS; otherwise call `error`."""
     if wrong := [argument for argument in rest if not _REMAPPING.fullmatch(argument)]:
         error(f"unrecognized arguments: {' '.join(wrong)}")
     return tuple(rest)

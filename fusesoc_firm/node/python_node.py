@@ -1,4 +1,4 @@
-"""The node of a system as a Python file: its table, and a call of what does the work."""
+"""Writes the node of a system as a Python file: its table, and a call of the code that does the work."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _TEMPLATE = "node/node.py"
 def python_node(
     loaded: LoadedSystem, ros: Middleware | None, specification: Path, folder: Path, paths: Sequence[Path] = ()
 ) -> dict[str, str]:
-    """The file, by its name in `folder`.
+    """Return the file by its name in `folder`.
 
-    Where the system has software, the node looks its functions up by the specification, and messages in `paths`: both
-    are named as they lie from the folder. Raises `InputError` if the system has no topic of `ros`.
+    If the system has software, the node finds its functions through the specification and its messages in `paths`; both
+    paths are relative to the folder. Raises `InputError` if the system has no topic of `ros`.
     """
     description = describe(loaded)
     if ros is not None and ros.number not in description.versions:
@@ -73,5 +73,5 @@ def _topic(topic: NodeTopic) -> dict[str, Any]:
 
 
 def _constant(message: str) -> str:
-    """The name of a definition's text: `GEOMETRY_MSGS_QUATERNION`."""
+    """Return the constant's name for a definition's text: `GEOMETRY_MSGS_QUATERNION`."""
     return identifier(*message.split("/")).upper()

@@ -1,13 +1,13 @@
 """Frames to the hardware: a queue for each subscriber, and a policy (docs/reference/host-queues.md).
 
     queues = SubscriberQueues(subscribers=3, capacity=10)          # least recently used
-    queues.put(subscriber, frame)                                  # any thread, a middleware's callback
+    queues.put(subscriber, frame)                                  # any thread, such as a callback of the middleware
     for subscriber, frame in queues:                               # the thread that owns the DMA, until `close`
         send(frame)
 
-Section 6.3.3, figure 6.4b. One queue for all, as a middleware has by default, lets a subscriber wait for all that came
-before. The policies are those of the hardware's schedulers, non-preemptive, as the host's stream has one order. The
-same in C++ is `firm/queues.hpp` in the folder `cpp` beside this file.
+Section 6.3.3, figure 6.4b. With one queue for all, the default of a middleware, each subscriber would wait for all
+earlier frames. The policies are those of the hardware's schedulers. They are non-preemptive, because the host's stream
+has one order. `cpp/firm/queues.hpp` is the same in C++.
 """
 
 from __future__ import annotations
@@ -24,42 +24,42 @@ Item = TypeVar("Item")
 
 
 class Policy(ABC):
-    """Which subscriber goes next: the one whose first frame has the smallest key, of equal ones the lowest index."""
+    """Chooses the next subscriber: the one whose first frame has the smallest key; among equals, the lowest index."""
 
     @abstractmethod
     def key(self, subscriber: int, arrival: int) -> int:
-        """The key of a subscriber whose first frame came at `arrival` (ns)."""
+        """Return the key of a subscriber whose first frame arrived at `arrival` (ns)."""
 
-    def served(self, subscriber: int) -> None:  # noqa: B027  (most policies need not know)
-        """Hear that a subscriber's frame was handed out."""
+    def served(self, subscriber: int) -> None:  # noqa: B027  (most policies ignore it)
+        """Note that a subscriber's frame was taken."""
 
 
 class FixedPriority(Policy):
     """The lowest index first."""
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """The index."""
+        """Return the index."""
         return subscriber
 
 
 class RoundRobin(Policy):
-    """The next index behind the one served last, cyclic; index 0 at first."""
+    """The next index after the one served last, cyclic; index 0 at first."""
 
     def __init__(self, subscribers: int) -> None:
         self._subscribers = subscribers
         self._first = 0
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """How far the index is from the one whose turn it is."""
+        """Return the distance of the index from the next in turn."""
         return (subscriber - self._first) % self._subscribers
 
     def served(self, subscriber: int) -> None:
-        """The turn goes on."""
+        """Pass the turn to the next index."""
         self._first = (subscriber + 1) % self._subscribers
 
 
 class LeastRecentlyUsed(Policy):
-    """The one that was served the longest time ago (section 4.2.1); at first, the lowest index.
+    """The subscriber served least recently (section 4.2.1); at first, the lowest index.
 
     A subscriber waits for at most `subscribers` - 1 others.
     """
@@ -69,58 +69,58 @@ class LeastRecentlyUsed(Policy):
         self._now = 0
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """When it was served last, counted in frames."""
+        """Return the time at which it was last served, counted in frames."""
         return self._served_at[subscriber]
 
     def served(self, subscriber: int) -> None:
-        """It is the one used most recently."""
+        """Record it as the most recently used."""
         self._served_at[subscriber] = self._now
         self._now += 1
 
 
 class EarliestDeadlineFirst(Policy):
-    """The one whose first frame has the earliest deadline: its arrival and the subscriber's relative deadline."""
+    """The subscriber whose first frame has the earliest deadline: its arrival plus the subscriber's time limit."""
 
     def __init__(self, deadlines: Sequence[int]) -> None:
-        """The relative deadlines, ns."""
+        """Take the relative deadlines, in ns."""
         self._deadlines = tuple(deadlines)
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """The absolute deadline."""
+        """Return the absolute deadline."""
         return arrival + self._deadlines[subscriber]
 
 
 class LeastSlackTime(Policy):
-    """The one whose first frame has the least slack: the time until its deadline less the time of its transfer."""
+    """The subscriber whose first frame has the least slack: the time until its deadline minus its transfer time."""
 
     def __init__(self, deadlines: Sequence[int], transfer_times: Sequence[int]) -> None:
-        """The relative deadlines and the times of a transfer, ns; as many of one as of the other."""
+        """Take the relative deadlines and the transfer times, in ns, one of each per subscriber."""
         pairs = zip(deadlines, transfer_times, strict=True)
         self._latest_starts = tuple(deadline - transfer for deadline, transfer in pairs)
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """The latest time to start; it is the slack but for the present time, which is everybody's."""
+        """Return the latest time to start; it differs from the slack by the present time, which is the same for all."""
         return arrival + self._latest_starts[subscriber]
 
 
 class Overflow(Enum):
-    """What `put` does with a frame for a queue that is full."""
+    """The action of `put` if a queue is full."""
 
-    DROP_OLDEST = "drop_oldest"  # the queue keeps the latest, as ROS' KEEP_LAST
-    DROP_NEWEST = "drop_newest"  # the queue stays as it is
-    BLOCK = "block"  # it waits until there is room
+    DROP_OLDEST = "drop_oldest"  # the queue keeps the latest, as ROS's KEEP_LAST does
+    DROP_NEWEST = "drop_newest"  # the queue is unchanged
+    BLOCK = "block"  # `put` waits for room
 
 
 class ClosedError(Exception):
-    """The queues are closed; to a reader: and empty."""
+    """The queues are closed and, for a reader, empty."""
 
 
 class EmptyError(Exception):
-    """No frame came in the time given."""
+    """No frame arrived in time."""
 
 
 class SubscriberQueues(Generic[Item]):
-    """Bounded queues, one a subscriber, read as one. Any number of threads may write and read."""
+    """Bounded queues, one per subscriber, read as one. Any number of threads may write and read."""
 
     def __init__(
         self,
@@ -130,7 +130,7 @@ class SubscriberQueues(Generic[Item]):
         overflow: Overflow = Overflow.DROP_OLDEST,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """`capacity` frames each; `policy` is least recently used if it is None; `clock` gives ns."""
+        """Create queues of `capacity` frames each; without a `policy`, least recently used; `clock` gives ns."""
         if subscribers < 1 or capacity < 1:
             raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 and more")
         self._policy = policy or LeastRecentlyUsed(subscribers)
@@ -143,10 +143,10 @@ class SubscriberQueues(Generic[Item]):
         self._changed = Condition()
 
     def put(self, subscriber: int, item: Item, timeout: float | None = None) -> bool:
-        """Add an item; whether it is in its queue now.
+        """Add an item; return whether it is queued.
 
-        It is not if it was the newest one to drop, or if there was no room for `timeout` seconds (None: for ever).
-        Raises `ClosedError`, also while it waits, and `IndexError` for a subscriber that there is not.
+        It is not if the full queue drops the newest, or if there was no room for `timeout` seconds (None: no limit).
+        Raises `ClosedError`, even during the wait, and `IndexError` for an unknown subscriber.
         """
         if not 0 <= subscriber < len(self._queues):
             raise IndexError(f"subscriber is {subscriber}; legal: 0 to {len(self._queues) - 1}")
@@ -166,9 +166,9 @@ class SubscriberQueues(Generic[Item]):
             return True
 
     def get(self, timeout: float | None = None) -> tuple[int, Item]:
-        """The subscriber that is next, and its first item; waits at most `timeout` seconds (None: for ever).
+        """Return the next subscriber and its first item; wait at most `timeout` seconds (None: no limit).
 
-        Raises `EmptyError` when the time is over, and `ClosedError` when all is read and nothing can come any more.
+        Raises `EmptyError` on timeout, and `ClosedError` when the queues are closed and empty.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._closed or any(self._queues), timeout)
@@ -184,7 +184,7 @@ class SubscriberQueues(Generic[Item]):
             return subscriber, item
 
     def __iter__(self) -> Iterator[tuple[int, Item]]:
-        """What `get` gives, until the queues are closed and all is read."""
+        """Yield the results of `get` until the queues are closed and empty."""
         while True:
             try:
                 found = self.get()
@@ -193,12 +193,12 @@ class SubscriberQueues(Generic[Item]):
             yield found
 
     def close(self) -> None:
-        """Take no more; what is there can still be read. Wakes everybody who waits."""
+        """Take no more items; queued ones can still be read. Wakes all waiting threads."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     def dropped(self, subscriber: int) -> int:
-        """How many items of a subscriber were dropped."""
+        """Return the number of dropped items of a subscriber."""
         with self._changed:
             return self._dropped[subscriber]

@@ -1,4 +1,4 @@
-"""A node from its options to its exit status; `firm live` and the generated node are this."""
+"""Runs a node from its options to its exit status, for `firm live` and the generated node."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fusesoc_firm.text.diagnostics import fail
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What a node is told when it is started. `versions` are those of ROS whose topics it has."""
+    """The options of a node at its start. `versions` are the versions of ROS that its topics belong to."""
 
     versions: tuple[int, ...]
     ros: RosOptions
@@ -36,7 +36,7 @@ class RunOptions:
 def run_options(
     arguments: argparse.Namespace, rest: Sequence[str], description: NodeDescription, ros: int | None = None
 ) -> RunOptions:
-    """The options that a command line means; `ros` is the one version wanted, if there is one. Raises `InputError`."""
+    """Return the options from a command line; `ros` selects a version, if given. Raises `InputError`."""
     if ros is not None and ros not in description.versions:
         known = " and ".join(map(str, description.versions))
         hint = "the hardware is made for the bytes of one version: 'middleware' of blocks and interfaces says which"
@@ -63,10 +63,10 @@ def run_options(
 def run_node(
     description: NodeDescription, open_transport: OpenTransport, options: RunOptions, loaded: LoadedSystem | None = None
 ) -> None:
-    """Be the node until Ctrl-C, SIGTERM or ROS ends it; a second Ctrl-C ends it at once.
+    """Run the node until Ctrl-C, SIGTERM or ROS ends it; a second Ctrl-C ends it at once.
 
-    `loaded` is the system, where it has software. Raises `InputError` if ROS or the hardware is gone, or if what was
-    received could not be processed in time.
+    `loaded` is the system, if it has software. Raises `InputError` if ROS or the hardware fails, or if received
+    messages could not be processed in time.
     """
     settings = replace(options.settings, report=_say)
     try:
@@ -74,7 +74,7 @@ def run_node(
             software = stack.enter_context(node_software(loaded, lambda error: _say(str(error)))) if loaded else None
             trace = stack.enter_context(closing(Trace(options.trace, description))) if options.trace else None
             node = Node(description, open_transport, settings, software, trace)
-            # What is left to be published leaves before the node says what it did.
+            # Published messages leave before the node prints its statistics.
             stack.callback(lambda: _say(node.statistics.text()))
             stack.callback(node.close)
             carriers = {}
@@ -90,7 +90,7 @@ def run_node(
 
 
 def _topics(carrier: RosCarrier, description: NodeDescription) -> str:
-    """What a node takes and gives, once it is there."""
+    """Describe the topics of a running node."""
     taken = [f"  {name} -> {description.subscribers[number].block}" for number, name in carrier.subscribers.items()]
     given = [f"  {description.publishers[number].block} -> {name}" for number, name in carrier.publishers.items()]
     return "\n".join([f"{description.name} is a node of {carrier.title}", *taken, *given])
@@ -98,7 +98,7 @@ def _topics(carrier: RosCarrier, description: NodeDescription) -> str:
 
 @contextmanager
 def _stopped_by_signals(node: Node) -> Iterator[None]:
-    """Within it, the first Ctrl-C or SIGTERM stops the node."""
+    """Within this context, the first Ctrl-C or SIGTERM stops the node."""
     known = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
     def stop(_: int, __: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""What a generated node in Python calls (`firm system node --language python`)."""
+"""The entry point of a generated node in Python (`firm system node --language python`)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from fusesoc_firm.tools.interrupts import accept_interrupts
 
 
 def main(description: NodeDescription, script: str = "", specification: str = "", paths: Sequence[str] = ()) -> None:
-    """Be the node, as the command line has it, and exit: 0 when it is asked to end, 1 for faults, 2 for a wrong line.
+    """Run the node as the command line says, and exit: 0 after a stop request, 1 for faults, 2 for a bad command line.
 
-    `specification` is that of a system with software, and `paths` hold its messages, both relative to the `script`.
+    For a system with software, `specification` is its file and `paths` are the folders of its messages, both relative
+    to the `script`.
     """
     accept_interrupts()
     parser = argparse.ArgumentParser(description=f"The node of the system {description.name}.")
@@ -30,7 +31,7 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
     try:
         folder = Path(script).resolve().parent
         places = [folder / path for path in paths]
-        # The folders of cores are among them.
+        # `places` includes the folders of message cores.
         loaded = load_beside(folder / specification, places, core_folders=lambda _: ()) if specification else None
         options = run_options(arguments, passed, description)
         run_node(description, at_address(arguments.transport), options, loaded)

@@ -1,4 +1,4 @@
-"""Software of a system in its node: payloads in, payloads out, the functions in between."""
+"""Runs a system's software in its node: payloads in, functions called, payloads out."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from fusesoc_firm.text.diagnostics import InputError, fail
 class NodeSoftware:
     """The blocks of type ROS-SW that have sources.
 
-    A message comes from a block, a topic's or a converter's, and what is made of it goes to others. `report` hears of
-    each fault, and the rest goes on: the call that failed is lost, with its messages.
+    A message enters from a block (a topic or a converter), and the functions' outputs leave to others. `report`
+    receives each fault. The failed call and its messages are lost; all else continues.
     """
 
     functions: Functions
@@ -33,7 +33,7 @@ class NodeSoftware:
     _lock: Lock = field(default_factory=Lock)
 
     def take(self, block: str, payload: bytes) -> list[tuple[str, bytes]]:
-        """Let a message in: what leaves because of it, each with the block that it goes to."""
+        """Take a message; return the resulting messages, each with the block that it goes to."""
         end, frame = self.sources[block]
         with self._lock:
             return list(self._run(block, end, frame, payload))
@@ -55,7 +55,7 @@ class NodeSoftware:
 
 @contextmanager
 def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) -> Iterator[NodeSoftware | None]:
-    """The software of a system, which may import its sources within; None if it has none.
+    """Load the software of a system; None if it has none. Its sources can be imported within this context.
 
     Raises `InputError`, also for a fault within a file.
     """
@@ -69,7 +69,7 @@ def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) ->
         topics = (*system.subscribers, *system.publishers, *software.subscribers)
         ends = {topic.block: (End(topic.block), topic.frame) for topic in topics}
         ends |= {topic.block: (end, topic.frame) for topic, end in sent_elsewhere(system).items()}
-        # What hardware sends to software elsewhere is a topic, and none of ours takes it.
+        # Hardware's output to software elsewhere is a topic, which no function here takes.
         outside = {topic.block for topic in taken}
         yield NodeSoftware(
             functions,

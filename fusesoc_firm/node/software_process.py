@@ -1,10 +1,11 @@
-"""A system's functions in a process of their own, which takes frames at its standard input and gives frames back.
+"""Runs a system's functions in a separate process, which reads frames from its standard input and writes frames back.
 
     python3 -m fusesoc_firm.node.software_process robot.yaml
 
-So a node in C++ runs blocks of type ROS-SW: to it they are a transport as the hardware is (`software:COMMAND`,
-docs/reference/node-library.md). The ids are the software's own, in the order of `software_ports`. The end of the input
-is the end of the process, with status 0, when all is answered. What the functions print goes to standard error.
+A node in C++ runs blocks of type ROS-SW in this way: it sees a transport, as for the hardware (`software:COMMAND`,
+docs/reference/node-library.md). The ids are the software's own, in the order of `software_ports`. At the end of the
+input, the process finishes all messages and exits with status 0. Output that the functions print goes to standard
+error.
 """
 
 from __future__ import annotations
@@ -30,10 +31,10 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
 @dataclass(frozen=True)
 class SoftwarePorts:
-    """What goes into a system's functions and comes out of them; the place in each is the id in frames.
+    """The inputs and outputs of a system's functions; the index in each is the id in frames.
 
-    In: the topics that they take, then the hardware's publishers that stand for their inputs. Out: the hardware's
-    subscribers that stand for their outputs, then the topics that they publish.
+    Inputs: the topics that they take, then the hardware's publishers that feed them. Outputs: the hardware's
+    subscribers that they feed, then the topics that they publish.
     """
 
     inputs: tuple[Topic, ...]
@@ -41,7 +42,7 @@ class SoftwarePorts:
 
 
 def software_ports(system: DerivedSystem) -> SoftwarePorts:
-    """The ports of the blocks with sources; others are software elsewhere."""
+    """Return the ports of the blocks with sources; blocks without sources are software elsewhere."""
     software = system.software
     here = {block.block for block in software.blocks if block.type.accelerator.sources}
     taken, given = set(), set()
@@ -60,9 +61,9 @@ def software_ports(system: DerivedSystem) -> SoftwarePorts:
 
 
 def serve(system: DerivedSystem, folder: Path, taken: BinaryIO, given: BinaryIO) -> None:
-    """Answer frames until the input ends. Raises `InputError` for a fault of a function, or of the frames' row.
+    """Process frames until the input ends. Raises `InputError` for a fault of a function, or of the stream of frames.
 
-    A payload that is no message is told on standard error, and the rest goes on.
+    A payload that is not a message is reported on standard error and skipped.
     """
     ports = software_ports(system)
     ids = {topic.block: number for number, topic in enumerate(ports.outputs)}
@@ -95,13 +96,13 @@ def _frames(row: BinaryIO, ids: int) -> Iterator[tuple[int, bytes]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command; its exit status."""
+    """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("spec", type=Path, help="the specification of the system")
     parser.add_argument("--path", type=Path, action="append", default=[], metavar="DIR", help="message definitions")
     parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
     given = parser.parse_args(arguments)
-    # Nothing but frames may come out there, whatever the functions print.
+    # Standard output carries frames only, whatever the functions print.
     frames = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     try:
@@ -111,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # Who asked is gone; nobody is left to be told.
+        # The reader has gone, so nobody is left to report to.
         return 1
     return 0
 

@@ -1,4 +1,4 @@
-"""What a node counts, and says when it ends."""
+"""The counts of a node, printed when it ends."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from fusesoc_firm.node.description import NodeDescription
 
 @dataclass
 class Input:
-    """Messages to the hardware, or to software: from a topic, or made by software."""
+    """Messages to the hardware or to software: from a topic, or made by software."""
 
     received: int = 0
     dropped: int = 0
     sent: int = 0
     refused: int = 0
-    """by the hardware, which found their frames broken"""
+    """rejected by the hardware, which found their frames broken"""
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Output:
 
 @dataclass
 class Statistics:
-    """Counts of a run, by block. `faults` are the bursts that no Manager sends, and the pulses of `id_error`."""
+    """Counts of a run, by block. `faults` are illegal bursts and pulses of `id_error`."""
 
     inputs: dict[str, Input] = field(default_factory=dict)
     outputs: dict[str, Output] = field(default_factory=dict)
@@ -37,18 +37,18 @@ class Statistics:
     software_faults: int = 0
     restarts: int = 0
     unfinished: int = 0
-    """messages that were still in queues, or frames of which a part had come, when the time to end was over"""
+    """messages still in queues, or incomplete frames, when the time to end was over"""
 
     @classmethod
     def of(cls, description: NodeDescription) -> Statistics:
-        """Nothing counted yet."""
+        """Return zero counts for a node."""
         return cls(
             {item.block: Input() for item in description.inputs},
             {item.block: Output() for item in description.outputs},
         )
 
     def text(self) -> str:
-        """A table for people."""
+        """Return a table for the user."""
         rows: list[tuple[str, ...]] = [("from", "received", "dropped", "sent", "refused")]
         rows += [
             (name, *map(str, (item.received, item.dropped, item.sent, item.refused)))

@@ -1,12 +1,12 @@
-"""The way of each message through a system: when it was where, in simulated time and on the wall's clock.
+"""Traces each message through a system: the time of each stage, in simulated time and by the wall clock.
 
     trace = Trace(path, description)
-    ...                                        # the node tells it what happens
+    ...                                        # the node reports its events
     trace.close()
 
-A row is a message from a subscriber to a publisher. A publisher's n-th message belongs to the n-th of each subscriber
-that its block gets something from, and the row is that of the one that came last: so it is for accelerators that answer
-every message with one. What a message went through as software is a row before, and one behind.
+A row is a message from a subscriber to a publisher. A publisher's n-th message belongs to the n-th message of each
+subscriber that feeds its block, and the row is that of the latest of them. This holds for accelerators that answer
+every message with one. Steps in software before and after the hardware are rows of their own.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Entry:
 
 @dataclass
 class _Answer:
-    """A message that came out of the hardware, with the one that led to it."""
+    """A message from the hardware, with the message that caused it."""
 
     entry: Entry | None
     publisher: int
@@ -61,7 +61,7 @@ class _Answer:
 
 @dataclass
 class _Ways:
-    """What is on its way: to the hardware, in it towards each publisher, and to each topic."""
+    """Messages under way: to the hardware, in it towards each publisher, and to each topic."""
 
     untaken: deque[Entry] = field(default_factory=deque)
     pending: dict[tuple[int, int], deque[Entry]] = field(default_factory=dict)
@@ -69,10 +69,10 @@ class _Ways:
 
 
 class Trace:
-    """Writes the table; any thread may tell it something. Its times count from when it was made."""
+    """Writes the table; any thread may report events. Times count from its creation."""
 
     def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
-        """Begin the file at `path`; `clock` gives ns. Raises `InputError`."""
+        """Create the file at `path`; `clock` gives ns. Raises `InputError`."""
         check_output(path)
         try:
             self._file = path.open("w", newline="", encoding="utf-8")
@@ -93,7 +93,7 @@ class Trace:
         self._start = clock()
 
     def sending(self, entry: Entry) -> None:
-        """A message is being sent to the hardware."""
+        """Record that a message is being sent to the hardware."""
         with self._lock:
             entry.number = next(self._numbers)
             self._ways.untaken.append(entry)
@@ -101,17 +101,17 @@ class Trace:
                 self._ways.pending.setdefault((entry.subscriber, publisher), deque()).append(entry)
 
     def sent(self, entry: Entry) -> None:
-        """The hardware, or a bounded buffer before it, has the message."""
+        """Record that the hardware, or a bounded buffer before it, has the message."""
         entry.sent_ns = self._clock()
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
-        """Simulated hardware took the next one of the messages sent."""
+        """Record that simulated hardware took the next sent message."""
         with self._lock:
             if self._ways.untaken:
                 self._ways.untaken.popleft().cycles = (first_cycle, last_cycle)
 
     def refused(self, subscriber: int) -> None:
-        """The hardware found a frame of a subscriber broken: no publisher answers it. It is the one taken last."""
+        """Record that the hardware rejected the frame of a subscriber that it took last: no publisher answers it."""
         with self._lock:
             for publisher in self._reached.get(subscriber, ()):
                 queue = self._ways.pending.get((subscriber, publisher))
@@ -120,7 +120,7 @@ class Trace:
                     queue.remove(taken[-1])
 
     def came(self, publisher: int, size: int, cycles: tuple[int, int] | None, *, is_published: bool) -> None:
-        """A message came out of the hardware. It `is_published` later, or is for software."""
+        """Record a message from the hardware. If `is_published`, it goes to a topic later, otherwise to software."""
         with self._lock:
             answer = _Answer(self._cause(publisher), publisher, size, cycles, self._clock())
             if is_published:
@@ -129,20 +129,20 @@ class Trace:
                 self._write(answer.entry, answer, None)
 
     def published(self, publisher: int, time_ns: int) -> None:
-        """The middleware has published the next message of a publisher."""
+        """Record that the middleware has published the next message of a publisher."""
         with self._lock:
             if answers := self._ways.unpublished.get(publisher):
                 answer = answers.popleft()
                 self._write(answer.entry, answer, time_ns)
 
     def forget(self) -> None:
-        """The hardware began anew: what was in it is lost."""
+        """Record that the hardware was reset and has lost its messages."""
         with self._lock:
             self._write_rest()
             self._ways = _Ways()
 
     def close(self) -> None:
-        """Write what got no answer, and end the file."""
+        """Write the messages without a response, and close the file."""
         with self._lock:
             self._write_rest()
             self._file.close()
@@ -183,7 +183,7 @@ class Trace:
         )
 
     def _differences(self, cycles: Iterable[int | None]) -> tuple[float | None, ...]:
-        """Cycles from beat to beat, and the time from the first one to the last one."""
+        """Return the cycles from beat to beat, and the time from the first to the last."""
         first_in, last_in, first_out, last_out = cycles
         whole = _minus(last_out, first_in)
         clock = self._description.clock_hz
@@ -192,7 +192,7 @@ class Trace:
 
 
 def converter_names(description: NodeDescription) -> tuple[dict[int, str], dict[int, str]]:
-    """What the converters are called, by their ids: subscribers, publishers."""
+    """Return the names of the converters by id: subscribers, publishers."""
     return (
         {item.id: item.block for item in description.inputs if item.id is not None},
         {item.id: item.block for item in description.outputs if item.id is not None},

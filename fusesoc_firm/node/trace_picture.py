@@ -1,4 +1,4 @@
-"""The ways of messages as a picture, with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
+"""Draws the table of a trace with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SUFFIXES = (".pdf", ".png", ".svg")
 
 _Row = dict[str, float | str | None]
 
-# What passes from one column to the next, on the wall's clock and in simulated time.
+# The stages between successive columns, by the wall clock and in simulated time.
 _WALL = (
     ("to the queue", "received_ns", "queued_ns"),
     ("queue and sending", "queued_ns", "sent_ns"),
@@ -32,7 +32,7 @@ _CYCLES = (
 )
 _ROW_INCHES = 2.6
 _WIDTH_INCHES = 11.0
-# Without the date and the random names that matplotlib puts into a file, the same table gives the same bytes.
+# Without a date and matplotlib's random names, the same table gives the same bytes.
 _SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
 _METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
@@ -42,9 +42,9 @@ _METADATA: dict[str, dict[str, None]] = {
 
 
 def draw_trace(table: Path, picture: Path) -> None:
-    """Draw a table as `Trace` writes it: a row of panels for each way, wall time beside simulated time.
+    """Draw a table that `Trace` has written: a row of panels for each way, wall time beside simulated time.
 
-    Raises `InputError` for a file that is none, a picture of another kind, and where matplotlib is missing.
+    Raises `InputError` for another kind of file, an unknown picture format, and if matplotlib is missing.
     """
     check_output(picture, SUFFIXES)
     ways = _ways(table)
@@ -69,7 +69,7 @@ def draw_trace(table: Path, picture: Path) -> None:
 def _draw(
     axis: Any, rows: Sequence[_Row], parts: Sequence[tuple[str, str, str]], scale: Callable[[float], float], unit: str
 ) -> None:
-    """Each message as a bar of its parts, one above the other; a part that began before the one below is left out."""
+    """Draw each message as a bar of its stages, stacked upwards; a stage that began before the one below is omitted."""
     whole = [row for row in rows if all(row[name] is not None for _, *names in parts for name in names)]
     axis.set_xlabel("message")
     axis.set_ylabel(unit)
@@ -87,7 +87,7 @@ def _draw(
 
 
 def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:
-    """The rows of each way, of the messages that came back."""
+    """Return the rows of each way, for the messages with a response."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)

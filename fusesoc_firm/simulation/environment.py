@@ -1,4 +1,4 @@
-"""What stands at a system's pins in its simulation: VHDL of the user's, such as motors behind a PWM output."""
+"""The environment at a system's pins in its simulation: the user's VHDL, such as motors driven by a PWM output."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from fusesoc_firm.text.naming import identifier
 def environment_files(
     paths: Mapping[Path, SourceRef | None], system: DerivedSystem
 ) -> dict[PurePosixPath, GeneratedFile]:
-    """The files of the environment as those of the simulation's core, in their order.
+    """Return the environment's files, in order, as files of the simulation core.
 
-    The last one is called after the entity that the test bench instantiates. Raises `InputError` for a file that cannot
-    be one of them.
+    The test bench instantiates the entity named like the last file. Raises `InputError` for a file that cannot be part
+    of the environment.
     """
     taken = {
         system.entity,

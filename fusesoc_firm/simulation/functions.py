@@ -1,7 +1,7 @@
-"""The functions of accelerators in software, and the messages on their way from one to the other.
+"""The functions of accelerators in software, and the messages on their way between them.
 
-A function is called when all its messages are there; each block of a type has its own, with its own state. A message
-takes the fields with it that its way carries, and a function's answer is what a middleware would make of it.
+A function is called when all its messages have arrived. Each block of a type has its own function with its own state. A
+message keeps only the fields that its connection carries. A function's result is converted as a middleware would do.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ Message = dict[str, Any]
 
 @contextmanager
 def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Iterator[None]:
-    """Within it, sources in `folder` can import each other. Raises `InputError` if one imports what is not listed."""
+    """Let sources in `folder` import each other. Raises `InputError` if one imports an unlisted file."""
     listed = {(folder / source).resolve(): item for item in accelerators for source in item.sources}
     owners = {path.parent: item for path, item in reversed(listed.items())}
     paths, known, writes = [*sys.path], {*sys.modules}, sys.dont_write_bytecode
-    # Behind all others: nothing of Python's own is hidden.
+    # After all other folders, so that they hide no module of Python's own.
     sys.path += map(str, owners)
-    # No __pycache__ beside the user's files.
+    # Write no __pycache__ beside the user's files.
     sys.dont_write_bytecode = True
     try:
         yield
@@ -53,7 +53,7 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
 
 
 def _imported(known: Collection[str], folders: Iterable[Path]) -> Iterator[tuple[str, Path, Path]]:
-    """The modules that are not `known` and come out of one of the folders, each with its file and the folder."""
+    """Yield the modules from one of the folders that are not `known`, each with its file and the folder."""
     for name in sorted(sys.modules.keys() - known):
         file = Path(getattr(sys.modules[name], "__file__", None) or "").resolve()
         first = name.partition(".")[0]
@@ -64,7 +64,7 @@ def _imported(known: Collection[str], folders: Iterable[Path]) -> Iterator[tuple
 
 @dataclass(frozen=True)
 class _Way:
-    """Where a message goes, with the fields that do."""
+    """The destination of a message, with the fields that are carried."""
 
     sink: End
     frame: Frame
@@ -72,9 +72,9 @@ class _Way:
 
 @dataclass
 class Functions:
-    """The blocks with sources, those that give before those that take, and the messages that wait at each end.
+    """The blocks with sources, producers before consumers, and the messages that wait at each end.
 
-    What comes to an end from several others belongs together, the first with the first.
+    Messages from several blocks to one end are combined in order: the first with the first, and so on.
     """
 
     blocks: list[AcceleratorBlock]
@@ -87,7 +87,7 @@ class Functions:
     def of(cls, software: Software, folder: Path, outside: Mapping[End, str] = MappingProxyType({})) -> Functions:
         """Load all functions. Raises `InputError`, also for a fault within a file.
 
-        What goes to a block without sources is dropped, unless `outside` has a name for it.
+        Messages to a block without sources are dropped, unless `outside` has a name for it.
         """
         here = {block.block: block for block in software.blocks if block.type.accelerator.sources}
         elsewhere = {block.block for block in software.blocks} - here.keys()
@@ -109,15 +109,15 @@ class Functions:
         return made
 
     def take(self, source: End, message: Message) -> list[tuple[str, Message]]:
-        """Let a message in: the messages that leave because of it, each with the block outside that it goes to.
+        """Take a message; return the resulting messages to other blocks, each with the block that it goes to.
 
-        After an `InputError`, `run` gives what is left of them: only the call that failed is lost.
+        After an `InputError`, `run` returns the remaining messages: only the failed call is lost.
         """
         self._send(source, message)
         return self.run()
 
     def run(self) -> list[tuple[str, Message]]:
-        """Call what has all its messages: what leaves because of it, as `take` gives it. Raises `InputError`."""
+        """Call each function whose messages are complete; return messages as `take` does. Raises `InputError`."""
         for block in self.blocks:
             ends = [End(block.block, side.prefix) for side in block.type.inputs]
             while all(map(self._is_there, ends)):
@@ -140,14 +140,14 @@ class Functions:
         return all(self.waiting[end].values())
 
     def _next(self, end: End) -> Message:
-        """The next message at an end, put together of its parts."""
+        """Return the next message at an end, combined from its parts."""
         message: Message = {}
         for queue in self.waiting[end].values():
             message = _joined(message, queue.popleft())
         return message
 
     def _answers(self, block: AcceleratorBlock, messages: Sequence[Message]) -> list[Message | None]:
-        """What a function gives for its messages: one for each output, or None."""
+        """Call a function with its messages; return a message or None for each output."""
         number = self.calls[block.block] = self.calls.get(block.block, -1) + 1
         when = f"message {number} to '{block.block}'"
         function, outputs = self.functions[block.block], block.type.outputs
@@ -167,7 +167,7 @@ def _load(block: AcceleratorBlock, folder: Path) -> UserFunction:
 
 
 def _answer(function: UserFunction, when: str, side: MessageSide, value: object) -> Message | None:
-    """What comes out of the middleware that an answer is given to."""
+    """Return a function's result after its conversion by the middleware."""
     if value is None:
         return None
     if not isinstance(value, Mapping):
@@ -190,7 +190,7 @@ def _expected(outputs: Sequence[MessageSide]) -> str:
 
 
 def _joined(one: Any, other: Any) -> Any:
-    """Two parts of a message as one; elements of an array may be in parts, too."""
+    """Combine two parts of a message; elements of an array may be in parts, too."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         both = {name: _joined(one[name], other[name]) for name in one.keys() & other.keys()}
         return {**one, **other, **both}

@@ -1,4 +1,4 @@
-"""The simulated host's two files: stimuli and expected frames as text (docs/reference/simulation-host.md)."""
+"""Writes the simulated host's two text files: stimuli and expected frames (docs/reference/simulation-host.md)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LABEL_WIDTH = 160
 
 
 def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter]) -> str:
-    """The stimulus file."""
+    """Return the stimulus file."""
     ids = {item.block: item.id for item in subscribers}
     lines: list[str] = []
     for stimulus in stimuli:
@@ -28,7 +28,7 @@ def stimulus_text(stimuli: Iterable[Stimulus], subscribers: Iterable[Converter])
 
 
 def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]) -> str:
-    """The expected file; padding may hold any byte."""
+    """Return the file of expected frames; padding may hold any byte."""
     ids = {item.block: item.id for item in publishers}
     lines: list[str] = []
     for response in responses:
@@ -41,14 +41,14 @@ def expected_text(responses: Iterable[Response], publishers: Iterable[Converter]
 
 
 def _hex_lines(frame: bytes, used: bytes | None) -> Iterator[str]:
-    """The frame's bytes in hex; one that is not used is written as `..`."""
+    """Yield the frame's bytes in hex; an unused byte is written as `..`."""
     digits = [f"{byte:02x}" if used is None or used[index] else ".." for index, byte in enumerate(frame)]
     for first in range(0, len(digits), _BYTES_A_LINE):
         yield "  " + " ".join(digits[first : first + _BYTES_A_LINE])
 
 
 def _label(topic: Topic, message: dict[str, Any]) -> str:
-    """Block, type and values on one line of plain ASCII, cut where it gets long."""
+    """Return block, type and values on one line of plain ASCII, truncated if it gets long."""
     values = " ".join(f"{name}={value}" for name, value in _values(message))
     label = f"{topic.block} {topic.frame.message} {values}".encode("ascii", "replace").decode()
     return label if len(label) <= _LABEL_WIDTH else label[: _LABEL_WIDTH - 3] + "..."
@@ -63,7 +63,7 @@ def _values(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _shown(value: Any) -> str:
-    """A value without blanks, but for those of its texts, which are in quotes; of arrays no more than a label holds."""
+    """Return a value without blanks, except in quoted texts; arrays are cut to the length of a label."""
     match value:
         case str():
             return json.dumps(value, ensure_ascii=False)

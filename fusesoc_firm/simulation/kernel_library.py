@@ -1,4 +1,4 @@
-"""Compiles the C++ of an HLS accelerator to the shared library that simulation calls."""
+"""Compiles the C++ of an HLS accelerator to the shared library that the simulation calls."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.render import render
 
 _COMPILER = "g++"
-# Results must not depend on the processor (no contraction to fused operations), nor the file on its build (no
+# The results must not depend on the processor (no contraction to fused operations), nor the file on its build (no
 # build id, no symbols that name temporary files).
 _FLAGS = (
     "-std=c++17",
@@ -26,20 +26,20 @@ _FLAGS = (
     "-shared",
     "-s",
     "-Wl,--build-id=none",
-    # A function that is nowhere defined is found here, not when the simulator loads the library.
+    # Find undefined functions here, not when the simulator loads the library.
     "-Wl,-z,defs",
-    # Names the files that were included; those of the system are left out.
+    # List the included files except the system's.
     "-MMD",
     "-Wno-unknown-pragmas",
 )
-# A file in a rule of make, and what is escaped in its name.
+# A file name in a rule of make, with its escapes.
 _WORD = re.compile(r"(?:\\ |\S)+")
 _ESCAPED = re.compile(r"\\([ #])|\$(?=\$)")
 _CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".c")
 
 
 def toolchain() -> dict[str, str]:
-    """Versions of the compiler and of the C library, without which the library may not be loaded elsewhere."""
+    """Return the versions of the compiler and of the C library: other versions may be unable to load the library."""
     try:
         shown = subprocess.run([_COMPILER, "--version"], capture_output=True, text=True, check=False).stdout
     except FileNotFoundError:
@@ -48,7 +48,7 @@ def toolchain() -> dict[str, str]:
 
 
 def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:
-    """The simulated kernel, and the library that it calls out of the simulator's work folder. Raises `InputError`."""
+    """Return the simulated kernel, and the library that it loads from the work folder. Raises `InputError`."""
     configuration = kernel_configuration(accelerator)
     library = library_name(accelerator)
     shim = render(SHIM_TEMPLATE, configuration)
@@ -59,7 +59,7 @@ def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, Genera
 
 
 def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
-    """The library's bytes: the same for the same sources, wherever they lie."""
+    """Return the library's bytes, which are the same for the same sources in any folder."""
     first, *others = accelerator.accelerator.sources
     name = accelerator.accelerator.name
     units = [str((folder / source).resolve()) for source in others if Path(source).suffix in _CPP_SUFFIXES]
@@ -67,7 +67,7 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary)
         (place / "kernel.cpp").write_text(shim, encoding="utf-8")
-        # An `assert` puts the name of its file into the library.
+        # An `assert` puts its file name into the library.
         options = ["-I", str(above), f"-ffile-prefix-map={folder.resolve()}=.", "-o", "kernel.so"]
         command = [_COMPILER, *_FLAGS, "kernel.cpp", *units, *options]
         try:
@@ -85,7 +85,7 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
 
 
 def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> None:
-    """Every included file must be a source: a change of one that is not would never be noticed."""
+    """Check that every included file is a source: changes to other files would go unnoticed."""
     sources = {(folder / source).resolve() for source in accelerator.accelerator.sources}
     included = {
         (place / _ESCAPED.sub(r"\1", word)).resolve()

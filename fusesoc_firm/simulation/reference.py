@@ -1,10 +1,10 @@
-"""The reference that a simulation is compared with: a Python file of the user with a function `respond`.
+"""Runs the model that a simulation is compared with: a user's Python file with a function `respond`.
 
     def respond(subscriber: str, message: dict) -> list[tuple[str, dict]]:
 
-It gets each message sent, with the name of the subscriber's block, and returns the messages that the system must
-send for it, each with the name of its publisher's block. It is called in the order of the stimuli and may keep state.
-What goes to an accelerator in software it returns, too (`software`).
+It gets each message sent, with the name of the subscriber's block. It returns the responses that the system must send,
+each with the name of its publisher's block. It is called in the order of the stimuli and may keep state. It also
+returns the messages to accelerators in software (`software`).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _ANSWER = "it returns a list of (publisher, message), the message a mapping of f
 
 @dataclass(frozen=True)
 class Response:
-    """A message that the system must send: its payload, and the same decoded.
+    """A message that the system must send: its payload and its decoded value.
 
-    `cause` is the number, from 0, of the stimulus that it answers, None if no single one is known.
+    `cause` is the number, from 0, of the stimulus that causes it, or None if no single one is known.
     """
 
     publisher: Topic
@@ -39,9 +39,9 @@ class Response:
 
 
 def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topic]) -> list[Response]:
-    """What the model in `path` answers to all stimuli. Raises `InputError`, also for a fault within the model.
+    """Return the responses of the model in `path` to all stimuli. Raises `InputError`, also for faults in the model.
 
-    It may answer in the name of each of `publishers`.
+    The model may respond for each of `publishers`.
     """
     model = _Model(load_function(path, "respond", "the model", "subscriber, message", _ANSWER))
     known = {publisher.block: publisher for publisher in publishers}
@@ -54,14 +54,14 @@ def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topi
 
 @dataclass(frozen=True)
 class _Model:
-    """The user's function. `when`, everywhere, is the message that it was asked for."""
+    """The user's function. In all methods, `when` names the message that it was called for."""
 
     respond: UserFunction
 
     def answer(self, stimulus: Stimulus, when: str) -> list[object]:
-        """What `respond` returns, as a list."""
+        """Return the result of `respond` as a list."""
         with self.respond.guarded(when):
-            # A copy, as the message itself is what the report shows.
+            # A copy, because reports show the message itself.
             answer: object = self.respond.call(stimulus.subscriber.block, deepcopy(stimulus.message))
             # A generator runs the user's code only here.
             items = list(answer) if isinstance(answer, Iterable) and not isinstance(answer, str | Mapping) else None
@@ -70,7 +70,7 @@ class _Model:
         return items
 
     def response(self, item: object, cause: int, when: str, known: Mapping[str, Topic]) -> Response:
-        """An item of an answer."""
+        """Return an item of the result as a response."""
         if not isinstance(item, tuple | list) or len(item) != 2:
             self.respond.fail(f"for {when}, 'respond' returned {item!r} in its list", _ANSWER)
         block, message = item

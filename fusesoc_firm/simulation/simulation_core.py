@@ -1,6 +1,6 @@
-"""The simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels.
+"""Generates the simulation of a system as a core: test bench, stimuli, expected frames and simulated kernels.
 
-A live one has no frames, but a test bench that does what another program requests over a pipe
+A live simulation has no frames. Its test bench serves the requests that another program sends over a pipe
 (docs/reference/transports.md).
 """
 
@@ -33,18 +33,18 @@ from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
 
-# A test bench is nothing that synthesis, or a translation to Verilog, should see.
+# Neither synthesis nor a translation to Verilog may use a test bench.
 _BENCH_TAGS = ("simulation",)
 
 
 def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """What the system depends on, the stimuli, the model, the environment, and what else code of the user reads."""
+    """Return the inputs of system, stimuli, model and environment, and the files that the user's code reads."""
     found = [*live_inputs(request, loaded), *_files(request)]
     return [*found, *_stimuli_files(_path(request, "stimuli")), _path(request, "model")]
 
 
 def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
-    """The core; it belongs beside the one that the same specification gives as a system. Raises `InputError`."""
+    """Return the core, which complements the system's core from the same specification. Raises `InputError`."""
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "sim")
     stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
@@ -69,12 +69,12 @@ def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
 
 
 def live_inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """What the system depends on, and the environment."""
+    """Return the inputs of the system and the environment."""
     return [*system_core.inputs(request, loaded), *_environment(request)]
 
 
 def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
-    """The core of a live simulation. Seed and rate of stalls are given where it is started. Raises `InputError`."""
+    """Return the core of a live simulation. Seed and rate of stalls are set at its start. Raises `InputError`."""
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "live")
     environment = environment_files(_environment(request), system)
@@ -88,7 +88,7 @@ def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
 
 
 def _surroundings(loaded: LoadedSystem, environment: Mapping[PurePosixPath, GeneratedFile]) -> dict[str, GeneratedFile]:
-    """What every test bench of a system needs: kernels that can be simulated, and the environment."""
+    """Return the files that every test bench of a system needs: simulation kernels and the environment."""
     files: dict[str, GeneratedFile] = {}
     for kernel in loaded.system.kernels:
         files |= kernel_files(kernel, loaded.folder)
@@ -96,14 +96,14 @@ def _surroundings(loaded: LoadedSystem, environment: Mapping[PurePosixPath, Gene
 
 
 def _entity(environment: Mapping[PurePosixPath, GeneratedFile]) -> str | None:
-    """The entity of the environment's files."""
+    """Return the entity of the environment's files."""
     return [*environment][-1].stem if environment else None
 
 
 def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None:
-    """Fail if an accelerator is written in what the simulator does not understand, or the host's end of a link is.
+    """Fail if the simulator does not support the language of an accelerator or of the host's end of a link.
 
-    A user is pointed to the `target` of the default one.
+    The hint points the user to the `target` of the default simulator.
     """
     known = SIMULATORS[simulator]
     if not known.reads_vhdl and system.clocks:
@@ -136,7 +136,7 @@ def _vhdl_bench(configuration: Context) -> dict[str, GeneratedFile]:
 def _verilog_bench(
     configuration: Context, system: DerivedSystem, frames: int = 0, beats: int = 0
 ) -> dict[str, GeneratedFile]:
-    """The bench, and the entity that holds system and environment if there is one."""
+    """Return the bench and, if there is an environment, the entity that connects it to the system."""
     has_environment = configuration["environment"] is not None
     bench = verilog_bench_configuration(configuration, system, frames, beats, has_environment=has_environment)
     files = {
@@ -151,7 +151,7 @@ def _verilog_bench(
 
 
 def _beats(expected: list[Response], width: int) -> int:
-    """The beats of all frames that are expected; so many can wait for the ends of their frames at most."""
+    """Return the beats of all expected frames, the most that can wait for the ends of their frames."""
     lanes = width // 8
     return sum(-(-(ID_BYTES + LENGTH_BYTES + len(response.payload)) // lanes) for response in expected) or 1
 
@@ -164,17 +164,17 @@ def _path(request: Request, parameter: str) -> Path:
 
 
 def _stimuli_files(path: Path) -> list[Path]:
-    """The files of stimuli, of which a bag may be a folder."""
+    """Return the files of stimuli; a bag may be a folder."""
     if path.is_file():
         return [path]
-    # A call that the store answers does without what the import of rosbags' readers costs.
+    # A hit must not pay for the import of rosbags' readers.
     from fusesoc_firm.message.bag_reader import bag_files
 
     return bag_files(path)
 
 
 def _environment(request: Request) -> dict[Path, SourceRef | None]:
-    """The files of the environment, each with its place in the requesting core."""
+    """Return the files of the environment, each with its place in the requesting core."""
     return {request.files_root / file: source for file, source in request.listed("environment").items()}
 
 

@@ -1,11 +1,11 @@
-"""From a specification to a simulator that can be started: built by FuseSoC, and by Edalize's makefile.
+"""Builds a simulator from a specification, with FuseSoC and Edalize's makefile.
 
     built = build_simulator(Path("robot.yaml"))
     with Simulator(built.command(seed=7), built.folder) as simulator:           # node/transport/simulator.py
         ...
 
-Which core describes the system is looked up beside the specification. Where none does, one is written for it, in the
-folder of the build. A second call builds what has changed.
+The core that describes the system is searched for beside the specification. If there is none, one is written to the
+build folder. A second call rebuilds only what has changed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _SHOWN_LINES = 20
 
 @dataclass(frozen=True)
 class CoreSources:
-    """What a core that is written for a specification is to say beside it; one that is there says so itself."""
+    """The content of a core written for a specification; an existing core takes precedence."""
 
     paths: Sequence[Path] = ()
     distro: str = ""
@@ -52,19 +52,19 @@ class CoreSources:
 
 @dataclass(frozen=True)
 class BuiltSimulator:
-    """A simulator and the folder it must be started in."""
+    """A simulator and the folder in which it must be started."""
 
     tool: str
     folder: Path
     words: tuple[str, ...] = field(repr=False)
 
     def command(self, *, seed: int = 1, stall_percent: int = 0) -> list[str]:
-        """What starts it in `folder`; the streams stall in `stall_percent` of the cycles, as `seed` has it."""
+        """Return the command to start it in `folder`; `seed` chooses the `stall_percent` of cycles with stalls."""
         mark = _live(self.tool).parameter
         return [*self.words, f"{mark}SEED={seed}", f"{mark}STALL_PERCENT={stall_percent}"]
 
     def script(self, *, seed: int = 1, stall_percent: int = 0) -> Path:
-        """A program that starts it from any folder."""
+        """Return a program that starts it from any folder."""
         path = self.folder / f"run-simulator-seed{seed}-stall{stall_percent}"
         command = shlex.join(self.command(seed=seed, stall_percent=stall_percent))
         text = "#!/bin/sh\n# The simulated system at the end of a pipe: descriptors 3 and 4.\n"
@@ -76,10 +76,10 @@ class BuiltSimulator:
 def build_simulator(
     spec: Path, tool: str | None = None, *, build_root: Path | None = None, sources: CoreSources | None = None
 ) -> BuiltSimulator:
-    """Build a simulator of the system of a specification, or what of it has changed. Raises `InputError`.
+    """Build a simulator of a specification's system, or rebuild its changed parts. Raises `InputError`.
 
-    `build_root` is shared by all systems and tools; its default is a folder of the user's cache. `sources` count where
-    no core beside the specification names it.
+    All systems and tools share `build_root`; its default is a folder of the user's cache. `sources` applies only if no
+    core beside the specification names it.
     """
     tool = tool or default_simulator(is_live=True)
     _live(tool)
@@ -98,14 +98,14 @@ def build_simulator(
         except InputError:
             if is_new:
                 raise
-            # A library may know files that are gone.
+            # A library may refer to deleted files.
             shutil.rmtree(work)
             _build(spec, core, tool, work)
         return BuiltSimulator(tool, work, tuple(_words(work, tool)))
 
 
 def _write_core(spec: Path, folder: Path, sources: CoreSources) -> CoreFile:
-    """A core for a specification that has none."""
+    """Write a core for a specification that has none."""
     paths = [path.absolute() for path in sources.paths]
     loaded = load_beside(spec, paths, sources.distro or None, core_folders=sources.core_folders)
     system = loaded.system
@@ -122,7 +122,7 @@ def _write_core(spec: Path, folder: Path, sources: CoreSources) -> CoreFile:
 
 
 def _build_folder(spec: Path, tool: str, root: Path) -> Path:
-    """A folder of its own for each specification and tool; the name of its file helps people."""
+    """Return a separate folder for each specification and tool; the specification's name is in it for readability."""
     digest = hashlib.sha256(str(spec).encode()).hexdigest()[:12]
     folder = root.absolute() / f"{_short_name(spec)}-{digest}-{tool}"
     try:
@@ -133,12 +133,12 @@ def _build_folder(spec: Path, tool: str, root: Path) -> Path:
 
 
 def _short_name(spec: Path) -> str:
-    """What a specification's file is called, without the characters that make and simulators do not take in a path."""
+    """Return a specification's file name without the characters that make and simulators reject in a path."""
     return re.sub(r"[^A-Za-z0-9_.+-]", "_", spec.stem).lstrip("-")[:60]
 
 
 def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
-    """Have FuseSoC set the target up, and make what it says."""
+    """Let FuseSoC set up the target, and run make."""
     targets, target = core.section("targets"), "live" if tool == default_simulator(is_live=True) else f"live_{tool}"
     if target not in targets:
         fail(f"{core.path} has no target '{target}'", hint=f"firm system core {spec}")
@@ -153,12 +153,12 @@ def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
 
 
 def _project_folder(spec: Path) -> Path:
-    """Where FuseSoC finds the configuration of the user's project: above the specification, else where we are."""
+    """Return the folder with FuseSoC's configuration: above the specification, otherwise the current folder."""
     return next((folder for folder in spec.parents if (folder / "fusesoc.conf").is_file()), Path.cwd())
 
 
 def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
-    """Run a step of the build; what it printed."""
+    """Run a step of the build; return its output."""
     done = subprocess.run(
         command,
         cwd=folder,
@@ -178,12 +178,12 @@ def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
 
 
 def _flow(work: Path) -> Any:
-    """What FuseSoC says about the build."""
+    """Return FuseSoC's description of the build."""
     return yaml.safe_load(next(work.glob("*.eda.yml")).read_text(encoding="utf-8"))
 
 
 def _words(work: Path, tool: str) -> list[str]:
-    """What starts the simulator in its folder."""
+    """Return the command that starts the simulator in its folder."""
     if not (start := _live(tool).started_by):
         return [str(work / f"V{_flow(work)['toplevel']}")]
     steps = _run(work, ["make", "--file=Makefile", "--dry-run", "run"], work).split("\n")
@@ -191,7 +191,7 @@ def _words(work: Path, tool: str) -> list[str]:
 
 
 def _live(tool: str) -> Live:
-    """How the tool simulates live. Raises `InputError` if it does not."""
+    """Return the tool's support for live simulation. Raises `InputError` if it has none."""
     if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
         fail(f"there is no simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
     return live

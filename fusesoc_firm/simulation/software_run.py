@@ -1,9 +1,9 @@
-"""The software of a system in its simulation: the user's functions, run while the simulation is generated.
+"""Runs the software of a system for its simulation: the user's functions run while the simulation is generated.
 
-What hardware sends to a block in software is what the model says. What such a block sends to hardware becomes a
-stimulus, behind the one that led to it. What it sends to a publisher never meets the hardware, and is compared here.
+The model supplies the messages from hardware to a block in software. A message from such a block to hardware becomes a
+stimulus after the one that caused it. A message from it to a publisher bypasses the hardware and is compared here.
 
-A block without sources stands for software elsewhere: the stimuli hold what it sends.
+A block without sources is software elsewhere: the stimuli hold its messages.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 @dataclass(frozen=True)
 class Traffic:
-    """All that the hardware is sent, in this order, and all that it must send, in the order of each publisher."""
+    """All messages to the hardware in order, and all messages that it must send, in the order of each publisher."""
 
     stimuli: list[Stimulus] = field(default_factory=list)
     responses: list[Response] = field(default_factory=list)
 
 
 def stimulated(system: DerivedSystem) -> list[Topic]:
-    """What stimuli may hold: all that enters the system, but for what its own software sends."""
+    """Return the topics of stimuli: all inputs of the system except those from its own software."""
     converters = [item for item in system.subscribers if item.software is None]
     blocks = {item.block for item in converters}
     topics = [item for item in system.software.subscribers if item.block not in blocks]
@@ -41,7 +41,7 @@ def stimulated(system: DerivedSystem) -> list[Topic]:
 
 
 def answered(system: DerivedSystem) -> list[Topic]:
-    """What a model may say: all that leaves hardware or software, and what goes to accelerators within."""
+    """Return the topics of a model: all outputs of hardware or software, and all inputs of software."""
     found: dict[str, Topic] = {item.block: item for item in (*system.publishers, *system.software.publishers)}
     for block in (*system.accelerators, *system.software.blocks):
         for side in block.type.inputs:
@@ -51,9 +51,9 @@ def answered(system: DerivedSystem) -> list[Topic]:
 
 
 def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> Traffic:
-    """What goes to the hardware and comes back if its software, whose sources lie in `folder`, does its part.
+    """Return the messages to and from the hardware when its software, with sources in `folder`, takes part.
 
-    Raises `InputError` for what is missing in stimuli or model, and for what software does wrong.
+    Raises `InputError` for messages missing in stimuli or model, and for faults of the software.
     """
     _check_complete(system, stimuli, responses)
     caused: dict[int | None, list[Response]] = {}
@@ -68,12 +68,12 @@ def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], re
 
 
 def sent_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
-    """The outputs of software that is not here."""
+    """Return the outputs of software elsewhere."""
     return _elsewhere(system, lambda type_: type_.outputs)
 
 
 def taken_elsewhere(system: DerivedSystem) -> dict[Topic, End]:
-    """The inputs of software that is not here."""
+    """Return the inputs of software elsewhere."""
     return _elsewhere(system, lambda type_: type_.inputs)
 
 
@@ -88,7 +88,7 @@ def _elsewhere(system: DerivedSystem, sides: Callable[[AcceleratorType], Iterabl
 
 
 def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> None:
-    """Raise `InputError` if stimuli or model leave out all that somebody waits for."""
+    """Raise `InputError` if stimuli or model contain no message for a topic that software waits for."""
     faults = Diagnostics()
     sent = {stimulus.subscriber.block for stimulus in stimuli}
     for topic, end in sent_elsewhere(system).items():
@@ -106,7 +106,7 @@ def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], response
 
 @dataclass
 class _Run:
-    """A run of the software: the hardware's traffic so far, and what went from software to publishers."""
+    """A run of the software: the hardware's traffic so far, and the messages from software to publishers."""
 
     system: DerivedSystem
     functions: Functions
@@ -126,7 +126,7 @@ class _Run:
         return {item.block: way_to(item.block, self.system) for item in self.system.publishers}
 
     def take(self, stimulus: Stimulus, responses: Sequence[Response]) -> None:
-        """Send a message, and have software answer it and what the hardware sends for it."""
+        """Send a message, and run the software for it and for the responses of the hardware."""
         block = stimulus.subscriber.block
         if block in self._subscribers and block not in self._ends:
             self.traffic.stimuli.append(stimulus)
@@ -146,7 +146,7 @@ class _Run:
                 self.published.setdefault(name, []).append(given)
 
     def _cause(self, publisher: str) -> int | None:
-        """The last message so far on the way to a publisher."""
+        """Return the last message so far on the path to a publisher."""
         stimuli = self.traffic.stimuli
         way = self._ways[publisher]
         numbers = (number for number in reversed(range(len(stimuli))) if stimuli[number].subscriber.block in way)
@@ -154,7 +154,7 @@ class _Run:
 
 
 def way_to(publisher: str, system: DerivedSystem) -> set[str]:
-    """The blocks in hardware that a publisher's message comes from."""
+    """Return the blocks in hardware that a publisher's message derives from."""
     found: set[str] = set()
     new = {publisher}
     while new:
@@ -164,7 +164,7 @@ def way_to(publisher: str, system: DerivedSystem) -> set[str]:
 
 
 def _check_published(system: DerivedSystem, published: dict[str, list[Message]], responses: Sequence[Response]) -> None:
-    """Compare what software sends to publishers with what the model says."""
+    """Compare the messages from software to publishers with the model."""
     for topic in system.software.publishers:
         wanted = [response for response in responses if response.publisher.block == topic.block]
         found = published.get(topic.block, [])
@@ -180,7 +180,7 @@ def _check_published(system: DerivedSystem, published: dict[str, list[Message]],
 
 
 def _differences(one: Any, other: Any, path: str) -> Iterator[tuple[str, Any, Any]]:
-    """The values in which two messages differ, each with its path."""
+    """Yield the differing values of two messages, each with its path."""
     if isinstance(one, Mapping):
         for name, value in one.items():
             yield from _differences(value, other[name], f"{path}.{name}" if path else name)

@@ -1,10 +1,10 @@
-"""Messages to send to a system, out of a YAML file or a recorded bag.
+"""Reads the messages to send to a system from a YAML file or a recorded bag.
 
 A YAML file is a list; each item names the subscriber's block and gives its message:
 
     - QuaternionToEuler_sub: {x: 0.0, y: 0.0, z: 0.0, w: 1.0}
 
-Fields that the subscriber has no port for may be left out; they are sent as their defaults, zero or empty.
+Fields for which the subscriber has no port may be omitted; they are sent as their defaults, zero or empty.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from fusesoc_firm.text.diagnostics import Diagnostics, fail, nearest
 from fusesoc_firm.text.yaml_text import LARGE, YamlText, is_null, kind, read_yaml
 
 _YAML_SUFFIXES = (".yaml", ".yml")
-# Subscribers that are named where there is no file.
+# The number of subscribers named in the message about a missing file.
 _SHOWN = 3
 
 
 @dataclass(frozen=True)
 class Stimulus:
-    """A message for a subscriber: its payload as the middleware serialises it, and the same decoded."""
+    """A message for a subscriber: its payload, as serialised by the middleware, and its decoded value."""
 
     subscriber: Topic
     payload: bytes
@@ -38,7 +38,7 @@ class Stimulus:
 
 
 def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
-    """All messages of a file or bag, in its order. Raises `InputError`; a file without a message is one, too."""
+    """Return all messages of a file or bag in order. Raises `InputError`, also for a file without messages."""
     if not path.exists():
         fields = "{<field>: <value>, ...}"
         items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])
@@ -46,7 +46,7 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     if path.suffix in _YAML_SUFFIXES:
         stimuli = _from_yaml(path, subscribers)
     else:
-        # A call that the store answers does without what the import of rosbags' readers costs.
+        # A hit must not pay for the import of rosbags' readers.
         from fusesoc_firm.bags.routes import read_bag
         from fusesoc_firm.message.bag_reader import BAGS
 
@@ -77,7 +77,7 @@ def _from_yaml(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
 
 
 def _item(text: YamlText, node: yaml.Node, known: dict[str, Topic], faults: Diagnostics) -> Stimulus | None:
-    """One item of the list; None, with its faults noted, if it is no message."""
+    """Return one item of the list; None, with its faults noted, if it is not a message."""
     if not isinstance(node, yaml.MappingNode) or len(node.value) != 1:
         faults.error("a stimulus is one block with its message: '- <subscriber>: {...}'", text.source(node))
         return None

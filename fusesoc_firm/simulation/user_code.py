@@ -1,4 +1,4 @@
-"""Python of the user: a function out of a file, and whatever goes wrong in it shown at its own line."""
+"""Loads a function from a user's Python file, and reports exceptions in it at the file's own lines."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MODULE = "_user_code"
 
 @dataclass(frozen=True)
 class UserFunction:
-    """A function and its file; in messages they are called `what`, such as "the model"."""
+    """A function and its file; messages to the user call them `what`, such as "the model"."""
 
     path: Path
     what: str
@@ -26,24 +26,24 @@ class UserFunction:
 
     @contextmanager
     def guarded(self, when: str) -> Iterator[None]:
-        """Within it the function runs, for `when`: what it raises becomes an `InputError`."""
+        """Run the function within this context, for `when`: its exceptions become an `InputError`."""
         try:
             yield
         except (Exception, SystemExit) as error:  # noqa: BLE001 - the user's code may raise anything
             _fail_in(self.path, self.what, error, f" for {when}", self._line())
 
     def fail(self, message: str, hint: str = "") -> NoReturn:
-        """Report a fault of what the function returned where the function stands."""
+        """Report a fault in the function's result, at the line of the function."""
         fail(message, _place(self.path, self._line()), hint)
 
     def _line(self) -> int:
-        """The function's line; 1 if it is none of the file's own."""
+        """Return the function's line; 1 if the file does not define it."""
         code = getattr(self.call, "__code__", None)
         return code.co_firstlineno if code is not None and code.co_filename == str(self.path) else 1
 
 
 def load_function(path: Path, name: str, what: str, parameters: str, hint: str) -> UserFunction:
-    """The function `name` of a file. Raises `InputError`; `parameters` and `hint` say how it would be right."""
+    """Load the function `name` of a file. Raises `InputError`; `parameters` and `hint` describe the correct form."""
     spec = importlib.util.spec_from_file_location(_MODULE, path)
     if spec is None or spec.loader is None or not path.is_file():
         fail(
@@ -51,9 +51,9 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
             hint=f"it is a Python file (.py) with a function '{name}({parameters})'; {hint}",
         )
     module = importlib.util.module_from_spec(spec)
-    # Dataclasses, for one, look their module up.
+    # Dataclasses, for example, look up their module.
     sys.modules[_MODULE] = module
-    # No __pycache__ beside the user's file.
+    # Write no __pycache__ beside the user's file.
     writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         spec.loader.exec_module(module)
@@ -68,7 +68,7 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
 
 
 def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: int = 1) -> NoReturn:
-    """Report an exception at the file's own line that led to it, at the line `otherwise` if there is none."""
+    """Report an exception at the line of the file that led to it, or at the line `otherwise` if there is none."""
     text = f": {error}" if str(error) else ""
     message = f"{what} raised {type(error).__name__}{when}{text}"
     if isinstance(error, SyntaxError) and error.filename == str(path):

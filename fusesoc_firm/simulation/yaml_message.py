@@ -1,7 +1,7 @@
-"""A message written in YAML: its values as the message's types want them, each fault at its own place.
+"""Reads a message written in YAML, checks each value against its type, and reports each fault at its place.
 
-The types of the message decide what a value is, not YAML: `1e-3` is text to PyYAML, and `1` an integer, but both are
-right for a float64.
+The message's types determine the values, not YAML: `1e-3` is text to PyYAML and `1` an integer, but both are legal for
+a float64.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
 class _Branch:
     """A field: each of its elements is a value of `type`, a `text`, or a message of `fields`.
 
-    An array of fixed size has `count` elements, one of variable size is an `array`. It must be given if `is_used`, or
-    if any of its `fields` is.
+    An array of fixed size has `count` elements; one of variable size is an `array`. A field is required if it `is_used`
+    or if any of its `fields` is.
     """
 
     count: int | None = None
@@ -40,7 +40,7 @@ class _Branch:
     is_used: bool = False
 
     def at(self, path: Path) -> _Branch:
-        """The field that a path leads to."""
+        """Return the field at a path."""
         branch = self
         for step in path:
             branch = branch.fields.setdefault(step.name, _Branch(step.count))
@@ -48,14 +48,14 @@ class _Branch:
 
     @property
     def is_needed(self) -> bool:
-        """Whether somebody has a port for it or for something in it."""
+        """Return whether a port exists for the field or a part of it."""
         return self.is_used or any(branch.is_needed for branch in self.fields.values())
 
 
 def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnostics) -> dict[str, Any]:
-    """The message of `frame` that a node holds; what does not fit is noted and left out.
+    """Return the message of `frame` that a node holds; faults are noted and their values omitted.
 
-    Fields that are not used may be missing.
+    Unused fields may be missing.
     """
     if is_null(node) and not frame.names:
         return {}
@@ -85,14 +85,14 @@ def _tree(frame: Frame) -> _Branch:
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads one message; `name` is what it is called in faults of the whole."""
+    """Reads one message; `name` names it in faults of the whole message."""
 
     text: YamlText
     faults: Diagnostics
     name: str
 
     def message(self, node: yaml.Node, branch: _Branch, path: str) -> dict[str, Any]:
-        """A message at `path`, which is empty for the whole."""
+        """Return the message at `path`, which is empty for the whole."""
         what = f"'{path}'" if path else f"a {self.name}"
         if not isinstance(node, yaml.MappingNode):
             fields = ", ".join(branch.fields)
@@ -157,7 +157,7 @@ class _Reader:
 
 
 def _value(text: str, type_: WireType) -> bool | int | float:
-    """The value of a word. Raises `ValueError` that says what is legal."""
+    """Return the value of a word. Raises `ValueError` with the legal values."""
     if type_.code == "?":
         return _boolean(text)
     return _float(text, type_) if type_.code in "fd" else _integer(text, type_)
@@ -176,7 +176,7 @@ def _integer(text: str, type_: WireType) -> int:
     least, most = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if is_signed else (0, 2**bits - 1)
     legal = f"legal here: {least} to {most}"
     try:
-        # Not `017`, which is 15 to YAML and 17 to most people.
+        # This rejects `017`, which YAML reads as 15 and most people as 17.
         value = int(text, 0)
     except ValueError:
         raise ValueError(legal) from None

@@ -1,4 +1,4 @@
-"""Many messages: which ones, each layout once, and what came of them."""
+"""A campaign: selects messages, verifies each layout once, and collects the results."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fusesoc_firm.verify.task import Result, Task, Verdict, verify
 
 @dataclass(frozen=True)
 class Settings:
-    """How messages are verified."""
+    """The settings of a verification."""
 
     width: int = 8
     stimuli: int = 3
@@ -30,9 +30,9 @@ class Settings:
 
 @dataclass(frozen=True)
 class Entry:
-    """A message and what came of it.
+    """A message and its result.
 
-    `same_as` is the message of the same layout that was verified for it; `statistics` is None for one that is no legal
+    `same_as` is the message with the same layout that was verified instead; `statistics` is None for an illegal
     definition.
     """
 
@@ -44,10 +44,10 @@ class Entry:
 
 
 def select(library: MessageLibrary, patterns: Sequence[str]) -> list[MessageName]:
-    """The messages that names or patterns with `*` and `?` mean, all if there is none; sorted.
+    """Return the sorted messages that names, or patterns with `*` and `?`, select; all if there are no patterns.
 
-    A service or an action means its messages. Raises `InputError` for a name or a pattern that means none, and for
-    every fault in what a name leads to.
+    A service or an action selects its messages. Raises `InputError` for a name or pattern without a match, and for
+    every fault in the definitions of a named message.
     """
     if not patterns:
         return library.names()
@@ -76,7 +76,7 @@ def _named(library: MessageLibrary, full_name: str) -> Sequence[MessageName]:
 
 
 def run(library: MessageLibrary, names: Iterable[MessageName], settings: Settings, workers: Workers) -> Iterator[Entry]:
-    """Verify messages; an entry for each, as they are done. Raises `InputError` if no message can be verified here."""
+    """Verify messages; yield an entry for each as it is done. Raises `InputError` if none can be verified here."""
     tasks = _Tasks(library, settings)
     for task, result in workers.run(verify, tasks.of(names)):
         yield from tasks.finished
@@ -87,12 +87,12 @@ def run(library: MessageLibrary, names: Iterable[MessageName], settings: Setting
 
 @dataclass
 class _Tasks:
-    """Makes a task of the first message of each layout, and knows the others of that layout."""
+    """Makes a task of the first message of each layout, and keeps the others with the same layout."""
 
     library: MessageLibrary
     settings: Settings
     finished: list[Entry] = field(default_factory=list)
-    """What no task was made of: refused definitions, and those whose layout was already verified."""
+    """Entries without a task: refused definitions, and messages whose layout was already verified."""
     _first: dict[Any, MessageName] = field(default_factory=dict)
     _waiting: dict[MessageName, list[MessageName]] = field(default_factory=dict)
     _results: dict[MessageName, Result] = field(default_factory=dict)
@@ -116,7 +116,7 @@ class _Tasks:
                 self._waiting.setdefault(first, []).append(name)
 
     def entries(self, task: Task, result: Result) -> Iterator[Entry]:
-        """What a result says of the message and of all that wait for it."""
+        """Yield the entries of a task's message and of all messages that wait for it."""
         self._results[task.name] = result
         yield Entry(task.name, task.ros, result, self._statistics[task.name])
         for name in self._waiting.pop(task.name, ()):

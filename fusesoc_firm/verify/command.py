@@ -1,4 +1,4 @@
-"""`firm message verify`: the campaign with a progress bar, a summary, and files for what failed."""
+"""`firm message verify`: the campaign with a progress bar, a summary, and the files of failed messages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SHOWN = 20
 
 @dataclass(frozen=True)
 class Places:
-    """Where the work is done and where its results go; `command` begins a command that repeats a message."""
+    """The folders for work and results; `command` is the beginning of a command that repeats a message."""
 
     jobs: int | None = None
     cluster: str | None = None
@@ -38,7 +38,7 @@ class Places:
 
 
 def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: Settings, places: Places) -> None:
-    """Verify messages and print what came of it.
+    """Verify messages and print the results.
 
     Raises `InputError` if one fails, or if none could be verified.
     """

@@ -1,4 +1,4 @@
-"""How complex a message is: the dissertation's levels (figure 5.7), fields, types and depth (figures 5.8 to 5.10)."""
+"""Measures messages: the dissertation's levels (figure 5.7), and fields, types and depth (figures 5.8 to 5.10)."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from fusesoc_firm.message.model import (
 
 
 class Level(IntEnum):
-    """The most complex kind of element that a message holds, each level including those below it."""
+    """The most complex kind of element in a message; each level includes those below it."""
 
     SIMPLE = 1
-    """Numbers, one by one."""
+    """Single numbers."""
     EXPANDING = 2
-    """Arrays of fixed size and messages within the message: they unfold into simple elements."""
+    """Arrays of fixed size and nested messages: they unfold into simple elements."""
     ARRAYS = 3
     """Strings and variable arrays of numbers."""
     VARIABLE_SUBMESSAGES = 4
@@ -34,8 +34,8 @@ class Level(IntEnum):
 class Statistics:
     """The figures of a message.
 
-    `fields` are the leaves with all messages unfolded, an array counting once; `types` the distinct types among all
-    fields, messages included and arrays by their elements; `depth` is 1 where no message lies within.
+    `fields` counts the leaves with all messages unfolded, an array counting once. `types` counts the distinct types
+    among all fields, including messages and the elements of arrays. `depth` is 1 for a message without nested ones.
     """
 
     level: Level
@@ -45,7 +45,7 @@ class Statistics:
 
 
 def statistics(name: MessageName, definitions: Definitions) -> Statistics:
-    """The figures of a message."""
+    """Return the figures of a message."""
     return Statistics(
         level=_level(name, definitions),
         fields=_fields(name, definitions),
@@ -59,7 +59,7 @@ def _element(type_: FieldType) -> FieldType:
 
 
 def _nested(name: MessageName, definitions: Definitions) -> Iterator[MessageName]:
-    """The message of each field that holds one."""
+    """Yield the message of each field that holds one."""
     for field in definitions[name].fields:
         element = _element(field.type)
         if isinstance(element, MessageType):

@@ -1,4 +1,4 @@
-"""Definitions as text that every parser reads, for those who judge."""
+"""Definitions as text that every independent serialiser can parse."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.text.diagnostics import SourceRef
 
 _SEPARATOR = "=" * 80
-# Stands for a wstring; a message, as there may be arrays of it.
+# Replaces a wstring; it is a message so that arrays of it are possible.
 _WIDE = MessageName("firm_wide_msgs", "Wide")
 _UNITS = "units"
 _PLACE = SourceRef("", 0, 0)
 
 
 class NoJudgementError(Exception):
-    """A judge cannot say what a message's bytes are; the text is why."""
+    """A reference cannot determine a message's bytes; the text is the reason."""
 
 
 def plain_text(definition: MessageDefinition) -> str:
-    """The fields alone: defaults and constants are not sent, and not every parser reads all of them."""
+    """Return the fields only: defaults and constants are not sent, and some parsers reject some of them."""
     return "".join(f"{field.type} {field.name}\n" for field in definition.fields)
 
 
 def joint_text(name: MessageName, definitions: Definitions) -> str:
-    """A message and all below it in one text, parted as ROS's own tools do."""
+    """Return a message and all nested ones in one text, separated as by ROS's own tools."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{plain_text(definitions[other])}" for other in definitions if other != name]
     return "\n".join([plain_text(definitions[name]), *others])
 
 
 def with_wide_arrays(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
-    """The same of ROS 2 with `uint32[]` in place of each wstring: the units of UTF-16, in 32 bits each."""
+    """Return the definitions of ROS 2 with `uint32[]` in place of each wstring: UTF-16 units in 32 bits each."""
     field = Field(_UNITS, SequenceType(PrimitiveType("uint32")), _PLACE)
     made = {_WIDE: MessageDefinition(_WIDE, ROS2, (field,), (), _PLACE)}
     for name, definition in definitions.items():
@@ -58,7 +58,7 @@ def with_wide_arrays(definitions: Definitions) -> dict[MessageName, MessageDefin
 def with_wide_units(
     definition: MessageDefinition, definitions: Definitions, value: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """A value of a message as one of `with_wide_arrays`."""
+    """Convert a message's value to one of `with_wide_arrays`."""
     return {field.name: _wide_value(field.type, definitions, value[field.name]) for field in definition.fields}
 
 

@@ -1,4 +1,4 @@
-"""genpy, the reference of ROS 1, by a server process; `genpy_server` says why."""
+"""The reference of ROS 1: genpy in a server process (`genpy_server` gives the reason)."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _SERVER = Path(__file__).with_name("genpy_server.py")
 
 
 def is_installed() -> bool:
-    """Whether any Python of this machine has genpy."""
+    """Return whether any Python of this machine has genpy."""
     return _server() is not None
 
 
 def version() -> str:
-    """Its version; empty where it is not installed."""
+    """Return its version; empty if it is not installed."""
     server = _server()
     return server.version if server else ""
 
 
 def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
-    """The payload of each value. Raises `NoJudgementError` if genpy refuses the message."""
+    """Return the payload of each value. Raises `NoJudgementError` if genpy rejects the message."""
     server = _server()
     assert server is not None, "ask is_installed() first"
     texts = {str(other): plain_text(definition) for other, definition in definitions.items()}
@@ -45,7 +45,7 @@ def serialise(name: MessageName, definitions: Definitions, values: Sequence[Mess
 
 
 class _Server:
-    """A running server. Raises `EOFError` where that Python has no genpy."""
+    """A running server. Raises `EOFError` if that Python has no genpy."""
 
     def __init__(self, python: str) -> None:
         self._process = subprocess.Popen(
@@ -75,7 +75,7 @@ class _Server:
 
 @cache
 def _server() -> _Server | None:
-    """The server of this process: of the first Python that has genpy. Debian's is the system's."""
+    """Return this process's server, under the first Python that has genpy; on Debian, that is the system's."""
     pythons = dict.fromkeys(filter(None, (sys.executable, shutil.which("python3"), "/usr/bin/python3")))
     for python in pythons:
         try:

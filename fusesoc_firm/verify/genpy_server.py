@@ -1,11 +1,11 @@
-"""Serialises messages of ROS 1 with genpy: a program of its own, as genpy belongs to the system's Python.
+"""Serialises messages of ROS 1 with genpy, in a separate program because genpy belongs to the system's Python.
 
-It uses nothing but genpy, its parser genmsg and the standard library. Requests come on the standard input as pickles of
-(type, text of each definition, values), answers go to the standard output as pickles of (True, payloads) or (False,
-reason). The first answer is genpy's version. It ends when its input does.
+It uses only genpy, its parser genmsg and the standard library. Requests arrive on the standard input as pickles of
+(type, text of each definition, values). Results go to the standard output as pickles of (True, payloads) or (False,
+reason). The first result is genpy's version. The program ends with its input.
 
-`genpy.dynamic.generate_dynamic` would make the classes of all messages within a message, and takes seven times as long.
-What serialises is the method of the outermost alone, so only that class is made; the others' values are plain objects.
+`genpy.dynamic.generate_dynamic` would make the classes of all nested messages, which takes seven times as long. Only
+the method of the outermost class serialises, so only that class is made; the others' values are plain objects.
 """
 # mypy: ignore-errors
 # ruff: noqa: ANN001, ANN202 - genpy has no types, and no other module may be imported here
@@ -24,7 +24,7 @@ def main() -> int:
         import genpy.generator  # noqa: F401
     except ImportError:
         return 1
-    # Whatever genpy prints must not come between the answers.
+    # Keep genpy's own output out of the results.
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     _answer(answers, _version())
@@ -35,7 +35,7 @@ def main() -> int:
             return 0
         try:
             _answer(answers, (True, _payloads(name, texts, values)))
-        except Exception as error:  # noqa: BLE001 - it refuses by exceptions of many types
+        except Exception as error:  # noqa: BLE001 - genpy rejects messages with exceptions of many types
             _answer(answers, (False, f"{type(error).__name__}: {error}"))
 
 
@@ -66,7 +66,7 @@ def _class_of(context, name):
 
     spec = context.get_registered(name)
     lines = msg_generator(context, spec, {})
-    # The classes of the messages within are only needed for default values.
+    # The classes of nested messages are only needed for default values.
     text = "\n".join(line for line in lines if not (line.startswith("import ") and line.endswith(".msg")))
     scope = {}
     exec(text, scope)
@@ -96,7 +96,7 @@ def _argument(context, type_, value):
         return value if isinstance(value, bytes) else [_argument(context, element, item) for item in value]
     if element in ("time", "duration"):
         time = genpy.Time() if element == "time" else genpy.Duration()
-        # The constructor would carry what is above a second.
+        # The constructor would normalise nanoseconds above a second.
         time.secs, time.nsecs = value["sec"], value["nsec"]
         return time
     return _filled(context, SimpleNamespace(), element, value) if context.is_registered(element) else value

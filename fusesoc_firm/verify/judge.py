@@ -1,7 +1,7 @@
-"""What the bytes of a message must be, by serialisers that are not ours.
+"""Determines the bytes of a message with independent serialisers.
 
-ROS 1 is judged by genpy, ROS's own, or by rosbags where genpy is not installed. ROS 2 is judged by rosbags, and
-mcap-ros2-support, where it is installed, must read the same values out of its bytes.
+The reference for ROS 1 is genpy, ROS's own, or rosbags if genpy is not installed. The reference for ROS 2 is rosbags.
+If mcap-ros2-support is installed, it must read the same values from the bytes of rosbags.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Serialise = Callable[[MessageName, Definitions, Sequence[MessageValue]], list[by
 
 @dataclass(frozen=True)
 class Judgement:
-    """The payload of each value, and who says so."""
+    """The payload of each value, and the serialisers that determined it."""
 
     payloads: tuple[bytes, ...]
     judge: str
 
 
 def judge(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> Judgement:
-    """The payloads of a message's values.
+    """Return the payloads of a message's values.
 
     Raises:
         NoJudgementError: no installed serialiser can read the message, or two of them disagree.
@@ -44,13 +44,13 @@ def judge(name: MessageName, definitions: Definitions, values: Sequence[MessageV
 
 
 def ros1_judges() -> list[tuple[str, Serialise]]:
-    """Who can judge ROS 1 here, the better first."""
+    """Return the installed serialisers of ROS 1, the preferred one first."""
     genpy = [(genpy_judge.TITLE, genpy_judge.serialise)] if genpy_judge.is_installed() else []
     return [*genpy, (rosbags_judge.TITLE, rosbags_judge.serialise)]
 
 
 def versions() -> dict[str, str]:
-    """The installed judges and their versions."""
+    """Return the installed references and their versions."""
     found = {
         rosbags_judge.TITLE: rosbags_judge.version(),
         genpy_judge.TITLE: genpy_judge.version(),
@@ -60,7 +60,7 @@ def versions() -> dict[str, str]:
 
 
 def _judge_ros2(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> Judgement:
-    # A wstring lies on the wire as the units of UTF-16 in 32 bits each do, and none of the judges knows it.
+    # On the wire, a wstring equals its UTF-16 units in 32 bits each. None of the references supports wstrings.
     values = [with_wide_units(definitions[name], definitions, value) for value in values]
     definitions = with_wide_arrays(definitions)
     payloads = rosbags_judge.serialise(name, definitions, values)

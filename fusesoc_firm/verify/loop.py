@@ -1,4 +1,4 @@
-"""A Frame -> the bench that has its converters in a loop, with a gate in every handshake between them."""
+"""Writes the test bench of a Frame: its converters in a loop, with a gate in every handshake between them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SUBSCRIBER_ID = 1
 PUBLISHER_ID = 2
 
 _TEMPLATE = "verify/loop.vhd"
-# Cycles without a beat at the host: until it gives up, and in which it waits for surplus frames.
+# Cycles without a beat at the host, after which it gives up, and during which it waits for surplus frames.
 _WATCHDOG = 5000
 _QUIET = 100
 
@@ -24,7 +24,7 @@ _QUIET = 100
 class Gate:
     """A handshake with a gate in it.
 
-    `valid` and `ready` are what its source and its sink say, `assignments` lead both through to the other side.
+    `valid` and `ready` are those of its source and its sink; `assignments` connect both to the other side.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Gate:
 
 
 def loop_text(frame: Frame, width: int) -> str:
-    """The bench of a message's converters, entity `ENTITY`, with the generics `SEED` and `STALL_PERCENT`."""
+    """Return the bench of a message's converters: entity `ENTITY` with the generics `SEED` and `STALL_PERCENT`."""
     ports = message_ports(frame, width)
     found = gates(ports, segment_count(frame), has_msg_valid=not frame.is_fixed_size)
     # The fields of a message of fixed size are its only segment.
@@ -69,9 +69,9 @@ def loop_text(frame: Frame, width: int) -> str:
 
 
 def gates(ports: Sequence[MessagePort], segments: int, *, has_msg_valid: bool) -> list[Gate]:
-    """The gates of a message side: one a segment, a stream, an element, a segment of an element, and the message.
+    """Return the gates of a message side: one per segment, stream, element, element's segment, and for the message.
 
-    A handshake is found by its `ready`, the only kind of port that goes against the message.
+    A handshake is found by its `ready`, the only kind of port with the opposite direction.
     """
     by_name = {port.name: port for port in ports}
     found: list[Gate] = []
@@ -93,7 +93,7 @@ def _is_stream(port: MessagePort) -> bool:
 
 
 def _element_gates(name: str, ports: dict[str, MessagePort], first: int) -> list[Gate]:
-    """The gates of an array's elements. An element is shown when all its segments are."""
+    """Return the gates of an array's elements. An element is valid when all its segments are."""
     own = ports.get(f"{name}_segment_valid")
     count = own.width if own and own.width else 0
     taken = f"pub_{name}_valid and pub_{name}_ready"
@@ -104,7 +104,7 @@ def _element_gates(name: str, ports: dict[str, MessagePort], first: int) -> list
 
 
 def _message_gate(segments: int, gate: int) -> Gate:
-    """A message is shown when all its segments are."""
+    """Return the gate of a message, which is valid when all its segments are."""
     shown = " and ".join(["sub_msg_valid", *(f"pub_segment_valid({number})" for number in range(segments))])
     return Gate("msg_valid", shown, "msg_ready", (("pub_msg_valid", f"{shown} and is_open({gate})"),))
 

@@ -1,4 +1,4 @@
-"""mcap-ros2-support: reads messages of ROS 2, the second opinion on what rosbags wrote. An optional package."""
+"""A second reference for ROS 2: mcap-ros2-support, an optional package, reads the bytes that rosbags wrote."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.verify.definitions import NoJudgementError, joint_text
 
 TITLE = "mcap-ros2-support"
-# It reads `char` as ROS 1 does.
+# It reads `char` as in ROS 1.
 _PLAIN = {"byte": "uint8", "char": "uint8"}
 
 
 @cache
 def version() -> str:
-    """Its version; empty where it is not installed."""
+    """Return its version; empty if it is not installed."""
     try:
         return metadata.version(TITLE)
     except metadata.PackageNotFoundError:
@@ -42,7 +42,7 @@ def check(
     values: Sequence[MessageValue],
     payloads: Sequence[bytes],
 ) -> None:
-    """Raise `NoJudgementError` unless each value is read out of its payload."""
+    """Raise `NoJudgementError` unless each payload decodes to its value."""
     from mcap.records import Schema
     from mcap_ros2.decoder import DecoderFactory
 
@@ -61,7 +61,7 @@ def check(
 
 
 def _renamed(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
-    """The same under names that it accepts: those of actions' messages hold a `_`, which only ROS itself may use."""
+    """Rename messages so that the package accepts them: those of actions hold a `_`, which only ROS itself may use."""
     names = {name: MessageName("renamed", f"M{number}") for number, name in enumerate(definitions)}
     return {
         names[name]: replace(

@@ -1,4 +1,4 @@
-"""What a campaign came to: JSON for programs, HTML for people. Neither holds a path of the machine."""
+"""Reports the results of a campaign: JSON for programs, HTML for people. Neither contains a path of the machine."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _LEVELS = {
     Level.ARRAYS: "3 Arrays",
     Level.VARIABLE_SUBMESSAGES: "4 VariableSubmessages",
 }
-# Pixels of a figure, and of what stands below and left of its bars.
+# Pixels of a figure, and of the labels below and to the left of its bars.
 _WIDTH, _HEIGHT, _MARGIN, _LABELS = 560, 200, 40, 34
 
 
 @dataclass(frozen=True)
 class Report:
-    """All entries of a campaign, how it was run, and how long it took."""
+    """All entries of a campaign, its settings, and its duration."""
 
     entries: tuple[Entry, ...]
     settings: Settings
@@ -42,26 +42,26 @@ class Report:
 
     @property
     def totals(self) -> dict[str, int]:
-        """How many messages got each verdict."""
+        """The number of messages with each verdict."""
         found = Counter(entry.result.verdict for entry in self.entries)
         return {str(verdict): found[verdict] for verdict in Verdict}
 
     @property
     def failures(self) -> list[Entry]:
-        """The messages that failed, those that stand for themselves first."""
+        """The failed messages, those that were simulated themselves first."""
         failed = [entry for entry in self.entries if entry.result.verdict is Verdict.FAIL]
         return sorted(failed, key=lambda entry: entry.same_as is not None)
 
 
 def make_report(entries: Iterable[Entry], settings: Settings, seconds: float) -> Report:
-    """A report with its entries in the order of names and the versions of what judged them."""
+    """Return a report with its entries sorted by name and the versions of the references."""
     ordered = tuple(sorted(entries, key=lambda entry: (entry.ros.number, entry.name)))
     tools = {"fusesoc-firm": __version__, "GHDL": ghdl_version(), "Python": platform.python_version(), **versions()}
     return Report(ordered, settings, round(seconds, 1), tools)
 
 
 def write_report(report: Report, path: Path) -> Path:
-    """Write the report to `path`, and as HTML beside it; the path of that is returned."""
+    """Write the report to `path`, and as HTML beside it; return the path of the HTML."""
     write(path, json.dumps(as_data(report), indent=1, ensure_ascii=False) + "\n")
     beside = path.with_suffix(".html")
     write(beside, as_html(report))
@@ -69,7 +69,7 @@ def write_report(report: Report, path: Path) -> Path:
 
 
 def as_data(report: Report) -> dict[str, Any]:
-    """The report as plain data."""
+    """Return the report as plain data."""
     settings = report.settings
     return {
         "tools": dict(report.tools),
@@ -104,7 +104,7 @@ def _entry(entry: Entry) -> dict[str, Any]:
 
 
 def as_html(report: Report) -> str:
-    """The report as a page that needs no other file."""
+    """Return the report as a page that needs no other file."""
     settings = report.settings
     versions_of_ros = [ros for ros in middlewares() if any(entry.ros is ros for entry in report.entries)]
     return render(
@@ -129,7 +129,7 @@ def as_html(report: Report) -> str:
 
 
 def _groups(entries: Sequence[Entry], versions_of_ros: Sequence[Middleware]) -> list[tuple[str, list[Entry]]]:
-    """The rows of the table of totals: all, and each level, of each version."""
+    """Return the rows of the table of totals: all messages and each level, for each version of ROS."""
     rows = []
     for ros in versions_of_ros:
         mine = [entry for entry in entries if entry.ros is ros]
@@ -163,7 +163,7 @@ def _table(title: str, verdict: Verdict, entries: Sequence[Entry]) -> dict[str, 
 
 @dataclass(frozen=True)
 class Histogram:
-    """`counts[k]` values lie from `first + k * step` on below the next one; `beyond` lie at or above the end."""
+    """`counts[k]` values are in [`first + k * step`, `first + (k + 1) * step`); `beyond` values are above the range."""
 
     first: int
     step: int
@@ -172,7 +172,7 @@ class Histogram:
 
 
 def histogram(values: Sequence[int], first: int, step: int, most: int) -> Histogram:
-    """The histogram of values from `first` to `most`, as wide as they need."""
+    """Return the histogram of values from `first` to `most`, no wider than they need."""
     inside = [value for value in values if value <= most]
     counts = Counter((value - first) // step for value in inside)
     return Histogram(
@@ -181,7 +181,7 @@ def histogram(values: Sequence[int], first: int, step: int, most: int) -> Histog
 
 
 def _figures(entries: Sequence[Entry], ros: Middleware) -> list[dict[str, Any]]:
-    """Figures 5.8 to 5.10 of the dissertation, of one version."""
+    """Return figures 5.8 to 5.10 of the dissertation, for one version of ROS."""
     known = [entry.statistics for entry in entries if entry.ros is ros and entry.statistics]
     figures = (
         ("Fields, all messages within unfolded", histogram([each.fields for each in known], 0, 10, 249)),

@@ -1,4 +1,4 @@
-"""rosbags: serialises both versions, of any definition that its parser reads."""
+"""A reference for both versions of ROS: rosbags serialises any definition that its parser can read."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.verify.definitions import NoJudgementError, plain_text
 
 TITLE = "rosbags"
-# rosbags has no `time` and `duration`: it takes the messages of ROS 2 in their place, whose bits are the same.
+# rosbags lacks `time` and `duration`: the messages of ROS 2, which have the same bits, replace them.
 _TIMES = {"time": MessageName("builtin_interfaces", "Time"), "duration": MessageName("builtin_interfaces", "Duration")}
 _TIME_TEXT = "int32 sec\nuint32 nanosec\n"
 _LARGEST_INT8, _LARGEST_INT32 = 2**7 - 1, 2**31 - 1
 
 
 def version() -> str:
-    """Its version."""
+    """Return its version."""
     return metadata.version(TITLE)
 
 
 def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
-    """The payload of each value; the padding of CDR is zero. Raises `NoJudgementError` if rosbags cannot read it."""
+    """Return the payload of each value; CDR padding is zero. Raises `NoJudgementError` if rosbags cannot read it."""
     ros = definitions[name].ros
     texts = {other: plain_text(definition) for other, definition in definitions.items()}
     if ros is ROS1:
@@ -58,7 +58,7 @@ class _Store:
         self._texts: dict[MessageName, str] = {}
 
     def holding(self, texts: Mapping[MessageName, str]) -> Typestore:
-        """A store that has just these definitions of these names. Raises `NoJudgementError`."""
+        """Return a store with exactly these definitions for these names. Raises `NoJudgementError`."""
         if any(self._texts.get(name, text) != text for name, text in texts.items()):
             self._store, self._texts = get_typestore(Stores.EMPTY), {}
         for name, text in texts.items():
@@ -106,7 +106,7 @@ def _argument(
         case ArrayType(element, _) | SequenceType(element, _):
             return [_argument(store, element, definitions, ros, item) for item in value]
         case PrimitiveType("byte") if value > _LARGEST_INT8:
-            # A lone `byte` is packed as a signed number, also in ROS 2, where it is 0 to 255.
+            # A single `byte` is packed as a signed number, even in ROS 2, where its range is 0 to 255.
             return value - 2**8
     return value
 

@@ -1,4 +1,4 @@
-"""GHDL runs the loop of a message: frames in, frames expected back, a verdict out."""
+"""Simulates the loop of a message in GHDL: frames in, expected frames compared, a verdict out."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ from fusesoc_firm.verify.loop import ENTITY
 STIMULUS_FILE, EXPECTED_FILE, OUTPUT_FILE = "stimulus.txt", "expected.txt", "output.txt"
 BYTES_PER_LINE = 64
 STALL_PERCENT = 30
-# Seconds; the host gives up on hardware that hangs long before, so this is for a simulation that cannot get on.
+# In seconds. The host gives up on hanging hardware long before, so this limit stops a simulation that makes no
+# progress.
 TIMEOUT = 300
 
-# What the bench is made of, each behind what it depends on.
+# The cores of the bench in the order of their dependencies.
 _CORES = (
     "axis/package",
     "axis/axis",
@@ -44,7 +45,7 @@ _lock = threading.Lock()
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a simulation: `detail` says what is wrong, `output` is all that GHDL printed."""
+    """The result of a simulation: `detail` describes the fault, `output` is all of GHDL's output."""
 
     is_right: bool
     cycles: int
@@ -53,8 +54,8 @@ class Outcome:
 
 
 def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, timeout: float = TIMEOUT) -> Outcome:
-    """Compile `sources` of `folder`, the bench last, with the cores in `library`, and run it there."""
-    # Compiled and run by one process, which keeps all in memory: twice as fast as by steps.
+    """Compile `sources` of `folder`, the bench last, with the cores in `library`, and run the bench in `folder`."""
+    # One process compiles and runs all in memory, which is twice as fast as separate steps.
     command = [ghdl(), "-c", *_OPTIONS, f"-P{library}", *sources, "-r", ENTITY]
     command += [f"-gSEED={seed}", f"-gSTALL_PERCENT={STALL_PERCENT}"]
     try:
@@ -78,7 +79,7 @@ def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, tim
 
 
 def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes]) -> None:
-    """The host's two files (docs/reference/simulation-host.md): stimulus k causes answer k, and nothing else comes."""
+    """Write the host's files (docs/reference/simulation-host.md): stimulus k causes answer k, and nothing else."""
     sent = (f"> stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(stimuli))
     expected = (f"< @{number} answer to stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(answers))
     (folder / STIMULUS_FILE).write_text("".join(sent), encoding="ascii")
@@ -87,7 +88,7 @@ def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes
 
 @cache
 def ghdl() -> str:
-    """The program. Raises `InputError` if it is not installed."""
+    """Return the path of GHDL. Raises `InputError` if it is not installed."""
     path = shutil.which("ghdl")
     if path is None:
         fail("GHDL is not installed, and messages are verified in simulation", hint="apt-get install ghdl-mcode")
@@ -95,18 +96,18 @@ def ghdl() -> str:
 
 
 def ghdl_version() -> str:
-    """The first line that GHDL says of itself."""
+    """Return the first line of GHDL's description of itself."""
     return subprocess.run([ghdl(), "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[0]
 
 
 def firm_library() -> Path:
-    """A folder with the cores of the bench as the library `firm`, analysed once a process and deleted at its end."""
+    """Return a folder with the bench's cores as the library `firm`, analysed once per process and finally deleted."""
     with _lock:
         return _analysed_library()
 
 
 def core_files(root: Path | None = None) -> Iterator[Path]:
-    """The sources of the cores that the bench is made of."""
+    """Yield the sources of the bench's cores."""
     for core in _CORES:
         description = (root or library_root()) / "cores" / f"{core}.core"
         for name in read_core(description).section("filesets")["rtl"]["files"]:
@@ -128,7 +129,7 @@ def _hex_lines(frame: bytes) -> str:
 
 
 def _detail(output: str) -> str:
-    """The first lines that name a fault: the host's, an assertion's, or the compiler's."""
+    """Return the first lines that name a fault: the host's, an assertion's, or the compiler's."""
     lines = output.splitlines()
     faults = [line.partition(": ")[2] for line in lines if line.startswith("fault in cycle")]
     faults += [_REPORT.sub("", line) for line in lines if "(assertion failure)" in line and "FAIL" not in line]

@@ -1,4 +1,4 @@
-"""Values for any message, drawn from its definition: empty, typical and extreme ones, and ones of single elements."""
+"""Draws values for any message from its definition: empty, typical and extreme ones, and ones with single elements."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _LETTERS = "ab_/ Z9"
 # Two, three and four bytes of UTF-8; the last but one takes two units of UTF-16.
 _WIDE_LETTERS = "\x00é€語🤖\u200b"
 _LONGEST_TEXT = 12
-# The values that the variable parts of a message share, so that a stimulus stays some kilobytes long: a bound beyond a
-# part's share is not reached, and arrays within arrays are short.
+# The variable parts of a message share this number of values, so that a stimulus stays at some kilobytes. Bounds beyond
+# a part's share are not reached, and arrays within arrays are short.
 _MOST_VALUES = 1000
 
 
 def kinds(count: int) -> Iterator[str]:
-    """The kinds of a message's first `count` stimuli: each once, then those that draw anew by turns."""
+    """Yield the kinds of a message's first `count` stimuli: each kind once, then the random kinds in turn."""
     return islice(chain(KINDS, cycle((TYPICAL, EXTREME))), count)
 
 
@@ -47,9 +47,9 @@ def kinds(count: int) -> Iterator[str]:
 class Stimuli:
     """Draws values.
 
-    Variable parts have no element in an empty value, one in a value of `ONE`, 1 to `longest` in a typical one. Those of
-    an extreme one are at their bounds, or have 0 to `longest` where there is none, its numbers are the ends of their
-    ranges, NaN or infinite, and its texts hold characters of up to four bytes.
+    A variable part has no element in an empty value, one in a value of `ONE`, and 1 to `longest` in a typical one. In
+    an extreme value, variable parts are at their bounds, or have 0 to `longest` elements if unbounded. Its numbers are
+    the ends of their ranges, NaN or infinite, and its texts hold characters of up to four bytes.
     """
 
     definitions: Definitions
@@ -60,7 +60,7 @@ class Stimuli:
     _part_counts: dict[MessageName, int] = field(default_factory=dict, compare=False, repr=False)
 
     def message(self, name: MessageName, kind: str) -> dict[str, Any]:
-        """A value of a message, or of ROS 1's `time` as dictionaries have it."""
+        """Return a value of a message, or of ROS 1's `time`, as dictionaries."""
         return self._message(name, kind, max(1, _MOST_VALUES // max(1, self._parts(name))))
 
     def _message(self, name: MessageName, kind: str, most: int) -> dict[str, Any]:
@@ -88,7 +88,7 @@ class Stimuli:
         raise AssertionError(type_)
 
     def _size(self, type_: FieldType) -> int:
-        """The values in it where every variable part holds one element."""
+        """Return the number of values in it if every variable part holds one element."""
         match type_:
             case SequenceType(element):
                 return self._size(element)
@@ -101,7 +101,7 @@ class Stimuli:
         return 1
 
     def _parts(self, name: MessageName) -> int:
-        """The variable parts of a message, those of its arrays' elements once."""
+        """Return the number of variable parts of a message; those of an array's elements count once."""
         if name not in self._part_counts:
             types = [field.type for field in self.definitions[name].fields]
             elements = [type_.element if isinstance(type_, ArrayType | SequenceType) else type_ for type_ in types]
@@ -120,18 +120,18 @@ class Stimuli:
         return {"byte": byte, "char": "uint8"}.get(name, name)
 
     def _count(self, bound: int | None, kind: str, most: int) -> int:
-        """Elements of a variable part; for one element there is always room."""
+        """Return the number of elements of a variable part; there is always room for one."""
         if kind in (EMPTY, ONE):
             return int(kind == ONE)
         if kind == EXTREME and bound is not None and bound <= most:
             return bound
-        # A typical part is not empty, or what lies deep within arrays would hardly ever be there. Of a giant message
+        # A typical part is not empty, otherwise nested parts deep within arrays would rarely occur. In a giant message,
         # half of the parts are enough.
         fewest = int(kind == TYPICAL and most > 1)
         return self.chance.randint(fewest, max(1, min(self.longest, most, self.longest if bound is None else bound)))
 
     def _text(self, type_: StringType, kind: str, most: int) -> str:
-        """A text; the bound of a `string` counts bytes, that of a `wstring` units of UTF-16."""
+        """Return a text; the bound of a `string` counts bytes, that of a `wstring` UTF-16 units."""
         if kind == EMPTY:
             return ""
         if type_.bound is None and kind != ONE:

@@ -1,4 +1,4 @@
-"""One message from its definition to a verdict: stimuli, judge, converters, simulation."""
+"""Verifies one message, from its definition to a verdict: stimuli, reference, converters, simulation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _VHDL_ENCODING = "ascii"
 
 
 class Verdict(StrEnum):
-    """What became of a message; `REFUSED` ones are no legal definitions, so nothing could be made of them."""
+    """The verdict on a message; `REFUSED` means that its definition is illegal, so nothing could be generated."""
 
     PASS = "pass"
     FAIL = "fail"
@@ -39,7 +39,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Task:
-    """A message with all definitions below it, and how it is verified; it needs no file, so any machine can do it."""
+    """A message with all nested definitions and its settings; it needs no file, so any machine can process it."""
 
     name: MessageName
     definitions: Definitions
@@ -50,19 +50,19 @@ class Task:
 
     @property
     def ros(self) -> Middleware:
-        """The version of ROS that the message is of."""
+        """The version of ROS that the message belongs to."""
         return self.definitions[self.name].ros
 
     def chance(self) -> random.Random:
-        """The randomness of this message, the same in whatever company it is verified."""
+        """The random numbers of this message, which do not depend on the other messages of a campaign."""
         return random.Random(f"{self.seed} {self.name} {self.ros.number}")
 
 
 @dataclass(frozen=True)
 class Result:
-    """The verdict on a message. `payload_bytes` are those of each stimulus, `cycles` from first beat in to last out.
+    """The verdict on a message. `payload_bytes` has one item per stimulus; `cycles` is from first beat in to last out.
 
-    `files` are the work folder's, by name, if the task keeps them and the message did not pass.
+    `files` is the content of the work folder by name, if the task keeps it and the message did not pass.
     """
 
     verdict: Verdict
@@ -75,7 +75,7 @@ class Result:
 
 
 def verify(task: Task) -> Result:
-    """Verify a message. Raises `InputError` only for what concerns every message: GHDL is not installed."""
+    """Verify a message. Raises `InputError` only for a fault that affects every message: GHDL is not installed."""
     library = firm_library()
     started = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="firm_verify_") as name:
@@ -97,9 +97,9 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
         sources = _write_sources(folder, frame, task.width)
     except InputError as error:
         return replace(told, detail=f"not converted: {error.diagnostics[0].message}")
-    except Exception as error:  # noqa: BLE001 - a message that the generator stumbles over must not end all others
+    except Exception as error:  # noqa: BLE001 - a failure of the generator for one message must not end the others
         return replace(told, detail=f"not converted: {type(error).__name__}: {error}")
-    # The loop itself cannot tell two fields from each other that both converters take for one another.
+    # The loop cannot detect two fields that both converters swap in the same way.
     for value, payload in zip(values, judgement.payloads, strict=True):
         if fault := _layout_fault(frame, value, payload):
             return replace(told, detail=f"the layout is not the judge's: {fault}")
@@ -116,7 +116,7 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
 
 
 def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
-    """Write converters and bench; their names in the order of compilation."""
+    """Write converters and bench; return their names in the order of compilation."""
     files = subscriber_files([frame], width) | publisher_files([frame], width)
     texts = {name: str(file.content) for name, file in files.items()} | {_BENCH: loop_text(frame, width)}
     for name, text in texts.items():
@@ -125,7 +125,7 @@ def _write_sources(folder: Path, frame: Frame, width: int) -> list[str]:
 
 
 def _layout_fault(frame: Frame, value: MessageValue, payload: bytes) -> str:
-    """How our own layout of a value differs from the judge's bytes; empty if it does not."""
+    """Describe how this project's layout of a value differs from the reference's bytes; empty if it does not."""
     try:
         ours = encode(frame, value)
         used_bytes(frame, payload)
@@ -142,9 +142,10 @@ def _layout_fault(frame: Frame, value: MessageValue, payload: bytes) -> str:
 
 
 def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
-    """The frame that carries a payload, with garbage in the padding and behind the last field, as writers may send it.
+    """Return the frame of a payload, with garbage in the padding and after the last field, as writers may send it.
 
-    Our own layout says where padding lies. Where it errs, a value is hurt, and the answer is not the judge's.
+    The positions of padding come from this project's layout. If it is wrong, a value is damaged, and the response
+    differs from the reference.
     """
     used = used_bytes(frame, payload)
     noisy = bytes(byte if is_used else chance.randrange(256) for byte, is_used in zip(payload, used, strict=True))
@@ -152,10 +153,10 @@ def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
 
 
 def _answer(frame: Frame, payload: bytes, sent: bytes) -> bytes:
-    """What must come back: the judge's bytes.
+    """Return the expected response: the reference's bytes.
 
-    Where the size varies, the length is that of the frame that was sent, for the publisher has it before it can know of
-    bytes behind the last field: it sends zeros for these.
+    For a message of variable size, the length is that of the frame sent: the publisher must send the length before it
+    can know of bytes after the last field. It sends zeros for these.
     """
     trailing = 0 if frame.is_fixed_size else len(sent) - len(pack_frame(SUBSCRIBER_ID, payload))
     return pack_frame(PUBLISHER_ID, payload + bytes(trailing))

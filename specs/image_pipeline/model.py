@@ -1,7 +1,7 @@
-"""Model of the image pipeline, to the bit: what each accelerator makes of a message.
+"""Bit-accurate model of the image pipeline: the response of each accelerator to a message.
 
-Written with NumPy, which rosbags brings. `gray`, `scaled` and `integral` work on arrays of rows and columns; `respond`
-adds the rules of the message: what is no image of the right encoding becomes an empty one.
+It uses NumPy, which rosbags depends on. `gray`, `scaled` and `integral` work on arrays of rows and columns; `respond`
+adds the rules of the message: a message that is not an image of the right encoding becomes an empty one.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ def filtered(
     work: Callable[[Pixels], npt.NDArray[Any]],
     max_columns: int = _LARGEST_SIZE,
 ) -> Message:
-    """The message that an accelerator makes of one whose pixels it does `work` on; `encodings` are in and out.
+    """Return an accelerator's response to a message; `work` processes its pixels, `encodings` are in and out.
 
-    An image is empty if it is not in the encoding, or larger than the accelerator takes, or its data is not as long
-    as its height and step say.
+    The response is empty if the image is not in the encoding, or is larger than the accelerator supports, or if the
+    length of its data does not match its height and step.
     """
     height, width, step, data = message["height"], message["width"], message["step"], bytes(message["data"])
     channels = 3 if encodings[0] == "rgb8" else 1
@@ -82,7 +82,7 @@ def filtered(
     }
 
 
-# What each accelerator makes of a message.
+# The response of each accelerator to a message.
 ACCELERATORS: dict[str, Callable[[Message], Message]] = {
     "rgb_to_gray": lambda message: filtered(message, ("rgb8", "mono8"), gray),
     "scale_down": lambda message: filtered(message, ("mono8", "mono8"), scaled),
@@ -96,7 +96,7 @@ def respond(subscriber: str, message: Message) -> list[tuple[str, Message]]:
         raise ValueError(f"unknown subscriber '{subscriber}', legal: 'camera'")
     gray_image = ACCELERATORS["rgb_to_gray"](message)
     small_image = ACCELERATORS["scale_down"](gray_image)
-    # What goes to an accelerator counts where that is software.
+    # Inputs of an accelerator only matter if it is in software.
     return [
         ("small_in", gray_image),
         ("integral_in", small_image),

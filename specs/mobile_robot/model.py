@@ -1,8 +1,8 @@
-"""Bit-true model of the accelerator `mobile_robot`, and of the motors that its simulation has at the pins.
+"""Bit-accurate model of the accelerator `mobile_robot`, and of the motors at its pins in simulation.
 
-Kinematics and controllers compute as rtl/skid_steer.vhd and rtl/wheel_pid.vhd do, on whole numbers, once a period of
-control. The motors are tb/motor.vhd, a period of the PWM at a time. Between both stands the encoder's position some
-cycles ago: what a decoder has seen of it.
+Kinematics and controllers compute on whole numbers, once per control period, as rtl/skid_steer.vhd and
+rtl/wheel_pid.vhd do. The motors are those of tb/motor.vhd, advanced one PWM period at a time. They are linked by the
+encoder's position some cycles ago, which is the position that a decoder has seen.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ SEED = 1
 
 
 def main() -> int:
-    """Measure what the arguments name."""
+    """Run the measurements that the arguments name."""
     parser = argparse.ArgumentParser(prog="tests.bench", description="Measure converters, Manager and schedulers.")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"{', '.join(figures.parts())}; all if none is named")
     parser.add_argument("--seed", type=int, default=SEED, help="of random payloads and faults (default: %(default)s)")

@@ -1,6 +1,6 @@
-"""What the systems of specs/ take of an FPGA of each family, and what of it is their Manager.
+"""Resources of the systems of specs/ on an FPGA of each family, in total and for their Manager.
 
-The netlist is the one that the targets `synth_*` of a system's core make; it is the same for every family.
+The netlist is that of the targets `synth_*` of a system's core; it is the same for every family.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tests.hdl.ghdl import REPOSITORY
 TITLE = "Systems with accelerators, converters and Manager"
 MANAGER_TITLE = "The Manager within, LUT/FF"
 
-# Table 5.4, what was generated and the accelerators: LUT, FF, BRAM, DSP.
+# Table 5.4, the generated part and the accelerators: LUT, FF, BRAM, DSP.
 _USE_CASES = {"sobel": "1551/1294, 3 BRAM", "mobile_robot": "30127/21665, 578 DSP"}
 _TARGET = "synth_xilinx"
 # But for its message, it is the system robotic_arm.
@@ -68,7 +68,7 @@ class Netlist:
 
 
 class NotBuiltError(Exception):
-    """A netlist that FuseSoC does not make; the text is what was printed."""
+    """FuseSoC failed to make a netlist; the text is its output."""
 
 
 def applications() -> dict[str, Path]:

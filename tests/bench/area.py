@@ -1,6 +1,6 @@
 """LUTs and flip-flops: of converters, alone and with a Manager, and of stream parts.
 
-A row says what is measured and what it may take; `tables_of` synthesises rows, on all cores, and gives their tables.
+A row names a subject and its limits; `tables_of` synthesises rows on all cores of the machine and returns their tables.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ IMAGE, FRANKA_STATE = "sensor_msgs/Image", "franka_msgs/FrankaState"
 # LUT/FF in the dissertation: table 5.4.
 _USE_CASES = {IMAGE: "759/321", TWIST: "456/126"}
 
-# The parts that the Manager and the converters of messages of variable size are made of, with generics beside WIDTH.
+# The parts of the Manager and of the converters of messages of variable size, with generics beside WIDTH.
 _PARTS: Mapping[str, Mapping[str, Generic]] = {
     "firm_axis_register_slice": {},
     "firm_axis_fifo": {"DEPTH": FIFO_DEPTH},
     "firm_axis_window": {"VOID_LANES": 1},
     "firm_axis_pack": {},
 }
-# At 8 bits the lowest lane is no void one.
+# At 8 bits the lowest lane is not an invalid one.
 _PARTS_OF_8_BITS = {"firm_axis_window": {"VOID_LANES": 0}}
 _USE_CASES_TITLE = "Manager for two channels, its scheduler, and both converters of a message"
 _PARTS_TITLE = "Parts of streams, LUT/FF at each width in bits"
@@ -52,7 +52,7 @@ _NOTES = {
 
 @dataclass(frozen=True)
 class Bar:
-    """What a row may take at most; None is no bar."""
+    """The upper limits of a row; None means no limit."""
 
     lut: int
     ff: int | None = None
@@ -63,7 +63,7 @@ class Bar:
         return f"{area}, {self.lines} lines" if self.lines else area
 
     def is_met(self, found: Measured) -> bool:
-        """Whether what was found keeps to it."""
+        """Whether the measured figures meet the limits."""
         # LUTs that are memory are LUTs.
         pairs = ((found.cells.lut + found.cells.memory, self.lut), (found.cells.ff, self.ff), (found.lines, self.lines))
         return all(limit is None or value is None or value <= limit for value, limit in pairs)
@@ -71,7 +71,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class Subject:
-    """An entity that is analysed; `field_bits` and `lines` are None where it is no converter."""
+    """An entity that is analysed; `field_bits` and `lines` are None unless it is a converter."""
 
     library: Library
     entity: str
@@ -82,7 +82,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a subject takes."""
+    """The resources of a subject."""
 
     cells: Cells
     field_bits: int | None
@@ -91,7 +91,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Row:
-    """What is measured: `make` analyses it in an empty folder. `dissertation` is its LUT/FF there."""
+    """A measured subject: `make` analyses it in an empty folder. `dissertation` is its LUT/FF there."""
 
     label: str
     ros: str
@@ -140,7 +140,7 @@ def tables_of(
 
 
 def _synthesised(wanted: Sequence[Row], yosys: Yosys, tell: Tell) -> list[Measured | str]:
-    """What each row takes, or what went wrong."""
+    """Return the resources of each row, or its error."""
 
     def outcome(row: Row) -> Measured | str:
         found = _outcome(row, yosys)
@@ -156,7 +156,7 @@ _COLUMNS = ("design", "ROS", "bits", "LUT", "FF", "LUT as RAM", "field bits", "l
 
 
 def _outcome(row: Row, yosys: Yosys) -> Measured | str:
-    """The figures, `NOT_CONVERTED`, or what went wrong."""
+    """Return the figures, `NOT_CONVERTED`, or the error."""
     with tempfile.TemporaryDirectory() as name:
         try:
             subject = row.make(Path(name))

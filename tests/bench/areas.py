@@ -18,7 +18,7 @@ _DESIGN = re.compile(r"(\S+), N = (\d+)")
 
 
 def write_areas(tables: Iterable[Table], path: Path = PATH) -> None:
-    """Write what the tables of the Manager and of schedulers hold; what could not be measured is left out."""
+    """Write the tables of the Manager and of schedulers; entries that could not be measured are omitted."""
     found = {}
     for table in tables:
         columns = [table.columns.index(name) for name in ("design", "bits", "LUT", "FF", "LUT as RAM")]

@@ -153,6 +153,6 @@ def run(command: list[str], starts: list[list[str]], folder: Path, processors: i
 
 
 def generated(place: Path) -> dict[str, bytes]:
-    """What tools are given, by its path in the build root."""
+    """Return the inputs of tools, by path in the build root."""
     files = (place / "build").glob("*/default/src/bench_lib_*/*")
     return {str(path.relative_to(place)): path.read_bytes() for path in files}

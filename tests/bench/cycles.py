@@ -70,7 +70,7 @@ class WrongResultError(Exception):
 
 
 def latency_rows() -> list[tuple[Converter, str]]:
-    """What is measured, with the dissertation's cycles."""
+    """A measured subject, with the dissertation's cycles."""
     measured = (("geometry_msgs/Quaternion", SUBSCRIBER, "35"), ("geometry_msgs/Point", PUBLISHER, "28"))
     return [
         (Converter(ros, message, direction, width), theirs if (ros, width) == (1, 8) else "")
@@ -81,7 +81,7 @@ def latency_rows() -> list[tuple[Converter, str]]:
 
 
 def image_rows() -> list[Converter]:
-    """What is measured with images."""
+    """A measured subject with images."""
     return [
         Converter(ros, "sensor_msgs/Image", direction, _IMAGE_WIDTH)
         for direction in (SUBSCRIBER, PUBLISHER)
@@ -116,7 +116,7 @@ def measure(seed: int, tell: Tell) -> list[Table]:
 def cycles_of(
     model: Subscriber | Publisher, width: int, folder: Path, payloads: Payloads, *data: bytes
 ) -> list[Cycles]:
-    """Send payloads through a converter and count; raises `WrongResultError` if what comes of them is wrong."""
+    """Send payloads through a converter and count cycles; raises `WrongResultError` for a wrong result."""
     bodies = [len(payload).to_bytes(_LENGTH_BYTES, "little") + payload for payload in data]
     shown = [
         {**payloads.shown(payload), "payload_length": body[:_LENGTH_BYTES]}

@@ -1,4 +1,4 @@
-"""The converters that are measured: generated, analysed, and their ports read from what was generated."""
+"""The measured converters: generates and analyses them, and reads their ports from the generated text."""
 
 from __future__ import annotations
 

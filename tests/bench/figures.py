@@ -1,4 +1,4 @@
-"""docs/figures: what the bench measured, a page for each subject, with the versions of the tools."""
+"""Writes docs/figures: the bench's results, a page for each subject, with the versions of the tools."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FOLDER = REPOSITORY / "docs" / "figures"
 
 @dataclass(frozen=True)
 class Page:
-    """A page of figures: its file, its title, what a reader finds there, and the parts of the bench on it."""
+    """A page of figures: its file, its title, its content for a reader, and its parts of the bench."""
 
     name: str
     title: str

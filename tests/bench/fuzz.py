@@ -1,7 +1,7 @@
-"""Broken frames among good ones: every good one must be delivered as it is, none else, and nothing may hang.
+"""Broken frames among good ones: exactly the good ones must be delivered, unchanged, and nothing may hang.
 
-A frame is cut, lengthened, lies about a length or a count, has bytes changed, is another message's, or all in company.
-Which frames are good is decided by `payloads`; a broken one that reaches the converter must give one frame_error.
+A frame is cut, lengthened, has a wrong length or count, has bytes changed, is another message's, or several of these.
+`payloads` decides which frames are good; a broken one that reaches the converter must give one frame_error.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _NOTE = f"""
 
 @dataclass(frozen=True)
 class FuzzFrame:
-    """The bytes behind an id, and what the ports must show of them; None if the frame is broken."""
+    """The bytes after an id, and the expected values of the ports; None if the frame is broken."""
 
     body: bytes
     shown: dict[str, bytes] | None
@@ -52,7 +52,7 @@ class FuzzFrame:
 
 @dataclass(frozen=True)
 class Tally:
-    """What came of a run; `fault` is empty if all was right."""
+    """The result of a run; `fault` is empty if it is right."""
 
     broken: int = 0
     good: int = 0
@@ -63,7 +63,7 @@ class Tally:
 
 
 def rows() -> list[Converter]:
-    """What is fuzzed."""
+    """A fuzzed subject."""
     return [Converter(ros, message, SUBSCRIBER, width) for ros, message in MESSAGES for width in WIDTHS]
 
 
@@ -104,7 +104,7 @@ def fuzz(converter: Converter, folder: Path, broken: int, seed: int, tell: Tell)
 
 
 def _run(model: Subscriber, folder: Path, batch: list[FuzzFrame], seed: int, before: Tally) -> Tally:
-    """Send a batch and add what came of it to `before`."""
+    """Send a batch and add its results to `before`."""
     broken = sum(frame.shown is None for frame in batch)
     try:
         records, timing = model.run(folder, [frame.body for frame in batch], seed + before.broken, STALL_PERCENT)
@@ -123,7 +123,7 @@ def _run(model: Subscriber, folder: Path, batch: list[FuzzFrame], seed: int, bef
 
 
 def difference(model: Subscriber, frames: list[FuzzFrame], records: list[Message | FrameError]) -> str:
-    """The first frame of which not that came which should have, and what did; empty if there is none."""
+    """Describe the first frame whose result is unexpected; empty if there is none."""
     for number, (frame, record) in enumerate(zip_longest(frames, records)):
         if frame is None:
             return f"behind all frames comes {record}"
@@ -205,7 +205,7 @@ def _changed_byte(body: bytes, source: random.Random) -> bytes:
 
 
 def _lying_word(body: bytes, source: random.Random) -> bytes:
-    """A word behind the length that may be a count is a little off, or huge."""
+    """Change a word after the length that may be a count by a little, or make it huge."""
     words = (len(body) - _LENGTH_BYTES) // 4
     if words < 1:
         return body

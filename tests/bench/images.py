@@ -43,7 +43,7 @@ class Accelerator:
 
     @property
     def encoding(self) -> str:
-        """What it takes."""
+        """Its resources."""
         return "rgb8" if self.channels == 3 else "mono8"
 
 
@@ -59,7 +59,7 @@ _PIXELS_AT_LEAST = 2.0
 
 @dataclass(frozen=True)
 class Run:
-    """A message that went through: cycles, those with data first to last, and what came out."""
+    """A processed message: cycles, those from first to last data, and the result."""
 
     cycles: int
     data_cycles: int
@@ -106,7 +106,7 @@ def _row(item: Accelerator, width: int, seed: int, folder: Path, yosys: Yosys, t
 
 
 def _bar(item: Accelerator, width: int, cycles: int, rate: float, size: int) -> tuple[str, bool]:
-    """The bar and whether it is met; empty where there is none."""
+    """Return the limit and whether it is met; empty without a limit."""
     if item.channels == 3 and width == 128:
         most = int(_GRAY_AT_MOST * size * 8 / width)
         return f"{most} cycles", cycles <= most
@@ -116,7 +116,7 @@ def _bar(item: Accelerator, width: int, cycles: int, rate: float, size: int) -> 
 
 
 def expected(item: Accelerator, pixels: npt.NDArray[np.uint8]) -> tuple[tuple[int, int, int, str, str], bytes]:
-    """What the model makes of an image."""
+    """Return the model's result for an image."""
     message = {
         "header": {"frame_id": "camera"},
         "height": pixels.shape[0],
@@ -131,7 +131,7 @@ def expected(item: Accelerator, pixels: npt.NDArray[np.uint8]) -> tuple[tuple[in
 
 
 def library(folder: Path) -> Library:
-    """All accelerators and what they need, analysed in `folder`."""
+    """Analyse all accelerators and their dependencies in `folder`."""
     Library("firm", folder).analyse(core_files(*CORES))
     work = Library("work", folder)
     work.analyse(SPECS / item.system / "rtl" / f"{item.entity}.vhd" for item in ACCELERATORS)

@@ -1,4 +1,4 @@
-"""LUTs and flip-flops of what stands between two sides: a host and a system, or two clocks."""
+"""LUTs and flip-flops of the links between a host and a system, and of the crossings between two clocks."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""A simulated system as a node of real ROS, for a minute at 100 Hz, beside a plain node that answers by itself.
+"""A simulated system as a node of real ROS, for a minute at 100 Hz, compared with a plain node that echoes messages.
 
-Peers, node and echo run at the same time on one machine: these figures are of the machine; their relation is not.
+Peers, node and echo run at the same time on one machine: the figures depend on the machine; their ratio does not.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def measure(tell: Tell) -> list[Table]:
 
 
 def _run(version: int) -> list[dict[str, Any]]:
-    """What came back from the node and from the echo."""
+    """The responses of the node and of the echo."""
     with tempfile.TemporaryDirectory() as name, running_ros(version, Path(name)) as ros:
         folder = Path(name)
         spec = specification("quat2euler", version, folder)

@@ -71,7 +71,7 @@ def measure(yosys: Yosys, tell: Tell) -> list[Table]:
 
 
 def label(design: str, channels: int) -> str:
-    """What a row is called."""
+    """Return the title of a row."""
     return f"{design}, N = {channels}"
 
 

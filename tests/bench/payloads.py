@@ -1,4 +1,4 @@
-"""Payloads of a message and what its ports must show, judged by the types that rosbags knows and by no code of ours.
+"""Draws payloads of a message and determines the expected ports, from rosbags' types and without the project's code.
 
     payloads = Payloads(ROS2, "sensor_msgs/Image")
     payload = payloads.draw(random.Random(7))        # rosbags serialises it
@@ -56,7 +56,7 @@ class Payloads:
         return bytes(self._store.serialize_cdr(value, self._name))
 
     def shown(self, payload: bytes) -> dict[str, bytes]:
-        """What each port shows of a payload, elements in a row; raises `BrokenPayloadError`."""
+        """Return each port's values for a payload, elements in sequence; raises `BrokenPayloadError`."""
         return _Reader(self.ros, self._store, payload).shown(self._name)
 
     def _drawn_message(self, name: str, source: random.Random, given: Mapping[str, Any], path: str) -> Any:
@@ -143,7 +143,7 @@ class _Reader:
         if inner[0] is Nodetype.BASE and inner[1][0] != "string":
             self._shown[f"{path}_axis"] += self._numbers(inner[1][0], count) if count else b""
             return
-        # Every element takes a byte at least, so a count that lies ends here.
+        # Every element takes at least a byte, so a wrong count ends here.
         for _ in range(count):
             self._field(inner, path)
 

@@ -1,4 +1,4 @@
-"""What a second run of FuseSoC generates, and what it costs beside FuseSoC itself."""
+"""The work of a second run of FuseSoC, and its cost in addition to FuseSoC itself."""
 
 from __future__ import annotations
 

@@ -13,13 +13,13 @@ MET, MISSED, FAILED = "met", "MISSED", "FAILED"
 
 _LINE_LENGTH = 100
 
-# Called with a line for whoever waits.
+# Called with a line of progress for the user.
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Table:
-    """A title, the columns' headings, the rows, and what must be said about them."""
+    """A title, the columns' headings, the rows, and remarks."""
 
     title: str
     columns: tuple[str, ...]

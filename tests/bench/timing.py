@@ -38,7 +38,7 @@ Make = Callable[[Path, int], Subject]
 
 @dataclass(frozen=True)
 class Row:
-    """What is placed; `make` analyses it in an empty folder, for a number of channels."""
+    """A placed subject; `make` analyses it in an empty folder, for a number of channels."""
 
     label: str
     make: Make
@@ -80,7 +80,7 @@ def measure(nextpnr: Nextpnr, tell: Tell) -> list[Table]:
 
 
 def _outcome(row: Row, channels: int, nextpnr: Nextpnr) -> float | str:
-    """MHz, or what went wrong."""
+    """Return MHz, or the error."""
     with tempfile.TemporaryDirectory() as name:
         try:
             subject = row.make(Path(name), channels)

@@ -15,7 +15,7 @@ TASK_BEATS = (1, 2, 3, 4, 5, 8, 16)
 LEAST_USED = 99.5
 # Of times; the worst of them counts.
 _SETS = 4
-# After reset, when memories are cleared and who comes first is accepted.
+# After reset, when memories are cleared and the first tasks are accepted.
 _SKIPPED_CYCLES = 500
 _CYCLES = 3000
 
@@ -29,7 +29,7 @@ _NOTE = f"""
 
 
 def rows() -> list[tuple[str, int]]:
-    """What is measured: a policy and a number of requesters."""
+    """A measured subject: a policy and a number of requesters."""
     return [(policy, requesters) for policy in POLICIES for requesters in REQUESTERS]
 
 

@@ -69,7 +69,7 @@ class Cells:
         return f"{self.lut}/{self.ff}"
 
 
-# What a cell is: a field of `Cells`, or "" for what costs nothing, and how many of it.
+# The kind of a cell: a field of `Cells`, or "" for cells without cost, and their number.
 Kind = tuple[str, int]
 
 
@@ -82,7 +82,7 @@ class Family:
     cells: Mapping[str, Kind]
 
     def kind(self, cell: str) -> Kind:
-        """What a cell is. Raises `SynthesisError` if it is not known."""
+        """Return the kind of a cell. Raises `SynthesisError` for an unknown cell."""
         found = next((kind for name, kind in self.cells.items() if re.fullmatch(name, cell)), None)
         if found is None:
             raise SynthesisError(f"the cell {cell} is not known")
@@ -103,7 +103,7 @@ XILINX = Family(
         f"[IO]?BUFT?|IOBUF|BUFG|GND|VCC|MUXF[789]|{_RESET_INVERTER}": ("", 0),
     },
 )
-# A carry cell takes the two LUTs that it lies in, a distributed RAM four.
+# A carry cell uses the two LUTs around it, a distributed RAM four.
 ECP5 = Family(
     "ecp5",
     "synth_ecp5 -abc9",
@@ -117,7 +117,7 @@ ECP5 = Family(
         "PFUMX|L6MUX21|GND|VCC": ("", 0),
     },
 )
-# A carry cell lies beside a LUT.
+# A carry cell is beside a LUT.
 ICE40 = Family(
     "ice40",
     "synth_ice40 -abc9 -device u -dsp",
@@ -135,7 +135,7 @@ SYNTHESIS = XILINX.synthesis
 
 
 def count_cells(number_of: Mapping[str, int], family: Family = XILINX) -> Cells:
-    """Cells by what they take of a device. Raises `SynthesisError` for a latch, or a cell that is not known."""
+    """Count cells by the resources of a device. Raises `SynthesisError` for a latch or an unknown cell."""
     latches = [cell for cell in number_of if _LATCH.fullmatch(cell)]
     if latches:
         raise SynthesisError(f"latches: {', '.join(latches)}")

@@ -1,4 +1,4 @@
-"""`firm cache`: what the store holds, shown, removed and checked."""
+"""`firm cache`: the content of the store is shown, removed and checked."""
 
 from __future__ import annotations
 

@@ -331,7 +331,7 @@ def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, mo
 
 
 def test_what_is_doubtful_is_told_and_goes_on(capsys: Captured, tmp_path: Path) -> None:
-    """`warning` is told on the standard error, so that what is printed stays what it was."""
+    """`warning` goes to the standard error, so that the standard output is unchanged."""
     spec = tmp_path / "robot.yaml"
     ends = ", middleware: ROS, message: geometry_msgs/Point, topic: point"
     spec.write_text(
@@ -346,7 +346,7 @@ def test_what_is_doubtful_is_told_and_goes_on(capsys: Captured, tmp_path: Path) 
         assert captured.out and "warning" not in captured.out
 
 
-# What the files of each format begin with.
+# The first bytes of a file of each format.
 BEGINS = {"svg": b"<?xml", "png": b"\x89PNG\r\n", "pdf": b"%PDF-", "dot": b"digraph"}
 
 

@@ -53,7 +53,7 @@ def line_with(path: Path, text: str) -> int:
 
 
 def why(capsys: Captured, path: Path, text: str) -> dict[str, list[str]]:
-    """What is said of the line with `text`: kinds and places."""
+    """Return the explanation of the line with `text`: kinds and places."""
     assert main(["why", f"{path}:{line_with(path, text)}"]) == 0
     first, *rest = capsys.readouterr().out.splitlines()
     assert text in first
@@ -66,7 +66,7 @@ def why(capsys: Captured, path: Path, text: str) -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("application", APPLICATIONS)
 def test_every_line_is_that_of_the_template_named(application: str) -> None:
-    """The rest of a template's line, without its tags, stands on the line that is made of it."""
+    """The text of a template's line, without its tags, is in the generated line."""
     call = GeneratorCall("far", f"a:b:{application}-x:1", str(SPECS / application), {"spec": f"{application}.yaml"})
     request = make_request(call, GENERATORS["far"].parameters, no_messages)
     with recorded() as renderings:

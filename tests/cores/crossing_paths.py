@@ -38,7 +38,7 @@ class Domains:
 
 
 def unsynchronised(verilog: str, top: str, folder: Path, domains: Domains) -> list[str]:
-    """What is wrong, a line each."""
+    """Return the faults, one per line."""
     (folder / "netlist.v").write_text(verilog, encoding="utf-8")
     yosys = yowasp.Yosys()
     yosys.prepare()
@@ -58,7 +58,7 @@ class _Input:
 
 
 class _Netlist:
-    """The bits of a flat netlist of gates: who drives each, who reads it, and of which clock it is."""
+    """The bits of a flat netlist of gates: the driver, the readers and the clock of each."""
 
     def __init__(self, module: dict[str, Any], domains: Domains) -> None:
         self.domains = domains
@@ -115,7 +115,7 @@ class _Netlist:
                         yield f"{self._name(origin)} to {name}"
 
     def _is_first(self, output: int) -> bool:
-        """Whether a register is read by one other, and that as it is."""
+        """Return whether a register is read by exactly one other, without logic in between."""
         readers = self.readers[output]
         return len(readers) == 1 and bool(_FF.fullmatch(readers[0].removesuffix(" D")))
 

@@ -31,7 +31,7 @@ class PipeBench:
         return self.tool != "verilator"
 
     def command(self, width: int = 8, **generics: Generic) -> list[str]:
-        """What starts it; generics are SEED, STALL_PERCENT and FAULT."""
+        """Return the command to start it; generics are SEED, STALL_PERCENT and FAULT."""
         if self.tool == "ghdl":
             library = made_once("pipe_ghdl", _analyse)
             options = ["--std=93", "--work=firm", f"--workdir={library}", f"-P{library}"]

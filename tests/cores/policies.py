@@ -1,4 +1,4 @@
-"""What cores/sched holds of the table of policies: `make policies` writes it there."""
+"""The parts of cores/sched that derive from the table of policies: `make policies` writes them."""
 
 from __future__ import annotations
 

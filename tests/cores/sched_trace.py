@@ -56,7 +56,7 @@ class Trace:
         )
 
     def request(self, cycle: int) -> Bools:
-        """Who asks in a cycle, (S, N)."""
+        """The requests in a cycle, (S, N)."""
         bits = np.unpackbits(self.packed_request[:, cycle, ::-1], axis=1, bitorder="little", count=self.requesters)
         return bits.astype(np.bool_)
 
@@ -113,7 +113,7 @@ def first_difference(trace: Trace, scheduler: Scheduler) -> str:
 
 
 class _Tasks:
-    """Who is between the first and the last beat of a task, followed cycle by cycle."""
+    """Track, cycle by cycle, the requester between the first and the last beat of a task."""
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace

@@ -1,4 +1,4 @@
-"""The links of boards without a processor: frames over UART and SPI and back, and what both sides make of faults."""
+"""The links of boards without a processor: frames over UART and SPI and back, and the handling of faults."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.hdl.ghdl import Generic, GhdlError, Library, core_files
 SEED = 20261121
 LINKS = ("uart", "spi")
 WIDTHS = [8, 16, 64]
-# Cycles of the bench: of a bit, and of what a byte takes on the line.
+# Cycles of the bench: per bit, and per byte on the line.
 BIT = 10
 UART_BYTE, SPI_BYTE = 10 * BIT, 8 * BIT
 # Bits of silence after which a frame that has begun is over (1 ms at 125,000 baud).
@@ -153,7 +153,7 @@ def test_a_glitch_is_no_byte(library: Library, tmp_path: Path) -> None:
 @pytest.mark.parametrize("clear", [BREAK, PAUSE])
 @pytest.mark.parametrize("seed", range(3))
 def test_what_finds_no_room_is_dropped_and_cut(library: Library, tmp_path: Path, clear: list[str], seed: int) -> None:
-    """The system stands still while more comes than fits: whole frames before, one that is cut, whole ones after."""
+    """The system stalls while more arrives than fits: complete frames, then one that is cut, then complete ones."""
     print(f"seed {seed}")
     random_ = random.Random(seed)
     frames = [_frame(random_.randbytes(random_.randrange(20)), number) for number in range(12)]

@@ -52,7 +52,7 @@ def _read(path: Path) -> list[tuple[int, bytes]]:
 
 
 def _payload(publisher: int, frame: int, longest: int = LONGEST) -> bytes:
-    """What the bench's publishers send."""
+    """Return the frames that the bench's publishers send."""
     return bytes(
         (publisher + 31 * frame + 7 * place) % 256 for place in range((17 * publisher + 29 * frame) % (longest + 1))
     )

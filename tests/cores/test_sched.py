@@ -172,7 +172,7 @@ end architecture simulation;
 
 
 def refusal_of(library: Library, entity: str, requesters: int, generics: str) -> str:
-    """What elaborating `entity` with a generic map prints; it must fail."""
+    """Return the output of elaborating `entity` with a generic map; it must fail."""
     text = f"""
 library ieee;
 use ieee.std_logic_1164.all;

@@ -274,7 +274,7 @@ def test_illegal_transfer_times_are_named(tmp_path: Path, times: str, message: s
 
 
 def _refusal(library: Library, entity: str, requesters: int, generics: str) -> str:
-    """What elaborating `entity` prints; it must fail. `generics` stand between semicolons."""
+    """Return the output of elaborating `entity`; it must fail. `generics` are separated by semicolons."""
     file = library.directory / "refused.vhd"
     named = dict(generic.split(" => ") for generic in generics.split("; "))
     file.write_text(wrapper("refused", entity, requesters, {"REQUESTERS": str(requesters), **named}))

@@ -36,7 +36,7 @@ class Cycle:
 
 @dataclass
 class Model:
-    """What the queue holds, kept in two ways: a heap of Python's, and a list that is sorted. Entries are (key, id)."""
+    """The content of the queue, kept in two ways: Python's heap, and a sorted list. Entries are (key, id)."""
 
     heap: list[tuple[int, int]] = field(default_factory=list)
     ordered: list[tuple[int, int]] = field(default_factory=list)
@@ -115,7 +115,7 @@ def _judge(cycles: list[Cycle], is_sorted: bool) -> tuple[int, int]:
     model = Model()
     unwrap = Unwrapped()
     popped = fullest = 0
-    # The heap's root is filled anew in the cycle after a pop; if what fills it is popped, two cycles later.
+    # The heap's root is refilled in the cycle after a pop; if the new root is popped, two cycles later.
     filling = owing = is_cleared = False
     for number, cycle in enumerate(cycles):
         where = f"cycle {number}: {cycle}, {model.ordered[:3]}"

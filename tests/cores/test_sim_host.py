@@ -1,4 +1,4 @@
-"""The simulation host in VHDL and in Verilog: what it accepts, what it finds, what it prints, how it ends."""
+"""The simulation host in VHDL and in Verilog: accepted files, detected faults, printed reports, and its end."""
 
 from __future__ import annotations
 

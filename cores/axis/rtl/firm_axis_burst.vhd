@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Behind a multiplexer whose source may change between any two beats: each run of beats of one source leaves as a burst
--- that ends with `tlast`. A frame's first burst starts with the frame's first beat; a resumed one with one beat more,
--- whose lowest byte is the source's index and whose other bytes mean nothing.
--- Only another source's beat shows that a run is over. So a beat is held until the next one is there, no matter
--- whose; a frame's last one waits for nobody. A held beat therefore never blocks another source, and a run has no gap.
--- In which sources a frame has begun is kept in a memory, a bit a source. It is cleared in the 2**n cycles after reset,
--- n bits being the index; nothing is taken meanwhile.
--- The paths from input to output are combinational, and what is offered may change with the source until it is taken,
--- as behind the multiplexer: put a register slice behind it, which shows it to nobody.
+-- Forms bursts after a multiplexer whose source may change between any two beats: each run of beats from one source
+-- leaves as a burst that ends with `tlast`. The first burst of a frame starts with the frame's first beat. A resumed
+-- burst starts with an extra beat, whose lowest byte is the source's index and whose other bytes are meaningless.
+-- Only a beat of another source shows that a run is over. Each beat is therefore held until the next one arrives, from
+-- any source; the last beat of a frame is not held. A held beat never blocks another source, and a run has no gap.
+-- A memory with one bit per source records which frames have begun. It is cleared in the 2**n cycles after reset, for
+-- an index of n bits; no beat is taken meanwhile.
+-- The paths from input to output are combinational, and as at the multiplexer, the offered beat may change with the
+-- source until it is taken. A register slice after this entity hides such changes.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -23,7 +23,7 @@ entity firm_axis_burst is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- Whose beat it is that is offered; may change at any time.
+    -- The source of the offered beat; may change at any time.
     source        : in  std_logic_vector(index_bits(SOURCES)-1 downto 0);
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
@@ -44,7 +44,7 @@ architecture rtl of firm_axis_burst is
   constant INDEX_BITS_USED : positive := index_bits(SOURCES);
 
   type memory_t is array (natural range 0 to 2**INDEX_BITS_USED-1) of std_logic_vector(0 downto 0);
-  signal is_begun   : memory_t;  -- a frame of this source has begun and is not over
+  signal is_begun   : memory_t;  -- a frame of this source is incomplete
   signal address    : std_logic_vector(INDEX_BITS_USED-1 downto 0);
   signal write_bit  : std_logic;
   signal begun      : std_logic_vector(0 downto 0);
@@ -57,7 +57,7 @@ architecture rtl of firm_axis_burst is
   signal held_tlast_r  : std_logic;
   signal held_source_r : std_logic_vector(INDEX_BITS_USED-1 downto 0);
   signal held_r        : std_logic;
-  signal resume_r      : std_logic;  -- the index goes ahead of the held beat
+  signal resume_r      : std_logic;  -- the index precedes the held beat
 
   signal moved : std_logic;  -- `source` is not the held beat's
   signal ready : std_logic;
@@ -115,10 +115,10 @@ begin
         resume_r <= '0';
       elsif taken = '1' then
         held_r <= '1';
-        -- Between two beats of a frame the source's own beat is the one held, unless another one came.
+        -- Between two beats of a frame, its own beat is held, unless another source's beat has arrived.
         resume_r <= begun(0) and moved;
       elsif m_axis_tvalid_out = '1' and m_axis_tready = '1' then
-        -- Without a beat after it only a frame's last one leaves.
+        -- Without a beat after it, only the last beat of a frame leaves.
         held_r   <= resume_r;
         resume_r <= '0';
       end if;

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Takes the id off a frame and routes the rest to one of DESTINATIONS. Data is broadcast, only `tvalid` and
--- `tready` are decoded. At 8 bits the id's beat ends here; at wider streams it goes on with its lowest lane void
--- (the bytes are still there, `tkeep` is unchanged), so nothing has to be re-aligned. A frame whose id belongs to
--- nobody, or that is nothing but its id at 8 bits, is swallowed and `id_error` pulses in the cycle after its first
--- beat. The paths from input to output are combinational: put a register slice in front.
+-- Removes the id from a frame and routes the rest to one of DESTINATIONS. Data is broadcast, only `tvalid` and
+-- `tready` are decoded. At 8 bits the id's beat ends here. Wider streams keep the beat, with an invalid lowest lane
+-- (the bytes are still there, `tkeep` is unchanged), so that nothing needs realignment. A frame with an unknown id, or
+-- with only an id at 8 bits, is dropped, and `id_error` pulses in the cycle after its first beat. The paths from input
+-- to output are combinational: put a register slice in front.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -24,11 +24,11 @@ entity firm_axis_demux is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- One for all.
+    -- Shared by all destinations.
     m_axis_tdata : out std_logic_vector(WIDTH-1 downto 0);
     m_axis_tkeep : out std_logic_vector(WIDTH/8-1 downto 0);
     m_axis_tlast : out std_logic;
-    -- One bit a destination.
+    -- One bit per destination.
     m_axis_tvalid : out std_logic_vector(DESTINATIONS-1 downto 0);
     m_axis_tready : in  std_logic_vector(DESTINATIONS-1 downto 0);
 

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A synchronous FIFO for a stream. The memory is written and read at the clock, without reset and with a
--- registered output, which is what block RAM offers; a beat is never read in the cycle in which it is written.
--- That output register holds one beat more than DEPTH.
+-- A synchronous FIFO for a stream. The memory is written and read at the clock, without reset and with a registered
+-- output, as block RAM offers; a beat is never read in the cycle in which it is written.
+-- The output register holds one beat in addition to DEPTH.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

@@ -1,9 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Fills in a frame's length when all of it has come: stores frames, counts their bytes, sends each behind its length.
+-- Fills in a frame's length once the whole frame has arrived: it stores frames, counts their bytes, and sends each
+-- after its length.
 --
--- The store is a ring of DEPTH beats; a frame leaves it while others enter. A frame of more than DEPTH beats can never
--- be stored: by then the ring holds nothing else and has come round to the frame's first beat, so dropping it is to
--- forget the level, and its remaining beats are swallowed. A queue holds the lengths of the frames that are complete.
+-- The store is a ring of DEPTH beats; a frame leaves it while others enter. A frame of more than DEPTH beats
+-- cannot be stored. By the time it is detected, the ring holds only its beats and has wrapped to the first one. To drop
+-- the frame, the level is cleared and the remaining beats are discarded. A queue holds the lengths of complete frames.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -20,7 +21,7 @@ entity firm_axis_length_buffer is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- Frames of five bytes or more: id, four bytes that are not read, payload.
+    -- Frames of five bytes or more: id, four ignored bytes, payload.
     s_axis_tdata  : in  std_logic_vector(WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(WIDTH/8-1 downto 0);
     s_axis_tvalid : in  std_logic;
@@ -33,7 +34,7 @@ entity firm_axis_length_buffer is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    -- The errors of the publisher in front, and from here: a frame was too long and is dropped, code 6.
+    -- Errors of the publisher in front, and of this entity: code 6 if a frame was too long and is dropped.
     s_frame_error      : in  std_logic                    := '0';
     s_frame_error_code : in  std_logic_vector(3 downto 0) := (others => '0');
     frame_error        : out std_logic;
@@ -48,7 +49,7 @@ architecture rtl of firm_axis_length_buffer is
   constant ID_BYTES     : positive := 1;
   constant LENGTH_BYTES : positive := 4;
   constant HEADER_BYTES : positive := ID_BYTES + LENGTH_BYTES;
-  -- The beat behind those that a byte of the length lies in, counted from 0.
+  -- The beat after those that contain bytes of the length, counted from 0.
   constant PAST_LENGTH  : positive := (HEADER_BYTES - 1) / LANES + 1;
   constant QUEUE_DEPTH  : positive := 16;
   constant OVER_BUFFER  : std_logic_vector(3 downto 0) := "0110";
@@ -59,13 +60,13 @@ architecture rtl of firm_axis_length_buffer is
   signal read_index_r  : natural range 0 to DEPTH-1;
   signal level_r       : natural range 0 to DEPTH;
   signal room_r        : std_logic;                 -- there is room for a beat
-  signal beats_r       : natural range 0 to DEPTH;  -- of the frame that enters
-  signal dropping_r    : std_logic;                 -- it is too long
+  signal beats_r       : natural range 0 to DEPTH;  -- of the entering frame
+  signal dropping_r    : std_logic;                 -- the entering frame is too long
 
   signal take_beat : std_logic;
-  signal too_long  : std_logic;  -- the beat that enters fills the memory, and is not the frame's last
+  signal too_long  : std_logic;  -- the entering beat fills the memory, and is not the frame's last
 
-  -- A frame that has just come, for one cycle or until the queue takes its length.
+  -- A frame that has just arrived, for one cycle or until the queue takes its length.
   signal ended_r      : std_logic;
   signal end_beats_r  : natural range 0 to DEPTH;                       -- its beats but the last
   signal end_bytes_r  : std_logic_vector(clog2(LANES+1)-1 downto 0);    -- bytes of the last one
@@ -80,7 +81,7 @@ architecture rtl of firm_axis_length_buffer is
 
   -- The beat that is sent.
   signal read_beat  : std_logic;
-  signal between    : std_logic;                     -- no frame goes on behind it
+  signal between    : std_logic;                     -- no frame continues after it
   signal word_r     : std_logic_vector(WORD_BITS-1 downto 0);
   signal valid_r    : std_logic;
   signal length_r   : std_logic_vector(31 downto 0);
@@ -220,7 +221,7 @@ begin
 
   -- Out -------------------------------------------------------------------------------------------------------------
 
-  -- All beats of a frame are there when its length is.
+  -- When its length is there, all beats of a frame are.
   between   <= not valid_r or word_r(WORD_BITS-1);
   start     <= next_valid and between and (m_axis_tready or not valid_r);
   read_beat <= start or (not between and m_axis_tready);

@@ -1,6 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- One stream out of SOURCES: `source` says which while `enable` is '1'. Purely combinational, and it does not know
--- frames: who drives `source` keeps them whole (a scheduler), or firm_axis_burst behind it marks where they are not.
+-- Forwards one of SOURCES streams: `source` selects it while `enable` is '1'. The multiplexer is purely combinational
+-- and ignores frames: the driver of `source` keeps them whole (a scheduler), or a firm_axis_burst after it marks
+-- bursts.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -15,7 +16,7 @@ entity firm_axis_mux is
     source : in std_logic_vector(index_bits(SOURCES)-1 downto 0);
     enable : in std_logic;
 
-    -- Source 0 lies lowest.
+    -- Source 0 is in the lowest bits.
     s_axis_tdata  : in  std_logic_vector(SOURCES*WIDTH-1 downto 0);
     s_axis_tkeep  : in  std_logic_vector(SOURCES*(WIDTH/8)-1 downto 0);
     s_axis_tvalid : in  std_logic_vector(SOURCES-1 downto 0);

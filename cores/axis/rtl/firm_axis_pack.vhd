@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes full beats out of frames that come as any number of bytes a cycle. The last 1 to LANES bytes of a frame wait
--- in `rest_r` until more come or the frame ends, so the end may be told later, with no byte. A rotation of radix 4
--- brings arriving bytes behind the waiting ones; those beyond the beat are by then in the lanes where the next beat
--- needs them. While a tail leaves, the next frame enters: only `m_axis_tready` ever holds the input up.
+-- Packs frames that arrive as any number of bytes per cycle into full beats. The last 1 to LANES bytes of a frame wait
+-- in `rest_r` until more arrive or the frame ends, so the end may be signalled later, without a byte. A rotation of
+-- radix 4 aligns arriving bytes after the waiting ones; excess bytes are then already in the lanes where the next beat
+-- needs them. While a tail leaves, the next frame enters: only `m_axis_tready` ever stalls the input.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,10 +17,10 @@ entity firm_axis_pack is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- Lanes 0 to `count`-1 are appended to the frame. What stands here stays until `ready`.
+    -- Lanes 0 to `count`-1 are appended to the frame. They are held until `ready`.
     data  : in  std_logic_vector(WIDTH-1 downto 0);
     count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
-    -- The frame ends with these bytes, or without one with those before. A frame without any byte is none.
+    -- The frame ends with these bytes, or with earlier ones if `count` is 0. A frame without any byte is not sent.
     last  : in  std_logic;
     valid : in  std_logic;
     ready : out std_logic;
@@ -42,7 +42,7 @@ architecture rtl of firm_axis_pack is
   subtype count_t is unsigned(COUNT_BITS-1 downto 0);
 
   signal rest_r  : std_logic_vector(WIDTH-1 downto 0);
-  signal advance : std_logic;  -- the output takes what there is for it
+  signal advance : std_logic;  -- the output takes the available bytes
 
 begin
 
@@ -50,7 +50,7 @@ begin
     report "firm_axis_pack: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
 
-  -- The waiting byte is the output; it is shown as soon as the input tells whether it is the last one.
+  -- The waiting byte is the output; it is offered as soon as the input tells whether it is the last one.
   byte_wide : if WIDTH = 8 generate
 
     signal waiting_r : std_logic;  -- rest_r holds a byte
@@ -87,7 +87,7 @@ begin
 
   wider : if WIDTH > 8 generate
 
-    -- Moves all lanes up by `shift`; the highest ones come in again at lane 0.
+    -- Moves all lanes up by `shift`; the highest ones wrap to lane 0.
     function rotated(lanes_in : std_logic_vector; shift : unsigned) return std_logic_vector is
       variable moved : std_logic_vector(WIDTH-1 downto 0);
       variable digit : std_logic_vector(1 downto 0);

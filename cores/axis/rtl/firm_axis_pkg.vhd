@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- What the stream cores share: sizes, and the two functions of an index that synthesis maps badly if they are
--- written as a dynamic array access. They are plain logic on std_logic, so an unknown bit gives an unknown
--- result and no warning. To select with an index, see firm_axis_select. Sizes may be illegal numbers: an entity's
--- own assert, which speaks only after elaboration, shall name them.
+-- Common functions of the stream cores: sizes, and two functions of an index that synthesis maps badly if they are
+-- written as a dynamic array access. They are plain logic on std_logic, so an unknown bit gives an unknown result and
+-- no warning. To select with an index, see firm_axis_select. Sizes may be illegal numbers, since an entity's own
+-- assert, which runs only after elaboration, must report them.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -10,10 +10,10 @@ package firm_axis_pkg is
 
   function max(left, right : integer) return integer;
 
-  -- Bits to tell `values` things apart: 0 for 1, 1 for 2, 8 for 256.
+  -- The number of bits to distinguish `values` items: 0 for 1, 1 for 2, 8 for 256.
   function clog2(values : integer) return natural;
 
-  -- Bits of an index to `values` things. A port cannot be empty, so it is 1 where one thing needs no index.
+  -- The number of bits of an index of `values` items. A port cannot be empty, so it is 1 for a single item.
   function index_bits(values : integer) return positive;
 
   function is_stream_width(width : integer) return boolean;
@@ -24,7 +24,7 @@ package firm_axis_pkg is
   -- '1' if `index` is `value`.
   function is_equal(index : std_logic_vector; value : natural) return std_logic;
 
-  -- The number of ones in a contiguous `keep`, which is one of a stream: it has 1 to 64 bits.
+  -- The number of ones in a contiguous `keep` of a stream, which has 1 to 64 bits.
   function lanes_kept(keep : std_logic_vector) return std_logic_vector;
 
   -- Bit k is '1' if `index` is k and `enable` is '1'. The index is decoded in two halves, so that each output costs one

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Cuts every path of a stream at the full rate of a beat a cycle. All outputs are registers, `s_axis_tready`
--- included: as it is a cycle late, a second register holds the beat that arrives when the output has just stalled.
--- `m_axis_tid` is the lowest byte of the frame's first beat, its id, on every beat of it: taken here it needs neither
--- logic nor a second register. `tuser` is for whatever else goes along. Who leaves either open pays nothing for it.
+-- Cuts every path of a stream at the full rate of a beat per cycle. All outputs are registered, including
+-- `s_axis_tready`. As this is a cycle late, a second register holds the beat that arrives when the output has just
+-- stalled. `m_axis_tid` is the frame's id, the lowest byte of its first beat, on every beat; to add it here needs
+-- neither logic nor a second register. `tuser` carries any other data. Either costs nothing if left open.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -51,7 +51,7 @@ architecture rtl of firm_axis_register_slice is
   signal ready_r   : std_logic;
 
   signal skidded   : std_logic;  -- skid_r holds a beat
-  signal available : std_logic;  -- next_beat is one
+  signal available : std_logic;  -- next_beat is valid
   signal move      : std_logic;  -- the output is free for it
 
 begin

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A stream at another width, without a cycle lost at the narrower end. It holds no beat back: the last narrow beat of a
--- wide one passes through in the cycle in which the wide one is taken. So when the source's last beat is taken, the
--- sink has everything, and what the source shows next needs not wait for anything in here.
+-- Converts a stream to another width, without a lost cycle at the narrower end. It holds no beat back: the last narrow
+-- beat of a wide one passes in the cycle in which the wide one is taken. So when the source's last beat is taken, the
+-- sink has all data, and the source's next data need not wait for this entity.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -17,7 +17,7 @@ entity firm_axis_resize is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- While it is low, what has come of a beat is forgotten: the message that the stream is part of was withdrawn.
+    -- While it is low, a partial beat is dropped: the message that contains the stream was withdrawn.
     is_open : in std_logic := '1';
 
     s_axis_tdata  : in  std_logic_vector(S_WIDTH-1 downto 0);
@@ -60,7 +60,7 @@ begin
 
     -- A one marks the piece that comes next.
     signal place_r : std_logic_vector(PIECES-1 downto 0);
-    -- The pieces before the last one; zeros where none has come.
+    -- The pieces before the last one; missing ones are zero.
     signal rest_r  : std_logic_vector(M_WIDTH-NARROW-1 downto 0);
     signal is_done : std_logic;  -- with this piece the beat is complete
     signal taken   : std_logic;
@@ -114,7 +114,7 @@ begin
   narrow_down : if S_WIDTH > M_WIDTH generate
 
     signal index_r : unsigned(clog2(PIECES)-1 downto 0);
-    -- A bit a piece: none of the beat follows it.
+    -- One bit per piece: no other piece of the beat follows it.
     signal ends    : std_logic_vector(PIECES-1 downto 0);
     signal is_done : std_logic_vector(0 downto 0);
 
@@ -165,7 +165,7 @@ begin
     count : process (clk)
     begin
       if rising_edge(clk) then
-        -- A beat that is gone in midst of its pieces was withdrawn.
+        -- A beat that disappears in the middle of its pieces was withdrawn.
         if rst_n = '0' or is_open = '0' or s_axis_tvalid = '0' then
           index_r <= (others => '0');
         elsif m_axis_tready = '1' then

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- One word out of many: a tree of multiplexers, two levels of which fit a 6-input LUT a bit. A dynamic array index
--- costs about twice of it through `ghdl --synth`. An index beyond the last word reads any of them, or zeros. If
--- DECODED, the tree is written as ANDs of words and decoded pairs of index bits, and ORs. Yosys maps that as it stands,
--- at the 4-to-1 multiplexers that fit a LUT, and takes nested multiplexers apart. That saves a third of the LUTs for
--- many words that share nothing, and costs more for words with constants, which nested multiplexers absorb.
+-- Selects one of many words with a tree of multiplexers, two levels of which fit a 6-input LUT per bit. A dynamic array
+-- index costs about twice as much with `ghdl --synth`. An index beyond the last word gives any word, or zeros. If
+-- DECODED, the tree consists of ANDs of words and decoded pairs of index bits, and ORs. Yosys maps this directly to
+-- the 4-to-1 multiplexers that fit a LUT, but takes nested multiplexers apart. That saves a third of the LUTs for
+-- many unrelated words, and costs more for words with constants, which nested multiplexers absorb.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -24,8 +24,8 @@ end entity firm_axis_select;
 
 architecture rtl of firm_axis_select is
 
-  -- Parts the words by the highest bit of the number that tells them apart. Simulation goes only the way to the word,
-  -- so thousands of them take no more time than a few.
+  -- Splits the words by the highest bit of the number that distinguishes them. Simulation follows only the path to the
+  -- word, so thousands of words take no more time than a few.
   function chosen(candidates, number : std_logic_vector) return std_logic_vector is
     constant COUNT : positive := candidates'length / WIDTH;
     -- The largest power of two below COUNT; 0 for one word, for which GHDL evaluates it, too.
@@ -46,8 +46,8 @@ architecture rtl of firm_axis_select is
     constant COUNT  : positive := candidates'length / WIDTH;
     constant LOW    : natural  := candidates'low;
     constant PLACES : natural  := clog2(COUNT);
-    -- The bits that choose a part, and those that choose within it. No word is parted in none, but GHDL evaluates it,
-    -- too.
+    -- The bits that choose a part, and those that choose within it. An empty list of words is never split, but GHDL
+    -- evaluates this, too.
     constant HERE   : natural  := 2 - PLACES mod 2;
     constant BELOW  : natural  := max(0, PLACES-HERE);
     variable first  : natural;
@@ -71,7 +71,7 @@ architecture rtl of firm_axis_select is
 
 begin
 
-  -- An illegal number is for the entity above to name.
+  -- The entity above reports an illegal number.
   nested : if WORDS >= 1 and not DECODED generate
     word <= chosen(words_in, index);
   end generate nested;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Makes a frame exactly as long as its header announces: bytes beyond that are dropped, and a frame that ends before is
--- filled up. It stands in front of firm_axis_pack and has that one's ports on both sides; all paths through it are
--- combinational. One adder does both: it counts up to zero, so that its carry tells when less is left than is offered.
+-- Makes a frame exactly as long as its header announces: excess bytes are dropped, and a frame that ends early is
+-- padded. It is placed before firm_axis_pack and has the same ports on both sides; all paths through it are
+-- combinational. One adder does both: it counts up to zero, and its carry tells when more is offered than remains.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -11,29 +11,30 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_trim is
   generic (
     WIDTH : integer := 8;
-    -- So many bytes of filling are no fault.
+    -- The number of padding bytes that is not a fault.
     SLACK : natural := 0
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- The bytes that shall follow the header: `start` takes them, and with them the first bytes of a frame. Bytes under
-    -- `header` belong to it and pass uncounted; until it is over, `announced` is the length that was taken.
+    -- The number of bytes that must follow the header. `start` takes it together with the first bytes of a frame. Bytes
+    -- marked by `header` belong to the header and are not counted; until its end, `announced` is the length that was
+    -- taken.
     length    : in  std_logic_vector(31 downto 0);
     start     : in  std_logic;
     header    : in  std_logic;
     announced : out std_logic_vector(31 downto 0);
 
-    -- As at firm_axis_pack, but `last` comes without bytes: the frame ends in front of it. What stands on `data` then
-    -- fills up a frame that is too short, and shall be zeros.
+    -- As at firm_axis_pack, but `last` comes without bytes: the frame ends before it. The lanes of `data` then pad a
+    -- frame that is too short, and must be zeros.
     data  : in  std_logic_vector(WIDTH-1 downto 0);
     count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     last  : in  std_logic;
     valid : in  std_logic;
     ready : out std_logic;
 
-    -- Bytes are offered that the frame has no room for; it ended, and has room for more than SLACK bytes.
+    -- Bytes are offered beyond the end of the frame, or it ended with more than SLACK bytes missing.
     is_cut    : out std_logic;
     is_filled : out std_logic;
 
@@ -50,13 +51,13 @@ architecture rtl of firm_axis_trim is
   constant LANES      : natural  := WIDTH/8;
   constant COUNT_BITS : positive := index_bits(LANES+1);
 
-  -- Minus one more than the bytes left: all ones is none.
+  -- The negated number of remaining bytes, minus one: all ones means none.
   signal left_r : unsigned(31 downto 0) := (others => '1');
 
   signal wanted  : unsigned(COUNT_BITS-1 downto 0);
   signal sum     : unsigned(32 downto 0);
-  signal exceeds : std_logic;  -- less is left than is wanted
-  signal open_r  : std_logic;  -- no length is announced: the frame is as long as it gets
+  signal exceeds : std_logic;  -- fewer bytes remain than are offered
+  signal open_r  : std_logic;  -- no length is announced: the frame may have any length
   signal ends    : std_logic;  -- the frame ends in this cycle, if it is taken
   signal lacking : unsigned(32 downto 0);
 

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Shows the next bytes of a frame from wherever the last field ended, and takes any number of them a cycle. A register
--- slice takes the beats in; behind it, `tdata_r` holds the beat in which the window begins and the slice's output the
--- one after it. One shifter of radix 4 joins the two: nothing else lies between the registers and `window`, and no
--- path leads from the stream to the window or from `take` to `s_axis_tready`. A beat a cycle enters, whatever the
--- offset, as long as all that is available is taken. At 8 bits there is nothing to shift, and the window is the stream.
+-- Shows the next bytes of a frame from the end of the last field on, and takes any number of them per cycle. A register
+-- slice receives the beats. After it, `tdata_r` holds the beat in which the window begins, and the slice's output the
+-- next one. One shifter of radix 4 joins the two: nothing else is between the registers and `window`, and no path leads
+-- from the stream to the window or from `take` to `s_axis_tready`. At any offset, a beat enters every cycle as long as
+-- all available bytes are taken. At 8 bits there is nothing to shift, and the window is the stream.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -13,7 +13,7 @@ use firm.firm_axis_pkg.all;
 entity firm_axis_window is
   generic (
     WIDTH : integer := 8;
-    -- So many low lanes of a frame's first beat hold nothing, though `tkeep` has them: 0 to WIDTH/8-1.
+    -- The number of low lanes in a frame's first beat that hold no data, although `tkeep` marks them: 0 to WIDTH/8-1.
     VOID_LANES : integer := 0
   );
   port (
@@ -26,16 +26,16 @@ entity firm_axis_window is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- The next bytes of the frame from lane 0 up; lanes beyond `available` are anything.
+    -- The next bytes of the frame from lane 0 up; lanes from `available` on are undefined.
     window    : out std_logic_vector(WIDTH-1 downto 0);
     available : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
-    -- With the available bytes, which may be none, the frame ends.
+    -- The frame ends with the available bytes, which may be none.
     is_last : out std_logic;
 
     -- Takes the first `take` bytes, at most `available`. The frame is over when `is_last` and all were taken.
     take_valid : in std_logic;
     take       : in std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
-    -- One cycle of it drops the rest of the frame, in preference to `take`; where the window shows none, the next one.
+    -- A pulse drops the rest of the frame and overrides `take`; if the window shows no frame, it drops the next one.
     skip : in std_logic
   );
 end entity firm_axis_window;
@@ -78,17 +78,17 @@ begin
 
   end generate byte_wide;
 
-  -- The slice has an assert of its own, which must not be the first to speak.
+  -- The slice has its own assert, which must not report first.
   wider : if WIDTH > 8 and is_stream_width(WIDTH) generate
 
     -- Stage n of the shifter moves by 0 to 3 times this number of lanes. The widest step comes first, so that few
-    -- lanes are carried on to the next stage.
+    -- lanes reach the next stage.
     function step_of(stage : positive) return positive is
     begin
       return max(1, LANES / 4**stage);
     end function step_of;
 
-    -- The highest bit that stage n gives to the next one.
+    -- The highest bit that stage n passes to the next one.
     function top_of(stage : positive) return natural is
     begin
       return 8 * (LANES + step_of(stage) - 1) - 1;
@@ -118,15 +118,15 @@ begin
       return moved(WIDTH-1 downto 0);
     end function bytes_from;
 
-    -- A legal number, that the assert above can speak first.
+    -- A legal number, so that the assert above reports first.
     constant VOID : natural := max(0, VOID_LANES);
 
     signal starting_r    : std_logic;  -- the next beat to enter is the first of a frame
     signal entering      : count_t;    -- the bytes of the beat that enters
     signal entering_user : std_logic_vector(7 downto 0);
 
-    -- The beat behind the window's first one. The slice carries the number of its bytes, and whether it is the first
-    -- of a frame, as `tuser`.
+    -- The beat after the window's first one. In `tuser`, the slice carries the number of its bytes, and whether it is
+    -- the first of a frame.
     signal next_tdata  : std_logic_vector(WIDTH-1 downto 0);
     signal next_user   : std_logic_vector(7 downto 0);
     signal next_tvalid : std_logic;
@@ -135,7 +135,7 @@ begin
     signal next_bytes  : count_t;
 
     -- The beat in which the window begins.
-    signal filled_r : std_logic := '0';  -- it is there
+    signal filled_r : std_logic := '0';  -- the beat is valid
     signal tdata_r  : std_logic_vector(WIDTH-1 downto 0);
     signal last_r   : std_logic := '0';
     signal offset_r : unsigned(OFFSET_BITS-1 downto 0) := (others => '0');  -- the window's first lane

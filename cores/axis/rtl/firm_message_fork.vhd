@@ -1,28 +1,28 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Gives one message to several sinks. Each takes it in its own time; the source is released when all have it. A sink's
--- valid does not wait for another sink's ready, so none can hold up the others for longer than one message.
--- The beats of a stream and the elements of an array are such messages, too.
+-- Distributes one message to several sinks. Each takes it in its own time; the source is released when all have it. A
+-- sink's valid does not wait for another sink's ready, so no sink delays the others by more than one message.
+-- The beats of a stream and the elements of an array can be such messages, too.
 library ieee;
 use ieee.std_logic_1164.all;
 
 entity firm_message_fork is
   generic (
     SINKS : integer := 2;
-    -- Bits of segment_valid, which a sink that has the message sees no more.
+    -- The number of bits in segment_valid; they are hidden from a sink that has the message.
     SEGMENTS : integer := 1
   );
   port (
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- It may fall without source_ready: the message is withdrawn, from those who have it as well.
+    -- It may fall without source_ready: the message is then withdrawn, even from sinks that have it.
     source_valid         : in  std_logic;
     source_ready         : out std_logic;
     source_segment_valid : in  std_logic_vector(SEGMENTS-1 downto 0) := (others => '0');
 
     sink_valid         : out std_logic_vector(SINKS-1 downto 0);
     sink_ready         : in  std_logic_vector(SINKS-1 downto 0);
-    -- The first sink's bits lie lowest.
+    -- The first sink has the lowest bits.
     sink_segment_valid : out std_logic_vector(SINKS*SEGMENTS-1 downto 0)
   );
 end entity firm_message_fork;

@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- What accelerators need to work with the values of messages.
+-- Functions for accelerators that process the values of messages.
 library ieee;
 use ieee.std_logic_1164.all;
 
 package firm_message_pkg is
 
-  -- Whether a value has the bits of a constant: `value = reference`, a bit at a time. GHDL 2.0 synthesises a constant
-  -- of 64 bits as zero if its low half is zero, and writes one of more than 32 bits into Verilog as a text; with this,
-  -- none is left that is wider than a bit.
+  -- Whether a value equals a constant, as `value = reference` but bit by bit. GHDL 2.0 synthesises a 64-bit constant as
+  -- zero if its low half is zero, and writes one of more than 32 bits into Verilog as a text. This function leaves no
+  -- constant wider than a bit.
   function is_equal(value, reference : std_logic_vector) return boolean;
 
 end package firm_message_pkg;

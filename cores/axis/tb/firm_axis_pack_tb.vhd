@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Frames from a file, cut into random pieces, through the packer to a sink with random stalls. What comes out goes into
--- a file, a line a frame in hex; form and stability of the stream are checked here.
+-- Sends frames from a file, cut into random pieces, through the packer to a sink with random stalls. The output goes to
+-- a file, one line per frame in hex; the bench checks form and stability of the stream.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -96,7 +96,7 @@ begin
       return integer(floor(draw * real(highest + 1)));
     end function draw_to;
 
-    -- What `data` and `count` hold, until it is taken.
+    -- The expected `data` and `count` until they are taken.
     procedure offer(is_end : in boolean) is
     begin
       valid <= '1';

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Frames from a file, cut into random pieces behind their header, through the trimmer to a taker that stalls. The four
--- bytes behind a frame's first one are the length that it announces, whatever it has. What comes out goes into a file,
--- a line a frame: the bytes in hex, then `cut` or `filled` where the trimmer said so.
+-- Sends frames from a file, cut into random pieces after their header, through the trimmer to a sink that stalls. The
+-- four bytes after a frame's first one are its announced length, which may differ from its real one. The output goes to
+-- a file, one line per frame: the bytes in hex, then `cut` or `filled` if the trimmer reported it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

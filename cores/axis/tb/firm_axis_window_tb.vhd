@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Frames from a file, of which the first VOID_LANES bytes are void, through the window to a reader that takes random
--- numbers of bytes, stalls and skips. What it took goes into a file, a line a frame: the bytes in hex, then `.` if the
+-- Sends frames from a file, whose first VOID_LANES bytes are invalid, through the window to a reader that takes random
+-- numbers of bytes, stalls and skips. The bytes taken go to a file, one line per frame: in hex, then `.` if the
 -- frame was taken to its end, `~` if it was skipped.
 -- Inputs change at the falling edge: beyond 8 bits no output may change before the next rising one.
 library ieee;
@@ -153,7 +153,7 @@ begin
     variable may_skip : boolean := true;   -- the window is not still busy with the last skip
     variable offered  : natural;
     variable wanted   : natural;
-    variable at_least : natural := 0;  -- what must still be available
+    variable at_least : natural := 0;  -- the bytes that must still be available
     variable idle     : natural := 0;
     variable idle_max : natural := 0;  -- between frames, though the next has been sent
     variable watch    : natural := 0;

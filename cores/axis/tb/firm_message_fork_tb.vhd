@@ -13,7 +13,7 @@ entity firm_message_fork_tb is
     SEED     : integer := 1;
     -- The chance, each cycle, that the source has no message or a sink takes none.
     STALL_PERCENT : integer := 0;
-    -- The chance, each cycle, that a message is withdrawn. Then no sink has it any more.
+    -- The chance per cycle that a message is withdrawn. Then no sink has it any more.
     WITHDRAW_PERCENT : integer := 0;
     -- The last sink takes nothing for so many cycles at the start; the others must have the first message at once.
     BLOCKED : integer := 0

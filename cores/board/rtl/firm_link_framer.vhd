@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Finds the ends of frames in a row of bytes, by the lengths that they announce. What comes is bytes and cuts; a cut
--- ends the frame that has begun, so that its converter reports it as broken, and is nothing between frames. A byte that
--- is not the last by its frame's length is held back until the next item tells whether a cut follows.
+-- Finds the ends of frames in a byte stream from their announced lengths. The input consists of bytes and cuts. A cut
+-- ends an incomplete frame, so that its converter reports it as broken; between frames it has no effect. A byte that is
+-- not the last of its frame is held until the next item tells whether a cut follows.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -12,7 +12,7 @@ entity firm_link_framer is
     rst_n : in std_logic;
 
     item_data  : in  std_logic_vector(7 downto 0);
-    item_cut   : in  std_logic;  -- the item is a cut, and no byte
+    item_cut   : in  std_logic;  -- the item is a cut, not a byte
     item_valid : in  std_logic;
     item_ready : out std_logic;
 
@@ -27,7 +27,7 @@ architecture rtl of firm_link_framer is
 
   constant LENGTH_BYTES : positive := 4;
 
-  -- Bytes of the frame before the next one: the id, those of the length, and then payload, whatever its place.
+  -- The position of the next byte in the frame: the id, the bytes of the length, then any byte of the payload.
   subtype place_t is natural range 0 to LENGTH_BYTES+1;
   constant ID_PLACE    : place_t := 0;
   constant LAST_LENGTH : place_t := LENGTH_BYTES;
@@ -35,12 +35,12 @@ architecture rtl of firm_link_framer is
 
   signal place_r     : place_t;
   signal remaining_r : unsigned(8*LENGTH_BYTES-1 downto 0);  -- bytes of the payload still to come
-  signal remaining   : unsigned(8*LENGTH_BYTES-1 downto 0);  -- the same behind the item, if it is a byte
+  signal remaining   : unsigned(8*LENGTH_BYTES-1 downto 0);  -- the same after the item, if it is a byte
   signal is_last     : std_logic;                            -- the item is the last byte of its frame
 
   signal data_r : std_logic_vector(7 downto 0);
   signal held_r : std_logic;  -- data_r holds a byte
-  signal last_r : std_logic;  -- which is its frame's last
+  signal last_r : std_logic;  -- and it is the last of its frame
 
   signal item_ready_out : std_logic;
 

@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Between a host link, which knows bytes, and a system's two streams of frames. Bytes from the host wait in a FIFO, get
--- the ends of their frames from the lengths that these announce, and fill beats; beats to the host are sent byte by
--- byte. The host's bytes cannot be stopped here: who drives the link looks at `room`. If bytes are lost, by the link or
--- for want of room, the frame that has begun is cut and all that follows is dropped, as it could be anything, until the
--- host makes itself clear: by a cut of its own, or by TIMEOUT cycles of silence. Silence cuts a frame that has begun in
--- any case.
+-- Connects a host link, which carries bytes, to a system's two streams of frames. Bytes from the host wait in a FIFO,
+-- are divided into frames by their announced lengths, and fill beats. Beats to the host are sent byte by byte. The
+-- host's bytes cannot be stalled here: the driver of the link must observe `room`. If bytes are lost, by the link or
+-- for lack of room, the current frame is cut and all later bytes, whose meaning is unknown, are dropped. This lasts
+-- until the host resynchronises, by its own cut or by TIMEOUT cycles of silence. Silence always cuts an incomplete
+-- frame.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -14,7 +14,7 @@ entity firm_link_streams is
   generic (
     WIDTH   : integer := 8;
     DEPTH   : integer := 1024;  -- bytes from the host that can wait
-    TIMEOUT : integer := 0    -- 0: silence means nothing
+    TIMEOUT : integer := 0    -- 0: silence has no effect
   );
   port (
     clk   : in std_logic;
@@ -22,7 +22,7 @@ entity firm_link_streams is
 
     rx_data  : in  std_logic_vector(7 downto 0);
     rx_valid : in  std_logic;   -- a pulse with each byte
-    rx_cut   : in  std_logic;   -- a pulse: what comes next begins a frame
+    rx_cut   : in  std_logic;   -- a pulse: the next byte begins a frame
     rx_lost  : in  std_logic;   -- a pulse: bytes were lost
     room     : out natural range 0 to DEPTH;
 
@@ -44,7 +44,7 @@ entity firm_link_streams is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- Pulses where bytes begin to be dropped.
+    -- Pulses when bytes start to be dropped.
     link_error : out std_logic
   );
 end entity firm_link_streams;
@@ -53,15 +53,15 @@ architecture rtl of firm_link_streams is
 
   constant LANES      : positive := WIDTH/8;
   constant COUNT_BITS : positive := clog2(LANES+1);
-  -- A number of one byte, and of none.
+  -- The counts of one byte and of zero bytes.
   constant ONE        : std_logic_vector(COUNT_BITS-1 downto 0) := (0 => '1', others => '0');
   constant NONE       : std_logic_vector(COUNT_BITS-1 downto 0) := (others => '0');
 
-  signal dropping_r : std_logic;                           -- bytes were lost, and the host has not made itself clear
-  signal cut_r      : std_logic;                           -- a cut is to be stored
-  signal silence_r  : natural range 0 to max(TIMEOUT, 1);  -- cycles until silence means a cut; 0 when it has
+  signal dropping_r : std_logic;                           -- bytes were lost, and the host has not resynchronised
+  signal cut_r      : std_logic;                           -- a cut must be stored
+  signal silence_r  : natural range 0 to max(TIMEOUT, 1);  -- cycles until silence causes a cut; 0 when it has
   signal silent     : std_logic;                           -- it does in this cycle
-  signal is_stored  : std_logic;                           -- the byte that comes is kept
+  signal is_stored  : std_logic;                           -- the received byte is kept
   signal lost       : std_logic;
   signal stored_r   : natural range 0 to DEPTH;            -- items in the FIFO
 
@@ -99,7 +99,7 @@ begin
 
   -- ------------------------------------------------------------------ from the host
 
-  -- The last place is for the cut that follows when all others are taken.
+  -- The last place is reserved for the cut that follows when all others are in use.
   is_stored <= '1' when rx_valid = '1' and dropping_r = '0' and cut_r = '0' and stored_r < DEPTH-1 else '0';
   lost      <= rx_lost or (rx_valid and not is_stored);
   put_valid <= '1' when is_stored = '1' or (cut_r = '1' and rx_valid = '0' and stored_r < DEPTH) else '0';

@@ -1,15 +1,15 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over SPI, mode 0, highest bit first, the host being the master; frames are sent as they are.
--- SPI sends both ways in every byte, asked or not, so each selection (spi_cs_n low) begins with a command:
+-- The host's two streams over SPI, mode 0, highest bit first, with the host as master; frames are sent unchanged.
+-- SPI transfers bytes in both directions at once, so each selection (spi_cs_n low) begins with a command:
 --
---   00  status  then come: room for bytes to the system (two bytes, lower first), bytes that wait for the host (two)
---   01  write   what follows are bytes of frames, no more than there is room for
---   02  read    then come bytes of frames; behind those that waited, 00
---   03  cut     what is written next begins a frame: both sides are together again after a fault
+--   00  status  then receive: room for bytes to the system (two bytes, lower first), bytes waiting for the host (two)
+--   01  write   then send: bytes of frames, no more than there is room for
+--   02  read    then receive: bytes of frames; after the waiting ones, 00
+--   03  cut     the next written byte begins a frame: this resynchronises both sides after a fault
 --
--- While the command is sent, what comes back is 80, and 1 more if bytes wait, 2 more if bytes were dropped since the
--- last cut. The pins are sampled by clk, so a period of spi_sclk takes 10 cycles of it at least. A byte counts when its
--- last bit is clocked; selections may end anywhere.
+-- During the command, the host receives 80, plus 1 if bytes wait, plus 2 if bytes were dropped since the last cut.
+-- clk samples the pins, so a period of spi_sclk takes at least 10 cycles of clk. A byte counts when its last bit is
+-- clocked; selections may end anywhere.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -44,7 +44,7 @@ entity firm_spi_link is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- Pulses where bytes begin to be dropped.
+    -- Pulses when bytes start to be dropped.
     link_error : out std_logic
   );
 end entity firm_spi_link;
@@ -57,7 +57,7 @@ architecture rtl of firm_spi_link is
   constant READ   : byte_t := x"02";
   constant CUT    : byte_t := x"03";
 
-  -- The pins, which know no clock, behind two flip-flops; a third one shows edges. The highest bit is the oldest.
+  -- The asynchronous pins after two flip-flops; a third one detects edges. The highest bit is the oldest.
   signal sclk_r : std_logic_vector(2 downto 0);
   signal cs_n_r : std_logic_vector(1 downto 0);
   signal mosi_r : std_logic_vector(1 downto 0);
@@ -65,15 +65,15 @@ architecture rtl of firm_spi_link is
   signal rises : std_logic;
   signal falls : std_logic;
 
-  signal bit_r     : natural range 0 to 7;  -- of the byte, how many came
+  signal bit_r     : natural range 0 to 7;  -- number of received bits of the byte
   signal first_r   : std_logic;             -- the byte is the selection's first
   signal in_r      : std_logic_vector(6 downto 0);
   signal out_r     : byte_t;
   signal command_r : byte_t;
   signal received  : byte_t;
-  signal complete  : std_logic;  -- with this cycle a byte has come
-  signal offered_r : std_logic;  -- what goes out is a byte of the FIFO
-  signal dropped_r : std_logic;  -- bytes were, since the last cut
+  signal complete  : std_logic;  -- a byte is complete in this cycle
+  signal offered_r : std_logic;  -- the outgoing byte is from the FIFO
+  signal dropped_r : std_logic;  -- bytes were dropped since the last cut
   signal status_r  : std_logic_vector(31 downto 0);  -- room and waiting bytes of one moment, what goes out next lowest
 
   signal rx_valid : std_logic;

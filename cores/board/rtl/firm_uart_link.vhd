@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent as they are,
--- byte after byte. A break from the host, or a pause of TIMEOUT_MS, ends a frame that has begun; both bring the two
--- sides together again after bytes were lost. uart_rts_n rises while there is little room, in time for the bytes that
--- an adapter still sends.
+-- The host's two streams over a serial line: eight data bits, no parity, one stop bit; frames are sent unchanged, byte
+-- by byte. A break from the host, or a pause of TIMEOUT_MS, ends an incomplete frame; both resynchronise the two sides
+-- after a loss of bytes. uart_rts_n rises while there is little room, early enough for the bytes that an adapter still
+-- sends.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -19,7 +19,7 @@ entity firm_uart_link is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- As a modem has them: rts_n low lets the host send, cts_n low lets this side send.
+    -- As at a modem: a low rts_n lets the host send, a low cts_n lets this side send.
     uart_rxd   : in  std_logic;
     uart_txd   : out std_logic;
     uart_rts_n : out std_logic;
@@ -39,14 +39,14 @@ entity firm_uart_link is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- Pulses where bytes begin to be dropped.
+    -- Pulses when bytes start to be dropped.
     link_error : out std_logic
   );
 end entity firm_uart_link;
 
 architecture rtl of firm_uart_link is
 
-  -- Cycles of a bit; the nearest number.
+  -- The cycles of a bit, rounded to nearest.
   function divisor_of(clock_hz : integer; baud : integer) return integer is
   begin
     if baud < 1 then
@@ -74,7 +74,8 @@ begin
   assert BAUD >= 1 and CLOCK_HZ / 4 >= BAUD
     report "firm_uart_link: BAUD is " & integer'image(BAUD) & "; legal: 1 to a quarter of CLOCK_HZ"
     severity failure;
-  -- What is over half a bit at the tenth one is read wrong; the host's clock may take the other half of that.
+  -- More than half a bit of error at the tenth bit would misread it; the host's clock may use the other half of the
+  -- margin.
   assert abs (CLOCK_HZ - DIVISOR*BAUD) <= CLOCK_HZ/40
     report "firm_uart_link: " & integer'image(DIVISOR) & " cycles of CLOCK_HZ are no bit at BAUD " & integer'image(BAUD)
            & ", it is off by more than 2.5 %"

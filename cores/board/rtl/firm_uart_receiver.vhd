@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Bytes from a serial line: a start bit, eight data bits with the lowest first, a stop bit. A bit is read in its
--- middle. A low stop bit is a break if all else was low too, and a fault otherwise; either way the line has to rise
--- before the next byte may start.
+-- Receives bytes from a serial line: a start bit, eight data bits with the lowest first, a stop bit. Each bit is
+-- sampled in its middle. A low stop bit is a break if all other bits were low, too, and a fault otherwise. In either
+-- case the line must rise before the next byte can start.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -25,11 +25,11 @@ end entity firm_uart_receiver;
 architecture rtl of firm_uart_receiver is
 
   constant FIRST_BIT : natural := 0;
-  constant STOP_BIT  : natural := 9;  -- behind the start bit and eight of data
+  constant STOP_BIT  : natural := 9;  -- after the start bit and eight data bits
 
   type state_t is (WAITING, RECEIVING, RECOVERING);
 
-  signal line_r  : std_logic_vector(1 downto 0);  -- the pin after two flip-flops, as it knows no clock; bit 1 is older
+  signal line_r  : std_logic_vector(1 downto 0);  -- the asynchronous pin after two flip-flops; bit 1 is older
   signal state_r : state_t;
   signal count_r : natural range 0 to DIVISOR-1;  -- cycles until the next bit's middle
   signal bit_r   : natural range FIRST_BIT to STOP_BIT;

@@ -1,7 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Bytes to a serial line: a start bit, eight data bits with the lowest first, a stop bit. No byte starts while the
--- other side does not want one; one that has started is finished. Bytes that are ready follow each other without a
--- pause.
+-- Sends bytes to a serial line: a start bit, eight data bits with the lowest first, a stop bit. No byte starts while
+-- the other side is not ready; a started byte is completed. Ready bytes follow each other without a pause.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -18,7 +17,7 @@ entity firm_uart_transmitter is
     ready : out std_logic;
 
     uart_txd   : out std_logic;
-    uart_cts_n : in  std_logic  -- low: the other side wants bytes
+    uart_cts_n : in  std_logic  -- low: the other side is ready
   );
 end entity firm_uart_transmitter;
 
@@ -26,11 +25,11 @@ architecture rtl of firm_uart_transmitter is
 
   constant BITS : positive := 10;
 
-  signal cts_n_r : std_logic_vector(1 downto 0);  -- the pin after two flip-flops, as it knows no clock; bit 1 is older
-  signal count_r : natural range 0 to DIVISOR-1;  -- cycles of the bit that are left
-  signal left_r  : natural range 0 to BITS-1;     -- bits behind this one
+  signal cts_n_r : std_logic_vector(1 downto 0);  -- the asynchronous pin after two flip-flops; bit 1 is older
+  signal count_r : natural range 0 to DIVISOR-1;  -- remaining cycles of the bit
+  signal left_r  : natural range 0 to BITS-1;     -- bits after this one
   signal bits_r  : std_logic_vector(BITS-1 downto 0);
-  signal done    : std_logic;                     -- with this cycle the last bit is over
+  signal done    : std_logic;                     -- the last bit ends in this cycle
 
   signal ready_out : std_logic;
 

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A host link between the simulation host and a system that sends every frame back as it is.
+-- A host link between the simulation host and a system that sends every frame back unchanged.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A serial line that does what a script says, and the frames that come of it, one a line, in hexadecimal. The script
--- has a word of six characters and a number a line: `byte   171` sends a byte, `wrong  171` one with a low stop bit,
--- `break  0` a break, `glitch 0` a level that is too short to mean anything, `pause  40` leaves the line alone for so
--- many bits; `system 0` stops the system, which takes no beat until `system 1`.
+-- A serial line driven by a script; the resulting frames are written one per line, in hexadecimal. Each line of the
+-- script has a word of six characters and a number: `byte   171` sends a byte, `wrong  171` one with a low stop bit,
+-- `break  0` a break, `glitch 0` a pulse too short for a start bit; `pause  40` leaves the line idle for 40 bits;
+-- `system 0` stalls the system until `system 1`.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -75,7 +75,7 @@ begin
         rxd <= stop;
         wait for BIT_TIME;
         rxd <= '1';
-        -- Without it, what follows a low stop bit would have no start bit.
+        -- Without it, the byte after a low stop bit would have no start bit.
         if stop = '0' then
           wait for BIT_TIME;
         end if;

@@ -1,17 +1,17 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The handshake of a message, or of an element of an array, between two clock domains. What the source shows is a level
--- a segment, and one that all of it came. They go to the sink and are seen there one after the other, in this order;
--- the sink returns which of them it has seen, and whether it has taken the message. Both go back to zero before the
--- next one, so nothing is lost or seen twice at any ratio of the clocks, and a message may be withdrawn at any time.
+-- Transfers the handshake of a message, or of an array's element, between two clock domains. The source shows one level
+-- per segment, and one that tells that all have arrived. They cross to the sink and appear there in this order. The
+-- sink returns the levels that it has seen, and whether it has taken the message. Both return to zero before the next
+-- message, so nothing is lost or seen twice at any ratio of the clocks, and a message may be withdrawn at any time.
 --
--- The fields are registers of the source's domain, which hold until the sink has let go, as a source that withdraws its
--- message may change them at once. A source that never does need not have them here: they hold until `s_ready`.
+-- The fields are registered in the source's domain until the sink has released them, because a source that withdraws
+-- its message may change them at once. A source that never withdraws does not need this: its fields hold until
+-- `s_ready`.
 --
--- What lies within the message, streams and elements, crosses in entities of its own (firm_cdc_stream,
--- firm_cdc_message) which must not be ahead of it: they let nothing in before `s_settled`, and the next message waits
--- for all of them.
+-- Streams and elements within the message cross in their own entities (firm_cdc_stream, firm_cdc_message). These must
+-- not run ahead of the message: they accept nothing before `s_settled`, and the next message waits for all of them.
 --
--- Constraint: fields are there one cycle of `m_clk` before the sink looks at them; limit their delay to that.
+-- Constraint: fields are stable one cycle of `m_clk` before the sink reads them; limit their delay to that.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -22,32 +22,32 @@ entity firm_cdc_message is
     SEGMENTS : integer := 1;
     -- Bits of all fields.
     FIELD_BITS : integer := 1;
-    -- Streams and elements within.
+    -- The number of streams and elements within the message.
     PARTS : integer := 1
   );
   port (
     s_clk   : in std_logic;
     s_rst_n : in std_logic;
 
-    -- Of what the message lies within: it may begin.
+    -- From the containing message: this one may begin.
     s_enable : in std_logic := '1';
 
     s_fields        : in  std_logic_vector(FIELD_BITS-1 downto 0) := (others => '0');
     s_segment_valid : in  std_logic_vector(SEGMENTS-1 downto 0);
     s_valid         : in  std_logic;
-    -- For a cycle: the sink has it.
+    -- High for a cycle when the sink has the message.
     s_ready         : out std_logic;
 
     -- The sink sees every segment that the source shows.
     s_settled   : out std_logic;
-    -- The sink sees nothing, nor will it.
+    -- The sink sees nothing of the message, and nothing is on its way.
     s_idle      : out std_logic;
     s_part_idle : in  std_logic_vector(PARTS-1 downto 0) := (others => '1');
 
     m_clk   : in std_logic;
     m_rst_n : in std_logic;
 
-    -- Of what the message lies within: it is still there.
+    -- From the containing message: it is still valid.
     m_enable : in std_logic := '1';
 
     m_fields        : out std_logic_vector(FIELD_BITS-1 downto 0);
@@ -62,21 +62,21 @@ architecture rtl of firm_cdc_message is
   constant NONE      : std_logic_vector(SEGMENTS downto 0) := (others => '0');
   constant ALL_PARTS : std_logic_vector(PARTS-1 downto 0)  := (others => '1');
 
-  -- A bit a segment, and above them that all came.
+  -- One bit per segment; the bit above tells that all have arrived.
   subtype levels_t is std_logic_vector(SEGMENTS downto 0);
 
   -- Of the source's domain.
   signal request_r   : levels_t;
   signal fields_r    : std_logic_vector(FIELD_BITS-1 downto 0);
-  signal withdrawn_r : std_logic;  -- the source has let go before the sink has seen what it showed
+  signal withdrawn_r : std_logic;  -- the source has withdrawn the message before the sink has seen its levels
   signal returned    : std_logic_vector(SEGMENTS+1 downto 0);
   signal shown       : levels_t;
   signal done        : std_logic;
   signal is_clear    : std_logic;  -- the sink is ready for another message
-  signal is_seen     : std_logic;  -- the sink has seen all that is requested
+  signal is_seen     : std_logic;  -- the sink has seen all requested levels
   signal begins      : std_logic;
 
-  -- Of the sink's domain: what it has seen, and above it that it is through with the message.
+  -- In the sink's domain: the levels that it has seen; the bit above tells that it has finished the message.
   signal requested : levels_t;
   signal answer_r  : std_logic_vector(SEGMENTS+1 downto 0);
   signal is_fallen : std_logic;  -- the message was withdrawn
@@ -119,7 +119,7 @@ begin
         request_r   <= (others => '0');
         withdrawn_r <= '0';
       elsif request_r(0) = '1' and (withdrawn_r = '1' or s_segment_valid(0) = '0') then
-        -- A level falls only after it was seen: no pulse can be lost on the way.
+        -- A level falls only after it was seen, so no pulse can be lost.
         withdrawn_r <= '1';
         if is_seen = '1' then
           request_r   <= (others => '0');
@@ -150,9 +150,9 @@ begin
       synced => requested
     );
 
-  -- Levels that rise or fall together may arrive one after the other, in any order: each is shown behind those before
-  -- it, and none any more when the first of them has fallen. In a reset, which the sink may be through with already,
-  -- they are those from before it.
+  -- Levels that rise or fall together may arrive at different times, in any order. Each is shown only after those
+  -- before it, and none after the first of them has fallen. During a reset, which may already be over for the sink, the
+  -- levels are those from before it.
   is_fallen <= '1' when (answer_r(SEGMENTS downto 0) and not requested) /= NONE else '0';
 
   order : process (requested, m_rst_n, m_enable, answer_r, is_fallen)

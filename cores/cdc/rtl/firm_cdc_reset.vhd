@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A reset for another clock domain: it begins with `rst_n` at once, whatever the clock does, and ends with a rising
--- edge, three or more of them after both `rst_n` and `release` are high. So a reset is never too short to be seen, and
--- when it ends, what came through synchronisers before it is gone from them.
+-- Transfers a reset to another clock domain: it begins with `rst_n` at once, even without a clock. It ends with a
+-- rising edge, at least three edges after both `rst_n` and `release` are high. A reset is therefore never too short to
+-- be seen, and when it ends, synchronisers no longer hold values from before it.
 --
 -- Constraint: the paths to the registers' clear and into the first register are asynchronous
 -- (docs/how-to/use-several-clocks.md).
@@ -11,9 +11,9 @@ use ieee.std_logic_1164.all;
 entity firm_cdc_reset is
   port (
     clk   : in std_logic;
-    -- From a register, as it clears asynchronously.
+    -- Must come from a register, because it clears asynchronously.
     rst_n : in std_logic;
-    -- Of any domain; it is low while `rst_n` is, and for as long as the reset has to last.
+    -- From any domain; low while `rst_n` is low, and for as long as the reset must last.
     release : in std_logic := '1';
 
     synced_rst_n : out std_logic

@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A stream of a message between two clock domains, and between two widths where they differ: a FIFO in distributed RAM,
--- as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It takes and gives a beat a cycle;
--- the slower clock, or the narrower end, sets the pace.
+-- Transfers a stream of a message between two clock domains, and between two widths if they differ. It is a FIFO in
+-- distributed RAM, as wide as the wider end, whose pointers cross in Gray code, one bit at a time. It takes and gives a
+-- beat per cycle; the slower clock, or the narrower end, limits the throughput.
 --
--- A stream's last beat is not taken from the source before the sink has it. So whatever the source shows after a
--- stream, such as that the message is complete, is not ahead of the stream at the sink.
+-- The last beat of a stream is taken from the source only when the sink has it. Later events at the source, such as the
+-- completion of the message, therefore never overtake the stream at the sink.
 --
--- Constraint: RAM to `m_axis_*` is written two cycles of `m_clk` or more before it is read; limit its delay to one. The
--- bits of a pointer may not be further apart than a cycle of the clock that they come from.
+-- Constraint: RAM to `m_axis_*` is written at least two cycles of `m_clk` before it is read; limit its delay to one.
+-- The skew between the bits of a pointer must be less than a cycle of their source clock.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -18,19 +18,20 @@ entity firm_cdc_stream is
   generic (
     S_WIDTH : integer := 8;
     M_WIDTH : integer := 8;
-    -- Beats, a power of two, 4 or more. The pointers' way and back takes some nine cycles: 16 never hold up the stream.
+    -- Beats, a power of two, at least 4. A round trip of the pointers takes some nine cycles, so 16 never stall the
+    -- stream.
     DEPTH : integer := 16
   );
   port (
     s_clk   : in std_logic;
     s_rst_n : in std_logic;
 
-    -- The message that the stream is part of, as its source shows it. When it falls, what has come of the stream is
+    -- The message that contains the stream, as its source shows it. When it falls, the received part of the stream is
     -- dropped.
     s_open   : in  std_logic := '1';
-    -- The sink sees this message: beats may follow.
+    -- The sink sees this message, so beats may follow.
     s_enable : in  std_logic := '1';
-    -- Nothing is on its way.
+    -- No data is under way.
     s_idle   : out std_logic;
 
     s_axis_tdata  : in  std_logic_vector(S_WIDTH-1 downto 0);
@@ -42,7 +43,7 @@ entity firm_cdc_stream is
     m_clk   : in std_logic;
     m_rst_n : in std_logic;
 
-    -- The message as the sink sees it. While it is low, what comes is dropped.
+    -- The message as the sink sees it. While it is low, all data is dropped.
     m_open : in std_logic := '1';
 
     m_axis_tdata  : out std_logic_vector(M_WIDTH-1 downto 0);
@@ -58,14 +59,14 @@ architecture rtl of firm_cdc_stream is
   constant WIDTH        : positive := max(S_WIDTH, M_WIDTH);
   constant WORD_BITS    : positive := WIDTH + WIDTH/8 + 1;
   constant INDEX_BITS   : positive := clog2(DEPTH);
-  -- A pointer has a bit more than an index, which tells a full FIFO from an empty one.
+  -- A pointer has one bit more than an index, to distinguish a full FIFO from an empty one.
   constant POINTER_BITS : positive := INDEX_BITS + 1;
 
   subtype pointer_t is unsigned(POINTER_BITS-1 downto 0);
   subtype gray_t is std_logic_vector(POINTER_BITS-1 downto 0);
   type memory_t is array (0 to DEPTH-1) of std_logic_vector(WORD_BITS-1 downto 0);
 
-  -- Two neighbours differ in one bit, the highest and zero as well.
+  -- Successive values differ in one bit, as do the highest and zero.
   function gray_of(pointer : pointer_t) return std_logic_vector is
   begin
     return std_logic_vector(pointer xor ('0' & pointer(POINTER_BITS-1 downto 1)));
@@ -173,7 +174,7 @@ begin
           write_r      <= write_r + 1;
           write_gray_r <= gray_of(write_r + 1);
         end if;
-        -- A beat that is not offered any more was withdrawn with its message.
+        -- A beat that is no longer offered was withdrawn with its message.
         last_r <= (write and wide_tlast) or (last_r and wide_tvalid and not is_drained);
       end if;
     end if;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Brings levels into another clock domain: each bit passes a row of registers, in which it has time to settle. Every
--- bit must come from a register of its own domain, with no logic behind it, and no two bits arrive together for
--- certain.
+-- Brings levels into another clock domain: each bit passes a chain of registers, in which it has time to settle. Every
+-- bit must come directly from a register of its own domain, without logic after it. Bits that change together may
+-- arrive at different times.
 --
 -- Constraint: the path into the first register is asynchronous (docs/how-to/use-several-clocks.md).
 library ieee;
@@ -10,7 +10,7 @@ use ieee.std_logic_1164.all;
 entity firm_cdc_sync is
   generic (
     BITS : integer := 1;
-    -- Registers in a row, 2 or more.
+    -- The length of the chain of registers, 2 or more.
     STAGES : integer := 2
   );
   port (
@@ -22,7 +22,7 @@ end entity firm_cdc_sync;
 
 architecture rtl of firm_cdc_sync is
 
-  -- The first stage lies lowest. All are to be placed side by side, and never to become a shift register in RAM.
+  -- The first stage has the lowest bits. Place all stages side by side; they must never become a shift register in RAM.
   signal stages_r : std_logic_vector(STAGES*BITS-1 downto 0);
 
   attribute async_reg     : string;

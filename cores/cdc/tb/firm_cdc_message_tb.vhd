@@ -1,9 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A message of variable size between two clocks: a field, a stream, and an array of elements that have a field and a
--- stream each. Lengths and bytes follow from the message's number, which is its first field, so the sink knows what
--- must come next. It checks at every edge that fields hold while they are shown, that nothing is ahead of what was
--- before it at the source, and that a withdrawn message leaves nothing behind. A source that withdraws drives 'X' from
--- there on.
+-- stream each. Lengths and bytes derive from the message's number, which is its first field, so the sink can predict
+-- them. It checks at every edge that fields hold while they are valid, that the order of events at the source is kept,
+-- and that a withdrawn message leaves no trace. A source that withdraws drives 'X' from then on.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -20,7 +19,7 @@ entity firm_cdc_message_tb is
     MESSAGES    : integer := 300;  -- at most 65535
     -- The chance, each cycle, that an end does nothing.
     STALL_PERCENT : integer := 0;
-    -- The chance of a message that it is withdrawn at some time.
+    -- The chance that a message is withdrawn at some time.
     WITHDRAW_PERCENT : integer := 0;
     -- The chance of a message that a reset of one cycle meets it.
     RESET_PERCENT : integer := 0;
@@ -87,7 +86,7 @@ architecture simulation of firm_cdc_message_tb is
   signal stream_idle    : std_logic;
   signal element_stream : std_logic;
 
-  -- What the source says of its messages: the last one that it withdrew or lost in a reset, and how many were taken.
+  -- State of the source's messages: the last one withdrawn or lost in a reset, and the number taken.
   signal withdrawn : natural := 0;
   signal given     : natural := 0;
   signal taken     : natural := 0;
@@ -323,7 +322,7 @@ begin
     procedure cycle is
     begin
       wait until rising_edge(s_clk);
-      -- What is complete is not withdrawn any more.
+      -- A complete message is no longer withdrawn.
       if s_rst_n = '0' or (left = 0 and s_valid = '0') then
         is_over := true;
       end if;

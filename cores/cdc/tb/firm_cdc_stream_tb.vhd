@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Streams of random length through the crossing, or at one clock through the resizer alone: every byte must come once,
--- in order, in full beats from lane 0 up with zeros in lanes that are not kept. The source may not be rid of a stream's
--- last beat before the sink has it.
--- Without stalls the pace is that of the slower end: the longest stream may take no more than its beats there, and
+-- Streams of random length through the crossing, or at one clock through the resizer alone: every byte must arrive
+-- once, in order, in full beats from lane 0 up, with zeros in unused lanes. The last beat of a stream must not be taken
+-- from the source before the sink has it.
+-- Without stalls, the slower end sets the pace: the longest stream may take no more cycles than its beats there plus
 -- SLACK.
 library ieee;
 use ieee.std_logic_1164.all;

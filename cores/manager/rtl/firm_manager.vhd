@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Stands between the host's two streams and the converters. Host to subscribers: takes the id off a frame and routes
--- it. Publishers to host: sends the frames of the publisher that the scheduler in the slot grants. Register slices on
--- the host's sides cut every path between the host and the converters.
+-- Connects the host's two streams to the converters. From host to subscribers, it removes the id of a frame and routes
+-- the frame. From publishers to host, it sends the frames of the publisher that the scheduler in the slot grants.
+-- Register slices on the host's sides cut every path between the host and the converters.
 -- If the scheduler is PREEMPTIVE, it may move the grant within frames, and the host gets bursts
 -- (docs/reference/manager.md).
 library ieee;
@@ -36,14 +36,14 @@ entity firm_manager is
     m_axis_tlast  : out std_logic;
     m_axis_tready : in  std_logic;
 
-    -- To the subscribers: data for all, one bit each to say for whom.
+    -- To the subscribers: data for all, one bit each to select one.
     sub_axis_tdata  : out std_logic_vector(WIDTH-1 downto 0);
     sub_axis_tkeep  : out std_logic_vector(WIDTH/8-1 downto 0);
     sub_axis_tlast  : out std_logic;
     sub_axis_tvalid : out std_logic_vector(SUBSCRIBERS-1 downto 0);
     sub_axis_tready : in  std_logic_vector(SUBSCRIBERS-1 downto 0);
 
-    -- From the publishers; publisher 0 lies lowest.
+    -- From the publishers; publisher 0 has the lowest bits.
     pub_axis_tdata  : in  std_logic_vector(PUBLISHERS*WIDTH-1 downto 0);
     pub_axis_tkeep  : in  std_logic_vector(PUBLISHERS*(WIDTH/8)-1 downto 0);
     pub_axis_tvalid : in  std_logic_vector(PUBLISHERS-1 downto 0);
@@ -205,7 +205,7 @@ begin
       m_axis_tready => m_axis_tready
     );
 
-  -- No publisher has an id of more bits.
+  -- Ids of publishers have at most this number of bits.
   name_publisher : for place in 0 to 7 generate
     of_index : if place < index_bits(PUBLISHERS) generate
       m_axis_tid(place) <= out_tid(place);

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The Manager's way to the host under a grant that moves at random, also within frames and also to publishers that have
--- nothing to send; or, for comparison, under a scheduler. What each publisher sends follows from its index and the
--- number of the frame, as the test that reads TRACE_FILE knows, too: of each burst one line, `tid`, a blank and the
--- bytes in hex. The last line that is printed has the beats taken from the publishers, those at the host, and the
--- cycles between the first of the former and the last of the latter.
+-- The Manager's path to the host under a grant that moves at random, even within frames and to publishers without a
+-- request; or, for comparison, under a scheduler. The frames of each publisher derive from its index and the frame's
+-- number, as the test that reads TRACE_FILE knows. TRACE_FILE has one line per burst: `tid`, a blank and the
+-- bytes in hex. The last printed line has the beats taken from the publishers, those at the host, and the
+-- cycles from the first of the former to the last of the latter.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -23,13 +23,13 @@ entity firm_manager_burst_tb is
     -- Frames of each publisher; of frame f of publisher p the payload has (17*p + 29*f) mod (LONGEST+1) bytes.
     FRAMES     : positive := 10;
     LONGEST    : natural  := 100;
-    -- Publisher 0 stops for ever behind its first beat.
+    -- Publisher 0 stops for good after its first beat.
     STOPPED       : boolean  := false;
     TRACE_FILE    : string   := "bursts.txt";
     EXPECTED_FILE : string   := "";
     SEED          : positive := 1;
-    -- The chance in a cycle that the grant moves; that it moves to any publisher, whether it has a beat or not; that a
-    -- publisher pauses behind a beat; that the host takes none.
+    -- The chances per cycle that the grant moves; that it moves to any publisher, even without a beat; that a publisher
+    -- pauses after a beat; that the host stalls.
     MOVE_PERCENT  : natural := 30;
     IDLE_PERCENT  : natural := 0;
     PAUSE_PERCENT : natural := 0;

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Least recently used for few requesters: of those that ask, who has waited longest since it completed a task.
--- A matrix of one bit for each pair says which of the two has waited longer. All pairs are looked at in one cycle,
--- so the next task is chosen in that of the last beat. Its area grows with the square of the requesters.
+-- Least recently used for few requesters: of those that request, it grants the one whose last task ended the longest
+-- time ago. A matrix of one bit per pair tells which of the two has waited longer. All pairs are compared in one cycle,
+-- so the next task is chosen in the cycle of the last beat. The area grows with the square of the requesters.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -18,7 +18,7 @@ entity firm_sched_age_matrix is
 
     request : in std_logic_vector(REQUESTERS-1 downto 0);
     beat    : in std_logic;  -- a beat of the granted requester is taken in this cycle
-    last    : in std_logic;  -- and is its task's last; read with `beat` only
+    last    : in std_logic;  -- and is its task's last; only valid with `beat`
 
     grant_valid  : out std_logic;
     grant_select : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
@@ -34,7 +34,7 @@ architecture rtl of firm_sched_age_matrix is
   signal longer   : matrix_t;
   signal longer_r : matrix_t;
 
-  signal spent    : row_t;  -- the requester whose task ends in this cycle: its request is its last beat's
+  signal spent    : row_t;  -- the requester whose task ends in this cycle; its request belongs to the last beat
   signal eligible : row_t;
   signal chosen   : row_t;
   signal goes_on  : std_logic;

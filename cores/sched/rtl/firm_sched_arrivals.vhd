@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Which tasks have come: a task is accepted once and stays `known` until it finishes; accepted ones leave one a cycle.
+-- Detects new tasks: a task is accepted once and stays `known` until it finishes; accepted tasks leave one per cycle.
 --
--- The requesters stand in rows. When no accepted task is here, the next row in which somebody asks is looked at, and
--- all of its new requests are accepted at once; they leave lowest index first. Rows take turns, so nobody waits for
--- ever behind lower indices that come again and again, and a lone request is accepted in the cycle in which it comes.
+-- The requesters are arranged in rows. When no accepted task is left, the next row with a request is read, and all its
+-- new requests are accepted at once; they leave lowest index first. Rows take turns, so that lower indices that return
+-- again and again cannot starve others. A lone request is accepted in the cycle in which it arrives.
 --
--- What is known lies in distributed RAM, a row a word: a requester is known where its bits in `accepted` and
--- `finished` differ. So the row that is accepted and the task that finishes write to memories of their own.
--- The RAM keeps what was there before a reset: after it the rows are made equal, one a cycle.
+-- The set of known tasks is in distributed RAM, one row per word: a requester is known if its bits in `accepted` and
+-- `finished` differ. Accepted rows and finished tasks can therefore write to separate memories.
+-- The RAM keeps its content during a reset: afterwards the rows are made equal, one per cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -31,9 +31,9 @@ entity firm_sched_arrivals is
     id     : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
     leaves : in  std_logic;
 
-    -- A requester finishes a task, which may be known or not. If it has not left, it is forgotten.
+    -- A requester finishes a task, known or not. If the task has not left, it is dropped.
     finished       : in std_logic;
-    finished_known : in std_logic;  -- it is known and has left; read with `finished` only
+    finished_known : in std_logic;  -- it is known and has left; only valid with `finished`
     finished_id    : in std_logic_vector(index_bits(REQUESTERS)-1 downto 0)
   );
 end entity firm_sched_arrivals;
@@ -51,18 +51,18 @@ architecture rtl of firm_sched_arrivals is
   subtype columns_t is std_logic_vector(COLUMNS-1 downto 0);
   subtype requesters_t is std_logic_vector(ROWS*COLUMNS-1 downto 0);
 
-  signal cleared_r : unsigned(ROW_BITS downto 0);  -- the next row to be made equal; the highest bit: all are
+  signal cleared_r : unsigned(ROW_BITS downto 0);  -- the next row to equalise; the highest bit: all are done
   signal clearing  : std_logic;
 
-  signal batch_r : columns_t;  -- accepted and still here
-  signal row_r   : row_t;      -- their row; after they have left the last one
+  signal batch_r : columns_t;  -- accepted, but not yet left
+  signal row_r   : row_t;      -- their row, or the last one if all have left
 
   signal asks          : std_logic_vector(ROWS*COLUMNS-1 downto 0);
   signal rows_that_ask : rows_t;
   signal rows_above    : rows_t;
   signal found_row     : row_t;
   signal next_row      : row_t;
-  signal row_asks      : columns_t;  -- of the next row
+  signal row_asks      : columns_t;  -- requests of the next row
   signal row_accepted  : columns_t;
   signal row_finished  : columns_t;
   signal row_known     : columns_t;
@@ -71,7 +71,7 @@ architecture rtl of firm_sched_arrivals is
   signal load          : std_logic;
   signal accept_row    : std_logic;
 
-  signal first   : column_t;  -- who leaves next
+  signal first   : column_t;  -- the requester that leaves next
   signal next_id : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
 
   signal padded_id       : std_logic_vector(ROW_BITS+COLUMN_BITS-1 downto 0);
@@ -143,7 +143,7 @@ begin
       write_word   => new_accepted
     );
 
-  -- Whoever is known no longer is. A task that is forgotten is known, too.
+  -- A finished requester is no longer known. A task that is dropped was known, too.
   forgets      <= any_of(batch_r and finished_column) when row_r = finished_row else '0';
   finish_task  <= finished and (finished_known or forgets);
   new_finished <= old_finished xor finished_column;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A scheduler of schedulers: requesters lie in groups, each with a scheduler of its own, and one more chooses among the
--- groups. A group asks if the requester asks to which its own scheduler gives the grant. A group that is not chosen
--- sees no beat, as if nobody took it.
--- The index of the granted requester is selected among those of the groups: registers, with a multiplexer behind them.
+-- A scheduler of schedulers: requesters form groups, each with its own scheduler, and one more scheduler chooses among
+-- the groups. A group requests if the requester that its scheduler grants does. A group that is not chosen sees no
+-- beats, as if the sink were not ready.
+-- The index of the granted requester is selected among those of the groups: registers, followed by a multiplexer.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -13,12 +13,12 @@ use firm.firm_sched_pkg.all;
 entity firm_sched_combined is
   generic (
     REQUESTERS : integer := 2;
-    -- Of each group: how many requesters it has, the lowest indices first, and its policy.
+    -- For each group: the number of its requesters, the lowest indices first, and its policy.
     SIZES      : times_t    := (1, 1);
     POLICIES   : policies_t := (LRU, LRU);
-    -- Among the groups; one without deadlines, since a group has none.
+    -- The policy among the groups; one without deadlines, since a group has none.
     TOP_POLICY : policy_t := LRU;
-    -- Of the policies that know them; one time for each requester.
+    -- For the policies that use them; one time for each requester.
     PERIODS        : times_t := IMPLICIT;
     TRANSFER_TIMES : times_t := IMPLICIT;
     DEADLINES      : times_t := IMPLICIT;
@@ -71,7 +71,7 @@ begin
 
   group_beat <= decode(top_select, beat, GROUPS);
 
-  -- Ranges that do not fit would end the elaboration before an assert can speak.
+  -- Ranges that do not fit would end the elaboration before an assert can report them.
   each_group : for group_index in 0 to GROUPS-1 generate
     legal : if IS_LEGAL generate
       constant SIZE  : positive := time_of(group_index, SIZES);

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Earliest deadline first, preemptive, with few cycles: up to 8 requesters are compared all at once, more of them
--- wait in a sorted queue, which hands over a task every cycle.
+-- Earliest deadline first, preemptive, with few cycles: up to 8 requesters are compared in parallel; more requesters
+-- wait in a sorted queue, which supplies a task every cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

@@ -2,19 +2,16 @@
 -- The scheduler of the policies that keep their tasks in a priority queue: the smallest key goes first.
 --
 --   request -> arrivals -> B, a task with its key -> queue -> current, the task that has the grant
---
--- A task's key is its deadline (EDF), its deadline less its transfer time, which is its latest start (LST), or the
--- stamp of its requester's last completion (LRU). All tasks' slack shrinks by one a cycle but that of the one that
--- sends: its key grows by one a beat instead, so that no other key ever changes.
---
--- When a task finishes, the next is the queue's root; if the queue is empty B, else who arrives. If there is
--- nobody, the grant stays where it is, parked: its requester may begin a task before that is accepted, which then
--- has no key yet and keeps the grant until it has. While the queue has no root for it fills it, B or who arrives goes
--- first where the root can preempt it after a beat; else nobody is granted.
--- A task with a smaller key (EDF, LST) takes the grant; the one that had it goes back into the queue through B.
---
--- Keys are compared as numbers that wrap around. So that they stay less than half their range apart whatever the
--- host does, time stands still while the current task's or the root's is overdue.
+-- A task's key is its deadline (EDF), its deadline minus its transfer time, which is its latest start (LST), or the
+-- stamp of its requester's last completion (LRU). The slack of all tasks except the sending one shrinks by one per
+-- cycle. Instead of changing all other keys, the key of the sending task grows by one per beat.
+-- When a task finishes, the next one is the queue's root; if the queue is empty, B; otherwise an arriving task. If
+-- there is none, the grant is parked where it is: its requester may begin a task before this is accepted. Such a task
+-- has no key yet, and keeps the grant until it has one. While the queue refills its root, B or an arriving task goes
+-- first if the root can preempt it after a beat; otherwise there is no grant.
+-- A task with a smaller key (EDF, LST) takes the grant; the preempted one goes back into the queue through B.
+-- Keys are compared as numbers that wrap around. They must stay less than half their range apart for any behaviour of
+-- the host. Time therefore stops while the key of the current task or of the root is overdue.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -27,7 +24,7 @@ entity firm_sched_engine is
   generic (
     REQUESTERS   : integer  := 2;
     POLICY       : policy_t := LRU;        -- or EDF_RESOURCES, EDF_LATENCY, LST
-    -- From the time at which a task leaves the arrivals to its key; not for LRU.
+    -- Added to the time at which a task leaves the arrivals, gives its key; not for LRU.
     OFFSETS      : times_t  := IMPLICIT;
     TIME_BITS    : integer  := 16;
     SHORTEST_RUN : integer  := 1
@@ -48,7 +45,7 @@ end entity firm_sched_engine;
 architecture rtl of firm_sched_engine is
 
   constant ID_BITS : positive := index_bits(REQUESTERS);
-  -- Stamps are sparse enough for the sweep of firm_sched_stamps with 5 bits more than an index.
+  -- With 5 bits more than an index, stamps are sparse enough for the sweep of firm_sched_stamps.
   constant STAMP_BITS : positive := ID_BITS + 5;
   constant HAS_STAMPS : boolean  := POLICY = LRU;
   constant IS_SORTED  : boolean  := POLICY = EDF_LATENCY;
@@ -99,8 +96,8 @@ architecture rtl of firm_sched_engine is
   signal next_key       : key_t;
 
   signal finished  : std_logic;
-  signal choose    : std_logic;  -- nobody has the grant in the next cycle by right
-  signal gives_way : std_logic;  -- the queue, to who is on the way to it
+  signal choose    : std_logic;  -- no task is entitled to the grant in the next cycle
+  signal gives_way : std_logic;  -- the queue yields to an item that is about to enter it
   signal take_root : std_logic;
   signal take_b    : std_logic;
   signal take_a    : std_logic;
@@ -108,13 +105,13 @@ architecture rtl of firm_sched_engine is
   signal preempt   : std_logic;
   signal get_key   : std_logic;  -- the current task gets its key
 
-  signal advance : std_logic;    -- time does
+  signal advance : std_logic;    -- time advances
 
 begin
 
   finished <= beat and last;
 
-  -- Who arrives.
+  -- Arriving tasks.
 
   u_arrivals : entity firm.firm_sched_arrivals
     generic map (
@@ -249,7 +246,7 @@ begin
       );
   end generate of_few_cycles;
 
-  -- Who is granted next.
+  -- The next grant.
 
   choose    <= finished or not (running_r or beat);
   take_root <= choose and first_valid;
@@ -263,7 +260,7 @@ begin
   begin
     root_is_before <= root_valid and is_before(root_key, key_r);
     b_has_room     <= '1' when IS_SORTED else not b_valid_r;
-    -- Better who may come first than nobody, since who should have takes the grant from it after a beat.
+    -- A possibly wrong task is better than none, since the right one preempts it after a beat.
     gives_way      <= not first_valid when SHORTEST_RUN <= 1 else empty;
     preempt        <= running_r and keyed_r and root_is_before and b_has_room and may_leave and not finished;
   end generate preemptive;
@@ -276,8 +273,8 @@ begin
     may_leave <= '1';
   end generate runs_of_one;
   longer_runs : if SHORTEST_RUN > 1 generate
-    signal beats_r : natural range 0 to SHORTEST_RUN;  -- of the run, no further than to the shortest
-    signal beats   : natural range 0 to SHORTEST_RUN;  -- with that of this cycle
+    signal beats_r : natural range 0 to SHORTEST_RUN;  -- of the run, saturating at the shortest run
+    signal beats   : natural range 0 to SHORTEST_RUN;  -- including that of this cycle
     signal pauses  : std_logic;
   begin
     beats     <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;

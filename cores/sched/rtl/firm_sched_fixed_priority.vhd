@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Fixed priority: the lowest index goes first. Non-preemptive, a task that has begun is never interrupted;
--- preemptive, it is by each request of a higher priority, but not before SHORTEST_RUN of its beats were taken in a row.
+-- Fixed priority: the lowest index goes first. If non-preemptive, a task that has begun is never interrupted. If
+-- preemptive, each request of a higher priority interrupts it, but only after SHORTEST_RUN of its beats in a row.
 -- The next task is chosen in the cycle of the last beat, so that ready requesters follow each other without a gap. The
--- request that the granted one shows in that cycle is its last beat's, not a new task's: it is left out. If nobody
--- else asks, the grant stays where it is, which costs nothing and serves a lone requester without a gap as well.
+-- request of the granted one in that cycle belongs to its last beat, not to a new task, and is ignored. Without other
+-- requests, the grant stays where it is, which costs nothing and serves a lone requester without a gap.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -14,7 +14,7 @@ entity firm_sched_fixed_priority is
   generic (
     REQUESTERS : integer := 2;
     PREEMPTIVE : boolean := false;
-    -- Beats; of a preemptive one only. A requester that pauses may be interrupted all the same.
+    -- In beats; only if preemptive. A requester that pauses may be interrupted earlier.
     SHORTEST_RUN : integer := 1
   );
   port (
@@ -34,10 +34,10 @@ architecture rtl of firm_sched_fixed_priority is
 
   signal finished  : std_logic;
   signal offered   : std_logic;  -- the granted requester's request
-  signal found     : std_logic;  -- another one asks
-  signal is_before : std_logic;  -- one of a higher priority does
+  signal found     : std_logic;  -- another requester requests
+  signal is_before : std_logic;  -- one of a higher priority requests
   signal choice    : std_logic_vector(index_bits(REQUESTERS)-1 downto 0);  -- of the others
-  signal kept      : std_logic;  -- the granted requester keeps the grant until its task is finished, whoever asks
+  signal kept      : std_logic;  -- the granted requester keeps the grant until its task is finished
   signal moves     : std_logic;  -- the choice becomes the grant
 
   signal grant_valid_r  : std_logic;
@@ -53,7 +53,7 @@ begin
     report "firm_sched_fixed_priority: " & fault_of_run(SHORTEST_RUN)
     severity failure;
 
-  -- The Manager selects `beat` and `last` by the grant, so they come late: they do not enter the choice.
+  -- The Manager selects `beat` and `last` by the grant, so they arrive late and are kept out of the choice.
   finished <= beat and last;
   moves    <= found and (finished or (not kept and (is_before or not offered)));
 
@@ -91,7 +91,7 @@ begin
   whole_runs : if PREEMPTIVE and SHORTEST_RUN > 1 generate
     subtype beats_t is natural range 0 to SHORTEST_RUN;
     signal beats   : beats_t;
-    signal beats_r : beats_t;                       -- of the run, no further than to the shortest
+    signal beats_r : beats_t;                       -- of the run, saturating at the shortest run
   begin
     beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
     kept  <= offered when beats > 0 and beats < SHORTEST_RUN else '0';

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Of those that ask, the next index after a given one, cyclically; the given one itself is the last. No registers.
--- Requesters lie in rows. First comes who is further on in the row of the given one; if nobody is, the lowest one of
--- the next row in which anybody asks, which may be that row again. Both are looked for at the same time.
+-- Finds the next requesting index after a given one, cyclically; the given one itself is the last. No registers.
+-- Requesters are arranged in rows. A later requester in the row of the given one goes first; otherwise, the lowest one
+-- of the next row with a request, which may be the same row. Both are searched for in parallel.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -23,10 +23,10 @@ end entity firm_sched_following;
 architecture rtl of firm_sched_following is
 
   constant BITS : positive := index_bits(REQUESTERS);
-  -- Up to it, rows are not worth their effort.
+  -- Up to this number, rows are not worth their cost.
   constant FEW : positive := 8;
 
-  -- The lowest one that is more than `index`, else the lowest one.
+  -- The lowest one above `index`, otherwise the lowest one.
   function next_of(bits, index : std_logic_vector) return std_logic_vector is
     constant COUNT : positive := bits'length;
     variable later : std_logic_vector(COUNT-1 downto 0);

@@ -1,14 +1,14 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A priority queue of few LUTs: a heap in distributed RAM, of items that each have an index of their own.
+-- A priority queue of few LUTs: a heap in distributed RAM, of items with distinct indices.
 --
--- Item i lies somewhere on the path from the root to leaf i, so a node holds only the bits of the index that are
--- not its own address, and there is always room. INSERT goes down the item's path: at each node the one that comes
--- first stays, the other goes on along its own path. After a pop the hole is filled with the smaller of the two
--- nodes below, whose hole is filled in turn. Each operation is at one level a cycle, and several follow each other
--- down. The root is a register: it is always the item that comes first, but for the cycle after a pop, when it is
--- filled anew. What fills it can be popped in that cycle, too; then the root is filled two cycles later.
---
--- The RAM keeps what was there before a reset. So the nodes are cleared after it, a path to a pair of leaves a cycle.
+-- Item i is always on the path from the root to leaf i. A node therefore holds only the bits of the index that are not
+-- its own address, and there is always room. INSERT goes down the item's path: at each node the item that goes first
+-- stays, and the other continues on its own path. After a pop, the smaller of the two nodes below fills the hole, and
+-- its own hole is filled in turn. Each operation is at one level per cycle, and several follow each other
+-- down. The root is a register: it is always the item that goes first, except in the cycle after a pop, when it is
+-- refilled. The item that fills it can be popped in that cycle, too; then the root is filled two cycles later.
+-- The RAM keeps its content during a reset. The nodes are therefore cleared after it, one path to a pair of leaves per
+-- cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -31,16 +31,16 @@ entity firm_sched_heap is
     insert_id    : in  std_logic_vector(index_bits(ITEMS)-1 downto 0);
     insert_key   : in  std_logic_vector(KEY_BITS-1 downto 0);
 
-    -- The item with the smallest key, of equal ones that of the lowest index.
+    -- The item with the smallest key; among equals, the lowest index.
     root_valid : out std_logic;
     root_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     root_key   : out std_logic_vector(KEY_BITS-1 downto 0);
-    -- The same where it is there, else the item that becomes the root in this cycle.
+    -- The root if it is valid, otherwise the item that becomes the root in this cycle.
     first_valid : out std_logic;
     first_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     first_key   : out std_logic_vector(KEY_BITS-1 downto 0);
     pop         : in  std_logic;    -- takes that item; only while it is valid
-    empty       : out std_logic     -- nothing is in the queue; while '0', a root is there or comes
+    empty       : out std_logic     -- the queue is empty; while '0', a root is valid or about to be
   );
 end entity firm_sched_heap;
 
@@ -55,7 +55,7 @@ architecture rtl of firm_sched_heap is
   signal root_valid_r : std_logic;
   signal root_id_r    : id_t;
   signal root_key_r   : key_t;
-  signal filling_r    : std_logic;  -- the level below tells what the root is from the next cycle on
+  signal filling_r    : std_logic;  -- the level below determines the root of the next cycle
   signal owing_r      : std_logic;  -- that was popped in the last cycle
   signal fill         : std_logic;
 
@@ -65,7 +65,7 @@ architecture rtl of firm_sched_heap is
   signal insert     : std_logic;
   signal root_stays : std_logic;
 
-  -- The operation for level n, and what level n+1 puts into a hole of level n; the root is level 0.
+  -- The operation for level n, and the item with which level n+1 fills a hole of level n; the root is level 0.
   signal down_insert : std_logic_vector(1 to LEVELS+1);
   signal down_fill   : std_logic_vector(1 to LEVELS+1);
   signal down_clear  : std_logic_vector(1 to LEVELS+1);
@@ -164,7 +164,7 @@ begin
     end process note_hole;
   end generate levels_below;
 
-  -- Below the leaves there is nothing.
+  -- There is no level below the leaves.
   up_valid(LEVELS) <= '0';
   up_id(LEVELS)    <= (others => '0');
   up_key(LEVELS)   <= (others => '0');

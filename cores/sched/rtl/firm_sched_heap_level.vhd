@@ -1,14 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A level of firm_sched_heap below the root: 2**LEVEL nodes, and the operation that is at this level in this cycle.
 --
--- A node is a pair's left or right one; the pairs lie under the address of their common node above, so that a pair
--- is read at once. That address is the highest LEVEL-1 bits of the operation's index.
--- INSERT compares its item with the node on the item's path: the one that comes first is the node's from now on,
--- the other goes on to the level below. FILL finds the smaller one of a pair, which the level above takes in the
--- same cycle, and goes on to the level below to fill the hole that this leaves. CLEAR empties the pair.
---
--- In the cycle behind a FILL no operation may come, since then the level below writes to the pair. Its address is
--- still here, for the index changes with an operation only.
+-- A node is the left or right one of a pair. A pair is stored at the address of its common parent node, so that both
+-- are read at once. That address is the highest LEVEL-1 bits of the operation's index.
+-- INSERT compares its item with the node on the item's path: the one that goes first is stored in the node, and the
+-- other continues to the level below. FILL finds the smaller one of a pair, which the level above takes in the
+-- same cycle, and continues to the level below to fill the resulting hole. CLEAR empties the pair.
+-- No operation may arrive in the cycle after a FILL, because the level below then writes to the pair. The pair's
+-- address is still here, since the index changes only with an operation.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -25,14 +24,14 @@ entity firm_sched_heap_level is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- The operation that comes from the level above, at most one, and its item; of a FILL the index tells the hole.
+    -- The operation from the level above, at most one, and its item; for a FILL, the index identifies the hole.
     insert : in std_logic;
     fill   : in std_logic;
     clear  : in std_logic;
     id     : in std_logic_vector(ID_BITS-1 downto 0);
     key    : in std_logic_vector(KEY_BITS-1 downto 0);
 
-    -- FILL: what the level above takes.
+    -- FILL: the item that the level above takes.
     smaller_valid : out std_logic;
     smaller_id    : out std_logic_vector(ID_BITS-1 downto 0);
     smaller_key   : out std_logic_vector(KEY_BITS-1 downto 0);
@@ -44,7 +43,7 @@ entity firm_sched_heap_level is
     below_id     : out std_logic_vector(ID_BITS-1 downto 0);
     below_key    : out std_logic_vector(KEY_BITS-1 downto 0);
 
-    -- The level below fills the hole here, its left or right one, with what it has.
+    -- The level below fills the left or right hole here with its item.
     hole         : in std_logic;
     hole_right   : in std_logic;
     filler_valid : in std_logic;
@@ -55,13 +54,13 @@ end entity firm_sched_heap_level;
 
 architecture rtl of firm_sched_heap_level is
 
-  -- Of an item's index the highest LEVEL bits are the node's address; the node keeps the others only.
+  -- The highest LEVEL bits of an item's index are the node's address; the node stores only the others.
   constant LOW_BITS     : natural  := ID_BITS - LEVEL;
   constant SIDE         : natural  := LOW_BITS;  -- the bit of the index that tells left from right
   -- A node: valid, key, the low bits of its item's index.
   constant NODE_BITS    : positive := 1 + KEY_BITS + LOW_BITS;
   subtype node_t is std_logic_vector(NODE_BITS-1 downto 0);
-  -- What is compared: key, side and low bits of the index.
+  -- The compared bits: key, side and low bits of the index.
   subtype rank_t is std_logic_vector(KEY_BITS+LOW_BITS downto 0);
 
   signal insert_r : std_logic;
@@ -78,7 +77,7 @@ architecture rtl of firm_sched_heap_level is
   signal write_left  : std_logic;
   signal write_right : std_logic;
 
-  -- The two that are compared: INSERT the item with its node, FILL left with right.
+  -- The two compared items: INSERT the item with its node, FILL left with right.
   signal first        : node_t;
   signal second       : node_t;
   signal second_right : std_logic;
@@ -173,7 +172,7 @@ begin
 
   node <= right when id_r(SIDE) = '1' else left;
 
-  -- A leaf holds no item but that of its own index, so whoever comes to it finds it empty.
+  -- A leaf only holds the item of its own index, so an arriving item finds it empty.
   leaves : if LOW_BITS = 0 generate
     first        <= left;
     second       <= right;
@@ -204,7 +203,7 @@ begin
     end loop;
   end process hand_up;
 
-  -- Of a FILL only the path to its hole goes on. Behind the last level nothing does but that.
+  -- Only the path to a FILL's hole continues. After the last level, nothing else remains to be done.
   hand_down : process (item, node, left, right, takes_second, insert_r, fill_r, clear_r, id_r)
     variable larger : node_t;
   begin

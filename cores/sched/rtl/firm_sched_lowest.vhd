@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The lowest index of those that ask but a given one, and whether that one asks, too. No registers.
--- Requesters lie in rows. Of the given one's row the requests are read at once, as its number is known; meanwhile the
--- first of the other rows in which anybody asks is found, and then the first request of that. Who is lower is decided
--- by the rows.
+-- Finds the lowest requesting index except a given one, and tells whether the given one requests, too. No registers.
+-- Requesters are arranged in rows. The requests of the given one's row are read at once, since its number is known.
+-- Meanwhile the first other row with a request is found, and then its first request. The rows' numbers decide which of
+-- the two is lower.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -16,10 +16,10 @@ entity firm_sched_lowest is
   port (
     request     : in  std_logic_vector(REQUESTERS-1 downto 0);
     index       : in  std_logic_vector(index_bits(REQUESTERS)-1 downto 0);
-    index_valid : in  std_logic;  -- else nobody is given, and `index` is 0
-    asks        : out std_logic;  -- the given one
-    found       : out std_logic;  -- another one asks
-    is_before   : out std_logic;  -- one of a lower index does
+    index_valid : in  std_logic;  -- otherwise no index is given, and `index` is 0
+    asks        : out std_logic;  -- the given one requests
+    found       : out std_logic;  -- another one requests
+    is_before   : out std_logic;  -- one of a lower index requests
     lowest      : out std_logic_vector(index_bits(REQUESTERS)-1 downto 0)  -- any if none is found
   );
 end entity firm_sched_lowest;
@@ -27,7 +27,7 @@ end entity firm_sched_lowest;
 architecture rtl of firm_sched_lowest is
 
   constant BITS : positive := index_bits(REQUESTERS);
-  -- Up to it, rows are not worth their effort.
+  -- Up to this number, rows are not worth their cost.
   constant FEW : positive := 8;
 
   -- The word of a number, found from its highest bit on.
@@ -82,7 +82,7 @@ begin
     signal row_asks   : std_logic_vector(ROWS-1 downto 0);  -- of the other rows
     signal first_row  : std_logic_vector(ROW_BITS-1 downto 0);
     signal of_first   : std_logic_vector(COLUMNS-1 downto 0);
-    signal row_before : std_logic;  -- a row of a lower number asks
+    signal row_before : std_logic;  -- a row of a lower number has requests
   begin
     pad : process (request)
     begin

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Least recently used, non-preemptive: of those that ask, who has waited longest since it completed a task.
--- Up to 16 requesters are compared all at once, more of them wait in a heap in distributed RAM.
+-- Least recently used, non-preemptive: of those that request, the one whose last task ended the longest time ago.
+-- Up to 16 requesters are compared in parallel; more requesters wait in a heap in distributed RAM.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Least slack time first, preemptive: who must begin first to meet its deadline. Up to 8 requesters are compared all at
--- once, more of them wait in a heap in distributed RAM.
+-- Least slack time first, preemptive: the task with the earliest latest start goes first. Up to 8 requesters are
+-- compared in parallel; more requesters wait in a heap in distributed RAM.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -36,7 +36,7 @@ architecture rtl of firm_sched_lst is
   constant FAULT          : string := fault_of_deadlines(REQUESTERS, PERIODS, DEADLINES, TIME_BITS, SHORTEST_RUN);
   constant TRANSFER_FAULT : string := fault_of_transfer(TRANSFER_TIMES, REQUESTERS, TIME_BITS);
 
-  -- A task's slack: what remains to its deadline if it is sent at once.
+  -- A task's slack: the time left until its deadline if it is sent at once.
   constant OFFSETS : times_t :=
     slacks_of(REQUESTERS, deadlines_of(REQUESTERS, PERIODS, DEADLINES), TRANSFER_TIMES);
 

@@ -1,15 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The scheduler of a policy with deadlines for few requesters: how urgent all tasks are in registers, compared with
--- each other in every cycle by a tree.
---
--- A task is accepted in the cycle in which it is first seen, whoever else asks, and takes part in the choice in the
--- next. The most urgent one has the grant; of equal ones the task that has it, else that of the lowest index. Nobody
--- accepted: the grant stays.
---
+-- The scheduler of a policy with deadlines for few requesters: the urgency of every task is in a register, and a tree
+-- compares all of them in every cycle.
+-- A task is accepted in the cycle in which it is first seen, independently of others, and takes part in the choice in
+-- the next. The most urgent task has the grant; among equals, the task that has it, otherwise the lowest index. Without
+-- an accepted task, the grant stays.
 -- Urgency is the time by which a task is past its deadline (EDF) or its latest start (LST), negative before: the
--- order is that of the keys of firm_sched_engine. It begins with a constant of the requester and grows by one a cycle,
--- so each is a counter that is reset, which takes its carry chain and hardly a LUT. No task grows more urgent while one
--- is overdue, so order is right whatever the host does.
+-- order is that of the keys of firm_sched_engine. It begins with a constant of the requester and grows by one per
+-- cycle. Each is therefore a counter with a reset, which costs its carry chain and hardly a LUT. No task grows more
+-- urgent while one is overdue, so the order is right for any behaviour of the host.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -21,8 +19,8 @@ use firm.firm_sched_queue_pkg.all;
 entity firm_sched_parallel is
   generic (
     REQUESTERS     : integer := 2;
-    SENDS_OWN_TIME : boolean := false;  -- a task grows no more urgent by the cycles in which it sends
-    OFFSETS        : times_t := IMPLICIT;  -- from the cycle in which a task comes until it is urgent by 0
+    SENDS_OWN_TIME : boolean := false;  -- a task does not grow more urgent in the cycles in which it sends
+    OFFSETS        : times_t := IMPLICIT;  -- from the cycle in which a task arrives until its urgency is 0
     TIME_BITS      : integer := 16;
     SHORTEST_RUN   : integer := 1
   );
@@ -41,15 +39,15 @@ end entity firm_sched_parallel;
 
 architecture rtl of firm_sched_parallel is
 
-  -- No two differ by half of this range: none begins with a quarter of it or more, and none grows beyond that.
+  -- No two differ by half of this range: none begins at a quarter of it or more, and none grows beyond that.
   constant URGENCY_BITS : positive := max(TIME_BITS-1, 2);
   constant LEVELS       : positive := index_bits(REQUESTERS);
   constant LEAVES       : positive := 2**LEVELS;
   subtype urgency_t is std_logic_vector(URGENCY_BITS-1 downto 0);
   subtype id_t is std_logic_vector(LEVELS-1 downto 0);
 
-  -- Node 1 is the root, node n has the children 2n and 2n+1, of which the first has the lower indices.
-  -- Behind the urgency a bit that is '1' for the task that has the grant, so that it goes before equal ones.
+  -- Node 1 is the root; node n has the children 2n and 2n+1, of which the first has the lower indices.
+  -- The bit after the urgency is '1' for the task that has the grant, so that it goes before equal ones.
   type ranks_t is array (1 to 2*LEAVES-1) of std_logic_vector(URGENCY_BITS downto 0);
   type ids_t is array (1 to 2*LEAVES-1) of id_t;
   signal valid : std_logic_vector(1 to 2*LEAVES-1);
@@ -137,8 +135,8 @@ begin
     kept <= '0';
   end generate runs_of_one;
   longer_runs : if SHORTEST_RUN > 1 generate
-    signal beats_r : natural range 0 to SHORTEST_RUN;  -- of the run, no further than to the shortest
-    signal beats   : natural range 0 to SHORTEST_RUN;  -- with that of this cycle
+    signal beats_r : natural range 0 to SHORTEST_RUN;  -- of the run, saturating at the shortest run
+    signal beats   : natural range 0 to SHORTEST_RUN;  -- including that of this cycle
   begin
     beats <= beats_r + 1 when beat = '1' and beats_r < SHORTEST_RUN else beats_r;
     kept  <= any_of(request and current(REQUESTERS-1 downto 0)) and not finished

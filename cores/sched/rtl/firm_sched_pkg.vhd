@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- What the schedulers share: who comes first of those that ask, the times of tasks, and the check of generics.
--- Generics may be illegal, and the assert that names them speaks only after elaboration. So no function here fails on
--- them: one that is asked for a time that was not given answers 1.
+-- Common functions of the schedulers: the choice among requesters, the times of tasks, and the check of generics.
+-- Generics may be illegal, and the assert that names them runs only after elaboration. No function here may therefore
+-- fail on them: a function that needs a missing time returns 1.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -17,18 +17,18 @@ package firm_sched_pkg is
 
   type times_t is array (natural range <>) of integer;  -- in clock cycles, one for each requester
 
-  -- Whether a bit is '1', and the index of the lowest one, with index_bits(bits'length) bits; any index if there is
-  -- none.
+  -- Whether a bit is '1', and the index of the lowest one, with index_bits(bits'length) bits; if there is none, any
+  -- index.
   function any_of(bits : std_logic_vector) return std_logic;
   function first_of(bits : std_logic_vector) return std_logic_vector;
 
-  -- The index of the only '1'; any index if there is none.
+  -- The index of the only '1'; if there is none, any index.
   function index_of(one_hot : std_logic_vector) return std_logic_vector;
 
   -- Bit k is '1' if k is more than `index`.
   function above(index : std_logic_vector; outputs : natural) return std_logic_vector;
 
-  -- In place of deadlines: each is its requester's period.
+  -- A substitute for deadlines: each deadline is its requester's period.
   constant IMPLICIT : times_t(0 to 0) := (0 => 0);
 
   function has_deadlines(policy : policy_t) return boolean;
@@ -46,23 +46,23 @@ package firm_sched_pkg is
   -- Of the first `count` elements.
   function sum_of(times : times_t; count : natural) return natural;
 
-  -- A time less than this can be told from one that has passed, with `time_bits` bits that wrap around.
+  -- A time less than this can be distinguished from a past one, with `time_bits` bits that wrap around.
   function horizon(time_bits : integer) return positive;
 
-  -- What is wrong with generics, in words; empty if all is well.
+  -- A description of the fault in generics; empty if there is none.
   function fault_of_size(requesters : integer) return string;
   function fault_of_run(shortest_run : integer) return string;
   function fault_of_time_bits(time_bits : integer) return string;
   -- `kind` is "period", "deadline" or "transfer time"; `generic_name` is the generic that `times` come from.
   function fault_of_times(generic_name, kind : string; times : times_t; requesters, time_bits : integer) return string;
-  -- Of all generics of a policy with deadlines but the transfer times.
+  -- Checks all generics of a policy with deadlines except the transfer times.
   function fault_of_deadlines(requesters : integer; periods, deadlines : times_t; time_bits, shortest_run : integer)
     return string;
-  -- Of the times of a policy that weighs them against deadlines.
+  -- Checks the times of a policy that weighs them against deadlines.
   function fault_of_transfer(transfer_times : times_t; requesters, time_bits : integer) return string;
   function fault_of_groups(requesters : integer; sizes : times_t; policies : policies_t; top_policy : policy_t)
     return string;
-  -- Of the times of all groups, if the policy of one knows them.
+  -- Checks the times of all groups, if the policy of one uses them.
   function fault_of_group_times(requesters : integer; policies : policies_t;
     periods, transfer_times, deadlines : times_t; time_bits, shortest_run : integer)
     return string;
@@ -74,7 +74,7 @@ package body firm_sched_pkg is
   constant SHORTEST_TIME : positive := 8;   -- bits
   constant LONGEST_TIME  : positive := 31;
 
-  -- Both are trees: of a chain, synthesis makes long paths.
+  -- Both are trees: synthesis makes long paths from a chain.
   function any_of(bits : std_logic_vector) return std_logic is
     constant COUNT : positive := bits'length;
     alias numbered : std_logic_vector(COUNT-1 downto 0) is bits;
@@ -207,7 +207,7 @@ package body firm_sched_pkg is
     return 2**(time_bits-3);
   end function horizon;
 
-  -- The least number of bits in whose horizon `value` is.
+  -- The smallest number of bits whose horizon exceeds `value`.
   function time_bits_for(value : integer) return positive is
   begin
     for bits in SHORTEST_TIME to LONGEST_TIME loop
@@ -274,7 +274,7 @@ package body firm_sched_pkg is
       return fault_of_time_bits(time_bits);
     elsif is_implicit(deadlines) then
       return fault_of_times("PERIODS", "deadline", periods, requesters, time_bits);
-    -- A period that is no deadline need not fit the time.
+    -- A period that is not a deadline need not fit the time.
     elsif fault_of_times("PERIODS", "period", periods, requesters, LONGEST_TIME) /= "" then
       return fault_of_times("PERIODS", "period", periods, requesters, LONGEST_TIME);
     end if;

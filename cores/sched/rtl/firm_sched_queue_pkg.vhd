@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The order of numbers that wrap around, such as times of a counter; and how requesters stand in rows.
+-- The order of numbers that wrap around, such as times of a counter, and the arrangement of requesters in rows.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -8,17 +8,17 @@ use firm.firm_axis_pkg.all;
 
 package firm_sched_queue_pkg is
 
-  -- Where there is much to say of each requester, it stands in rows: bits of a row's number and of a column's, of half
-  -- an index each. One row and one column are two at least, so two requesters are a row, of which another is not used.
+  -- Large numbers of requesters are arranged in rows. These are the bits of a row's number and of a column's, half an
+  -- index each. Both are at least 1, so two requesters form a row, and a second row is unused.
   function column_bits_of(requesters : integer) return positive;
   function row_bits_of(requesters : integer) return positive;
 
-  -- '1' if `left` comes before `right`, both of the same length and less than half their range apart. With an index
-  -- behind it, a key has an order without ties: the keys decide, and the index where they are equal.
+  -- '1' if `left` comes before `right`; both have the same length and are less than half their range apart. An index
+  -- appended to the key gives an order without ties: keys decide, and the index if they are equal.
   function is_before(left, right : std_logic_vector) return std_logic;
 
-  -- '1' if `key` lies two or three eighths of the range before `now`, each cut to whole eighths. If time stands
-  -- still then, and no new key is an eighth or more before or behind it, keys are never half the range apart.
+  -- '1' if `key` is two or three eighths of the range before `now`, each truncated to whole eighths. If time then
+  -- stops, and no new key is an eighth or more before or after it, keys are never half the range apart.
   function is_overdue(key, now : std_logic_vector) return std_logic;
 
 end package firm_sched_queue_pkg;

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A memory of one port that is read in the same cycle, for which FPGAs use LUTs as RAM. Reset does not clear it.
+-- A memory with one port and an asynchronous read, for which FPGAs use LUTs as RAM. Reset does not clear it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

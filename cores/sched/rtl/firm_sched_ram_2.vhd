@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- As firm_sched_ram, with a second address to read from.
+-- Like firm_sched_ram, with a second read address.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

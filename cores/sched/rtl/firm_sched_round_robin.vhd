@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Round robin, non-preemptive: the next index after the requester that was served last, cyclically.
--- The next task is chosen in the cycle of the last beat. The finishing requester needs no leaving out: it is the
--- last in the round, so it is chosen only if nobody else asks, which leaves the grant where it is.
+-- The next task is chosen in the cycle of the last beat. The finishing requester needs no exclusion: it is the last in
+-- the round, so it is chosen only if there are no other requests, which leaves the grant where it is.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

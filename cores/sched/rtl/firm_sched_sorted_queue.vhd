@@ -1,10 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- A priority queue of few cycles: a shift register that is kept sorted, with the ports of firm_sched_heap.
 --
--- Each cell compares the new item with its own. Since the cells are sorted, those behind the new item's place know
--- it from their own comparison, and the place itself from that of the cell before: nothing crosses the whole queue
--- but the new item. An insert and a pop are done in one cycle each, both at once if need be, and the next root is
--- there in the next cycle.
+-- Each cell compares the new item with its own. Since the cells are sorted, those after the new item's place detect
+-- this by their own comparison, and the place itself by that of the cell before: only the new item crosses the whole
+-- queue. An insert and a pop take one cycle each, even at the same time, and the next root is valid in the next cycle.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -26,16 +25,16 @@ entity firm_sched_sorted_queue is
     insert_id    : in  std_logic_vector(index_bits(ITEMS)-1 downto 0);
     insert_key   : in  std_logic_vector(KEY_BITS-1 downto 0);
 
-    -- The item with the smallest key, of equal ones that of the lowest index.
+    -- The item with the smallest key; among equals, the lowest index.
     root_valid : out std_logic;
     root_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     root_key   : out std_logic_vector(KEY_BITS-1 downto 0);
-    -- The same: the root never has to be waited for.
+    -- The same: the root is always available.
     first_valid : out std_logic;
     first_id    : out std_logic_vector(index_bits(ITEMS)-1 downto 0);
     first_key   : out std_logic_vector(KEY_BITS-1 downto 0);
     pop         : in  std_logic;    -- takes that item; only while it is valid
-    empty       : out std_logic     -- nothing is in the queue; while '0', a root is there or comes
+    empty       : out std_logic     -- the queue is empty; while '0', a root is valid or about to be
   );
 end entity firm_sched_sorted_queue;
 
@@ -43,7 +42,7 @@ architecture rtl of firm_sched_sorted_queue is
 
   constant ID_BITS : positive := index_bits(ITEMS);
   subtype item_t is std_logic_vector(KEY_BITS+ID_BITS-1 downto 0);
-  -- Cell 0 is the root. Those at both ends have no neighbour, so there is one more cell at each, which is never full.
+  -- Cell 0 is the root. Both ends have one more cell, never full, as a neighbour.
   type items_t is array (-1 to ITEMS) of item_t;
 
   signal valid_r : std_logic_vector(-1 to ITEMS);
@@ -65,13 +64,13 @@ begin
 
   cells : for cell in 0 to ITEMS-1 generate
     signal shift_back  : std_logic;  -- away from the root: takes the item of the cell before
-    signal shift_front : std_logic;  -- takes that of the cell behind
+    signal shift_front : std_logic;  -- takes that of the next cell
     signal take_new    : std_logic;
     signal from_before : std_logic;
   begin
     new_first(cell) <= not valid_r(cell) or is_before(new_item, item_r(cell));
 
-    -- A pop moves all to the front; a new item moves those behind its place back again, which then stay where they are.
+    -- A pop moves all items to the front; a new item moves those after its place back again, so they stay in place.
     root : if cell = 0 generate
       from_before <= '0';
       shift_back  <= '0';

@@ -1,14 +1,14 @@
 -- SPDX-License-Identifier: Apache-2.0
--- When each requester completed its last task, counted in completions: the keys of "least recently used".
+-- Records when each requester completed its last task, counted in completions: the keys of "least recently used".
 --
--- The count wraps around, so stamps must not grow too old. A sweep goes round and renews those that are older than
--- a quarter of the range; the count moves on at most four times a step of the sweep. Those that were idle for so
--- long keep no order among each other, but come before all that were not. The memory has one port: a completion
--- goes first, then a sweep that is due, then whoever reads. A step of the sweep reads a stamp in one cycle and writes
--- it, if need be, in a later one, which keeps the path through the memory short.
---
--- Who has no stamp since reset counts with its index: the lower ones were used less recently. Marks tell who has, in
--- rows as those of firm_sched_arrivals; after reset they are cleared, a row a cycle, while nobody arrives.
+-- The count wraps around, so stamps must not grow too old. A sweep renews those that are older than
+-- a quarter of the range; the count advances at most four times per step of the sweep. Requesters that were idle for so
+-- long have no order among each other, but go before all others. The memory has one port: a completion has priority,
+-- then a sweep that is due, then a read. A step of the sweep reads a stamp in one cycle and writes it, if necessary, in
+-- a later one, which keeps the path through the memory short.
+-- A requester without a stamp since reset uses its index: lower ones count as less recently used. Marks record which
+-- requesters have stamps, in rows like those of firm_sched_arrivals. After reset they are cleared, one row per cycle,
+-- while no task arrives.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -39,7 +39,7 @@ architecture rtl of firm_sched_stamps is
 
   constant COLUMN_BITS : positive := column_bits_of(REQUESTERS);
   constant ROW_BITS    : positive := row_bits_of(REQUESTERS);
-  constant ID_BITS     : positive := ROW_BITS + COLUMN_BITS;  -- those of an index, or more of two requesters
+  constant ID_BITS     : positive := ROW_BITS + COLUMN_BITS;  -- those of an index, or one more for two requesters
   constant COLUMNS     : positive := 2**COLUMN_BITS;
   subtype id_t is std_logic_vector(ID_BITS-1 downto 0);
   subtype columns_t is std_logic_vector(COLUMNS-1 downto 0);
@@ -48,7 +48,7 @@ architecture rtl of firm_sched_stamps is
 
   signal count_r : unsigned(STAMP_BITS-1 downto 0);
   signal sweep_r : unsigned(ID_BITS downto 0);     -- the highest bit: all marks are cleared
-  signal swept_r : std_logic_vector(STAMP_BITS-1 downto 0);  -- the sweep's stamp, where it has been read
+  signal swept_r : std_logic_vector(STAMP_BITS-1 downto 0);  -- the sweep's stamp, once read
   signal known_r : std_logic;
   signal steps_r : unsigned(2 downto 0);           -- of the count since the last one of the sweep, at most four
   signal due     : std_logic;
@@ -69,7 +69,7 @@ architecture rtl of firm_sched_stamps is
   signal found_stamp  : std_logic_vector(STAMP_BITS-1 downto 0);
   signal age          : unsigned(STAMP_BITS-1 downto 0);  -- of the sweep's stamp
   signal is_old       : std_logic;
-  signal moves        : std_logic;  -- the sweep, to the next requester
+  signal moves        : std_logic;  -- the sweep moves to the next requester
 
 begin
 
@@ -165,7 +165,7 @@ begin
       if known_r = '0' then
         swept_r <= found_stamp;
       end if;
-      -- What was read is no longer so if its requester completes a task.
+      -- A stamp that was read is outdated if its requester completes a task.
       known_r <= not clearing and (sweeps or known_r) and not moves;
       if completed = '1' and unsigned(completed_id) = sweep_r(ID_BITS-1 downto 0) then
         known_r <= '0';

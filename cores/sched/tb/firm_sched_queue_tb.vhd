@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Random operations on a priority queue, written down cycle by cycle for a model to judge. A line is a cycle:
--- `insert id key` or `-`, `pop` or `-`, then what the queue shows: ready, empty, and `id key` of the root or `-`.
+-- Random operations on a priority queue, recorded cycle by cycle for comparison with a model. A line is a cycle:
+-- `insert id key` or `-`, `pop` or `-`, then the outputs of the queue: ready, empty, and `id key` of the root or `-`.
 -- Keys are drawn near a number that grows and wraps around; it waits while the root lags behind.
 library ieee;
 use ieee.std_logic_1164.all;

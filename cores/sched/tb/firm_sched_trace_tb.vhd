@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Random tasks for the scheduler of any policy. What its ports do in every cycle is written to a file, which is
--- compared with the policy's model in Python: tests/cores/sched_trace.py reads it.
--- How requesters and sink behave is drawn anew for each stretch of cycles: everybody or a lone one has tasks, of one
--- beat or many, at once, in bursts or now and then, with pauses and stalls or without.
+-- Random tasks for the scheduler of any policy. The values of its ports in every cycle are written to a file, which
+-- tests/cores/sched_trace.py compares with the policy's model in Python.
+-- The behaviour of requesters and sink is drawn for each stretch of cycles: all requesters or a single one have tasks,
+-- of one beat or many, at once, in bursts or now and then, with or without pauses and stalls.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -26,13 +26,13 @@ entity firm_sched_trace_tb is
     SEED     : integer := 1;  -- 1 and more
     SEGMENTS : integer := 4;  -- each begins with a reset
     CYCLES   : integer := 1000;  -- of a segment
-    -- Nobody pauses, nobody stalls, and everybody always has a task.
+    -- No pauses and no stalls, and every requester always has a task.
     SATURATED : boolean := false;
     -- Beats of each task, 0 for a number that is drawn.
     TASK_BEATS : integer := 0;
-    -- Cycles of a stretch beside those that are drawn.
+    -- Cycles of a stretch in addition to the drawn ones.
     STRETCH : integer := 0;
-    -- At the beginning of a stretch nobody takes a beat for as many cycles at most.
+    -- The longest stall of the sink at the beginning of a stretch, in cycles.
     LONGEST_STALL : integer := 0;
     TRACE         : string  := "trace.txt";
     EXPECTED      : string  := ""
@@ -93,7 +93,7 @@ architecture simulation of firm_sched_trace_tb is
     return drawn_times(5, 4, LONGEST_PERIOD);
   end function drawn_deadlines;
 
-  -- Every group has somebody; where the others belong is drawn.
+  -- Every group has at least one requester; the groups of the others are drawn.
   function drawn_sizes return times_t is
     constant GROUPS : positive := max(1, GROUP_POLICIES'length);
     variable sizes  : times_t(0 to GROUPS-1) := (others => 1);
@@ -322,7 +322,7 @@ begin
       end loop;
     end procedure reset;
 
-    -- The grant is there; who answers it?
+    -- The grant is valid: find the requester that responds.
     procedure answer(cycle : in natural) is
     begin
       granted     := NOBODY;

@@ -1,9 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The synchroniser as simulation should have it: what changed last before an edge may be seen now or an edge later,
--- each bit for itself, as a metastable register decides. A library has it in place of that of robot:cdc:firm_cdc_sync.
--- Earlier changes have settled: bits that change one after the other are never seen in another order, as in a wire
--- each. What it draws follows from where it stands and from when its input changes first: another phase gives other
--- numbers.
+-- A synchroniser for simulation: the last change before an edge may be seen at this edge or the next, independently for
+-- each bit, as a metastable register decides. A library uses it in place of robot:cdc:firm_cdc_sync.
+-- Earlier changes have settled: as on wires, successive changes of bits are never seen in another order. The random
+-- numbers derive from the instance's path and the time of its first input change: another phase gives other numbers.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -36,7 +35,7 @@ architecture simulation of firm_cdc_sync is
     return value + 1;
   end function hash;
 
-  -- What a time has beyond its nanoseconds.
+  -- The part of a time below its nanoseconds.
   function femtoseconds(moment : time) return natural is
   begin
     return (moment - (moment / 1 ns) * 1 ns) / 1 fs;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A clock that has nothing to do with another one: it has about so many edges for each of the other's, begins at any
--- phase, and is off by up to a thousandth, so that its edges wander along the other's. Simulation only.
+-- A clock unrelated to another one: it has a given average ratio of edges, begins at any phase, and deviates by up to a
+-- thousandth, so that its edges drift along the other's. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -13,7 +13,7 @@ entity firm_sim_clock is
     SEED : integer := 1
   );
   port (
-    -- The clock ends with it, so that a simulation does: when it stood still for some of the longer periods.
+    -- The clock stops after this one has stopped for some of the longer periods, so that the simulation can end.
     reference : in  std_logic;
     clk       : out std_logic
   );
@@ -22,7 +22,7 @@ end entity firm_sim_clock;
 architecture simulation of firm_sim_clock is
 
   constant DRIFT       : real     := 0.001;
-  -- Half periods without an edge of the reference, after half a microsecond without one.
+  -- Half periods without an edge of the reference, counted after half a microsecond without one.
   constant LAST_EDGES  : positive := 20;
   constant LONGEST_GAP : time     := 500 ns;
 
@@ -41,10 +41,10 @@ begin
     variable draw     : real;
     variable half     : time;
     variable level    : std_logic := '0';
-    variable edges    : natural   := 0;  -- since the reference stands still
+    variable edges    : natural   := 0;  -- since the reference stopped
   begin
     clk <= '0';
-    uniform(random_1, random_2, draw);  -- the first number of neighbouring seeds is much the same
+    uniform(random_1, random_2, draw);  -- neighbouring seeds give similar first numbers
     uniform(random_1, random_2, draw);
     half := 500.0 * real(PERIOD_PS) * (1.0 + DRIFT * (2.0 * draw - 1.0)) * 1 fs;
     uniform(random_1, random_2, draw);

@@ -1,5 +1,5 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Stands for a pair of converters behind the Manager: takes frames without id, as a subscriber does, and sends them
+-- Replaces a pair of converters behind the Manager: takes frames without id, as a subscriber does, and sends them
 -- back with ID, as a publisher does. It stalls at random on both sides. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
@@ -120,7 +120,7 @@ begin
     kept_tready <= '0' when first_r = '1' else sent_tready;
   end generate byte_wide;
 
-  -- The id goes into the void lane of the first beat.
+  -- The id goes into the invalid lane of the first beat.
   wider : if WIDTH > 8 generate
     sent_tdata(WIDTH-1 downto 8) <= kept_tdata(WIDTH-1 downto 8);
     sent_tdata(7 downto 0)       <= std_logic_vector(to_unsigned(ID, 8)) when first_r = '1' else kept_tdata(7 downto 0);

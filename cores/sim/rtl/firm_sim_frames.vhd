@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host's end of a link that carries bytes: finds frames in them by their lengths and passes each on when it is
--- whole. It keeps what it has, however much that is. Simulation only.
+-- The host's end of a link that carries bytes: it finds frames by their lengths and passes each on when it is complete.
+-- Its memory is unbounded. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -10,7 +10,8 @@ entity firm_sim_frames is
     clk   : in std_logic;
     rst_n : in std_logic;
 
-    -- The byte that came last, and how many came; they change at any time, and not twice within a cycle.
+    -- The last received byte, and the number of received bytes; they may change at any time, but at most once per
+    -- cycle.
     data  : in std_logic_vector(7 downto 0);
     count : in natural;
 
@@ -42,13 +43,13 @@ begin
 
   frame : process (clk)
 
-    -- All bytes that wait, those of whole frames first.
+    -- All waiting bytes, those of complete frames first.
     variable first  : item_ptr_t;
     variable newest : item_ptr_t;
-    variable whole  : natural := 0;  -- bytes of whole frames
+    variable whole  : natural := 0;  -- bytes of complete frames
 
     variable taken  : natural := 0;  -- bytes so far
-    variable bytes  : natural := 0;  -- of the frame that comes in
+    variable bytes  : natural := 0;  -- of the incoming frame
     variable header : unsigned(8*HEADER_BYTES-1 downto 0);
 
     procedure take_byte is

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Random gates for handshakes: the bench lets `valid` and `ready` of handshake k through while `is_open(k)` is high. A
--- gate stays open from the cycle in which it showed a `valid` until that is taken, so nothing shown is withdrawn. Also
--- watches that the source does not withdraw it. Simulation only.
+-- Random gates for handshakes: the bench connects `valid` and `ready` of handshake k while `is_open(k)` is high. A gate
+-- stays open from the cycle in which it showed a `valid` until the transfer, so no valid is withdrawn. The entity also
+-- checks that the source does not withdraw it. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 
@@ -9,7 +9,7 @@ entity firm_sim_gates is
   generic (
     COUNT : integer := 1;
     SEED  : integer := 1;
-    -- The chance that a gate is closed in a cycle in which its source has something; 0 keeps all open.
+    -- The chance that a gate is closed in a cycle with `valid`; 0 keeps all open.
     STALL_PERCENT : integer := 0
   );
   port (
@@ -28,7 +28,7 @@ architecture simulation of firm_sim_gates is
 
   signal is_open_r : std_logic_vector(COUNT-1 downto 0) := (others => '1');
 
-  -- The generator of a period of 65536 that `x := 75 x mod 65537` is.
+  -- The generator `x := 75 x mod 65537` has a period of 65536.
   constant MODULUS : positive := 65537;
   constant FACTOR  : positive := 75;
 
@@ -59,7 +59,7 @@ begin
             severity failure;
           is_waiting(gate) := valid(gate) and not (is_open_r(gate) and ready(gate));
         end if;
-        -- A gate that nobody asks stays as it is: hundreds of them would only slow the simulation down.
+        -- A gate without `valid` keeps its state: drawing for hundreds of them would only slow the simulation down.
         is_asked := rst_n = '0' or valid(gate) = '1';
         if STALL_PERCENT > 0 and is_asked and (is_open_r(gate) = '0' or is_waiting(gate) = '0') then
           random          := FACTOR * random mod MODULUS;

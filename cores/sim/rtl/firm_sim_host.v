@@ -2,32 +2,32 @@
 // The host of firm_sim_host.vhd for simulators of Verilog: it reads the same files, stalls in the same cycles for the
 // same SEED, finds the same faults and writes the same report, so that runs of all simulators can be compared.
 //
-// The frames stay in their files: of each the host knows where it stands, and reads it again when its turn comes. Each
-// parameter but WIDTH and ERRORS can be set anew where the simulator is started, as in +SEED=7.
+// The frames stay in their files: the host records the position of each, and reads it again when it is sent or
+// compared. Each parameter except WIDTH and ERRORS can be set at the start of the simulator, as in +SEED=7.
 //
-// Inputs are read before the rising edge; what the host drives changes with the falling edge, so no order of events
-// matters. Where a stream carries nothing, it drives 'x'.
+// Inputs are read before the rising edge. Outputs change at the falling edge, so the order of events does not
+// matter. A stream without a beat carries 'x'.
 
 `timescale 1ns / 1ps
 
 module firm_sim_host #(
   parameter WIDTH = 8,
-  // Bits of `frame_error`, one a converter.
+  // Bits of `frame_error`, one per converter.
   parameter ERRORS = 1,
-  // Paths relative to the directory the simulator runs in.
+  // Paths relative to the directory in which the simulator runs.
   parameter STIMULUS_FILE = "stimulus.txt",
   parameter EXPECTED_FILE = "expected.txt",
-  // Where to write what came, in the grammar of the expected file; none where it is empty.
+  // The file for received frames, in the grammar of the expected file; none if empty.
   parameter RECEIVED_FILE = "",
-  // All randomness follows from it.
+  // Determines all random choices.
   parameter SEED = 1,
-  // The chance, each cycle and direction, that the host offers no beat or takes none.
+  // The chance per cycle and direction that the host stalls.
   parameter STALL_PERCENT = 0,
   // Frames whose labels and latency are printed.
   parameter SHOWN = 10,
   // Cycles without a beat after which the host gives up on missing frames.
   parameter WATCHDOG = 100000,
-  // Cycles without a beat in which it listens for surplus frames when everything has come.
+  // Cycles without a beat in which it listens for surplus frames after the last expected one.
   parameter QUIET = 1000,
   // The most frames of a file.
   parameter FRAMES = 65536
@@ -69,7 +69,7 @@ module firm_sim_host #(
   localparam EXPECTED = FRAMES;
 
   localparam TAB = 9, NEWLINE = 10, RETURN = 13, BLANK = 32;
-  // What a byte that cannot be read is; `..` is any byte.
+  // The value of an illegal byte, and of `..`, which matches any byte.
   localparam ILL_FORMED = -2, ANY = -3;
 
   reg [NAME_BITS-1:0] stimulus_name, expected_name, received_name, name;
@@ -80,18 +80,18 @@ module firm_sim_host #(
   integer label_at    [0:2*FRAMES-1];  // where the label begins in its file
   integer bytes_at    [0:2*FRAMES-1];
   integer size        [0:2*FRAMES-1];
-  integer cause       [0:2*FRAMES-1];  // the stimulus that causes it; NONE where the file does not say
+  integer cause       [0:2*FRAMES-1];  // the stimulus that causes it; NONE if the file does not say
   integer next_of_id  [0:2*FRAMES-1];  // the next one with the same id
-  integer first_cycle [0:FRAMES-1];    // when the first and the last beat of a stimulus were taken
+  integer first_cycle [0:FRAMES-1];    // cycles in which the first and the last beat of a stimulus were taken
   integer last_cycle  [0:FRAMES-1];
   reg     is_received [0:2*FRAMES-1];
-  integer first_of_id [0:255];         // the next one to come
+  integer first_of_id [0:255];         // the next expected one
   integer last_of_id  [0:255];
   integer stimuli, expectations;       // frames of the files
   integer announced_id_errors, announced_frame_errors;
 
   integer cycle, idle_cycles, faults;
-  reg     is_shown;                    // the fault that has begun is printed
+  reg     is_shown;                    // the current fault is printed
   integer random_1, random_2;
 
   // The stream to the system.
@@ -102,7 +102,7 @@ module firm_sim_host #(
   integer beats_in;
 
   // The stream from the system.
-  integer receiving;                   // NONE where nobody expects it
+  integer receiving;                   // NONE if no frame is expected
   reg     is_in_frame, is_frame_right;
   integer received_id;
   integer bytes_received;
@@ -111,7 +111,7 @@ module firm_sim_host #(
   integer frames_received, frames_right, frames_shown;
   integer beats_out;
 
-  // The inputs as they are before the rising edge.
+  // The inputs as sampled before the rising edge.
   reg               tready, tvalid, tlast;
   reg [WIDTH-1:0]   tdata;
   reg [LANES-1:0]   tkeep;
@@ -119,7 +119,7 @@ module firm_sim_host #(
   reg               id_pulse;
   reg [ERRORS-1:0]  frame_pulses;
 
-  // What the stream from the system must still show, as it waited for `tready`.
+  // A beat that waited for `tready`, and that the stream from the system must still show.
   reg               is_held, held_tlast;
   reg [WIDTH-1:0]   held_tdata;
   reg [LANES-1:0]   held_tkeep;
@@ -129,10 +129,10 @@ module firm_sim_host #(
 
   // ------------------------------------------------------------------ files
 
-  integer char;         // the last one read; negative behind the end
+  integer char;         // the last one read; negative after the end
   integer line_number;
   integer value;        // of the byte that was read, or ILL_FORMED, or ANY
-  integer frame;        // the one that is being read; NONE before the first
+  integer frame;        // the frame being read; NONE before the first
   integer frame_count;
   integer base;
   reg [7:0] mark;
@@ -181,7 +181,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // A new frame; `mark label` or `mark @n label`, behind the mark.
+  // A new frame: reads the rest of `mark label` or `mark @n label` after the mark.
   task start_frame;
     begin
       if (frame_count == FRAMES) begin
@@ -253,7 +253,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // A byte of two digits, the first of which is read; ILL_FORMED, with the message printed, where it is none.
+  // A byte of two digits, the first of which has been read; ILL_FORMED, after the message is printed, if it is illegal.
   task read_byte;
     integer first;
     begin
@@ -279,7 +279,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // A line of bytes, the first character of which is read.
+  // A line of bytes, whose first character has been read.
   task read_bytes;
     begin
       while (char >= 0 && char != NEWLINE) begin
@@ -301,7 +301,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // The last frame is complete: check it and put it behind the others with its id.
+  // The last frame is complete: check it and append it to the others with its id.
   task close_frame;
     begin
       if (frame != NONE) begin
@@ -344,7 +344,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // Open `name` and find the frames that `mark` begins.
+  // Open `name` and find the frames that begin with `mark`.
   task read_frame_file;
     begin
       frame       = NONE;
@@ -389,7 +389,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // The next byte of the frame at which `file` stands; comments and announcements may be between.
+  // The next byte of the frame at the position of `file`; comments and announcements may be in between.
   task next_byte;
     integer first;
     begin
@@ -405,7 +405,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // Print the label of a frame; `file` stays where it is.
+  // Print the label of a frame; the position of `file` is unchanged.
   task write_label(input integer labelled, input integer place);
     integer origin, ignored;
     begin
@@ -431,7 +431,7 @@ module firm_sim_host #(
     end
   endtask
 
-  // A fault of the frame that comes in.
+  // A fault of the incoming frame.
   task begin_frame_fault;
     begin
       is_frame_right = 0;

@@ -1,11 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host beside the hardware, for simulation: makes clock and reset, sends the frames of a stimulus file, compares
--- what comes back with an expected file, and reports. docs/reference/simulation-host.md says what the files and the
--- report look like.
+-- The simulated host: it generates clock and reset, sends the frames of a stimulus file, compares responses with an
+-- expected file, and reports. docs/reference/simulation-host.md describes the files and the report.
 --
--- One process does all of it once a cycle: it reads the inputs as they are before the rising edge, and what it
--- drives changes HOLD after the edge, so no order of delta cycles matters. Where a stream carries nothing, the host
--- drives 'X'.
+-- One process does everything, once per cycle: it samples the inputs before the rising edge, and its outputs change
+-- HOLD after the edge, so the order of delta cycles does not matter. A stream without a beat carries 'X'.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -18,22 +16,22 @@ use firm.firm_sim_pkg.all;
 entity firm_sim_host is
   generic (
     WIDTH : integer := 8;
-    -- Bits of `frame_error`, one a converter.
+    -- Bits of `frame_error`, one per converter.
     ERRORS : integer := 1;
-    -- Paths relative to the directory the simulator runs in.
+    -- Paths relative to the directory in which the simulator runs.
     STIMULUS_FILE : string := "stimulus.txt";
     EXPECTED_FILE : string := "expected.txt";
-    -- Where to write what came, in the grammar of the expected file; none where it is empty.
+    -- The file for received frames, in the grammar of the expected file; none if empty.
     RECEIVED_FILE : string := "";
-    -- All randomness follows from it.
+    -- Determines all random choices.
     SEED : integer := 1;
-    -- The chance, each cycle and direction, that the host offers no beat or takes none.
+    -- The chance per cycle and direction that the host stalls.
     STALL_PERCENT : integer := 0;
     -- Frames whose labels and latency are printed.
     SHOWN : integer := 10;
     -- Cycles without a beat after which the host gives up on missing frames.
     WATCHDOG : integer := 100000;
-    -- Cycles without a beat in which it listens for surplus frames when everything has come.
+    -- Cycles without a beat in which it listens for surplus frames after the last expected one.
     QUIET : integer := 1000
   );
   port (
@@ -115,7 +113,7 @@ begin
     variable beats_in    : natural := 0;
 
     -- The stream from the system.
-    variable receiving       : frame_ptr_t;  -- what the frame must be; null where nobody expects it
+    variable receiving       : frame_ptr_t;  -- the expected frame; null if no frame is expected
     variable is_in_frame     : boolean := false;
     variable is_frame_right  : boolean;
     variable received_id     : integer := NO_ID;
@@ -128,14 +126,14 @@ begin
     variable beats_out       : natural := 0;
     variable last_out        : natural := 0;
 
-    -- What the stream from the system must still show, as it waited for `tready`.
+    -- A beat that waited for `tready`, and that the stream from the system must still show.
     variable is_held    : boolean := false;
     variable held_tdata : std_logic_vector(s_axis_tdata'range);
     variable held_tkeep : std_logic_vector(s_axis_tkeep'range);
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
 
-    -- The file of what came: its line of the frame that comes in.
+    -- The file of received frames, and its line of the incoming frame.
     file received          : text;
     variable received_line : line;
 
@@ -150,7 +148,7 @@ begin
       end if;
     end procedure fault;
 
-    -- A fault of the frame that comes in.
+    -- A fault of the incoming frame.
     procedure frame_fault(what : in string) is
     begin
       is_frame_right := false;
@@ -260,7 +258,7 @@ begin
             & integer'image(first_out - cause.last_cycle) & " last beat in to first beat out");
     end procedure show_frame;
 
-    -- Nothing is written where nobody asks for it: that would take as long as all the rest.
+    -- Nothing is written without a file: writing would double the simulation time.
     procedure note_frame(id : in byte_t) is
     begin
       if RECEIVED_FILE /= "" then

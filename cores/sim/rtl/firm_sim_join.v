@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // firm_sim_join.vhd for simulators of Verilog, cycle by cycle: joins the bursts of each publisher behind a Manager with
-// a preemptive scheduler to frames, and passes these on one after the other in the order in which they become whole.
-// Verilog has no memory that grows, so it keeps at most BEATS beats; more of them, or a burst that does not fit, end the
+// a preemptive scheduler to frames, and forwards these in the order of their completion.
+// Verilog has no memory that grows, so it keeps at most BEATS beats. More beats, or an illegal burst, end the
 // simulation.
 
 `timescale 1ns / 1ps
@@ -40,16 +40,16 @@ module firm_sim_join #(
   reg [7:0]                tid       [0:BEATS-1];
   reg                      tlast     [0:BEATS-1];
   integer                  next_beat [0:BEATS-1];
-  integer                  free;                   // those that a frame has left
-  integer                  used;                   // those that a frame has ever had
+  integer                  free;                   // those released by a frame
+  integer                  used;                   // those ever used by a frame
 
-  // The frame of each publisher that has begun and is not whole.
+  // The incomplete frame of each publisher.
   integer                  first     [0:255];
   integer                  last      [0:255];
   integer                  bytes     [0:255];
-  reg [8*HEADER_BYTES-1:0] header    [0:255];      // id lowest, then the length
+  reg [8*HEADER_BYTES-1:0] header    [0:255];      // id in the lowest byte, then the length
 
-  integer                  first_whole, last_whole;  // beats of whole frames
+  integer                  first_whole, last_whole;  // beats of complete frames
   reg                      is_first;                 // the next beat is the first of a burst
 
   integer                  beat, lane, id;
@@ -97,7 +97,7 @@ module firm_sim_join #(
     end
   endtask
 
-  // Its bytes count for the frame; those of the header are kept.
+  // Counts the beat's bytes for the frame; those of the header are stored.
   task count_bytes;
     begin
       bits = header[id];
@@ -130,7 +130,7 @@ module firm_sim_join #(
       if (is_first && s_axis_tdata[7:0] !== s_axis_tid)
         $fatal(1, "burst of id %0d begins with another id", id);
       if (is_first && bytes[id] > 0) begin
-        // The beat that a resumed frame goes on with carries nothing but the id.
+        // The first beat of a resumed burst carries only the id.
         if (s_axis_tlast === 1'b1)
           $fatal(1, "burst of id %0d resumes a frame without a beat of it", id);
       end else begin

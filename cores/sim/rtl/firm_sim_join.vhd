@@ -1,8 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Stands for the host's software behind a Manager with a preemptive scheduler: joins the bursts of each publisher to
--- frames and passes these on one after the other, each in one piece, in the order in which they become whole. It keeps
--- what it has, however much that is, and is ready when the one behind it is. A burst that does not fit ends the
--- simulation. Simulation only.
+-- Replaces the host's software behind a Manager with a preemptive scheduler: joins the bursts of each publisher to
+-- frames and forwards these in one piece each, in the order of their completion. Its memory is unbounded, and it is
+-- ready when the entity after it is. An illegal burst ends the simulation. Simulation only.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -51,15 +50,15 @@ architecture simulation of firm_sim_join is
   end record beat_t;
 
   type queue_t is record
-    first : beat_ptr_t;  -- null where there is none
+    first : beat_ptr_t;  -- null if there is none
     last  : beat_ptr_t;
   end record queue_t;
 
-  -- The frame of a publisher that has begun and is not whole.
+  -- The incomplete frame of a publisher.
   type frame_t is record
     beats  : queue_t;
     bytes  : natural;
-    header : unsigned(8*HEADER_BYTES-1 downto 0);  -- id lowest, then the length
+    header : unsigned(8*HEADER_BYTES-1 downto 0);  -- id in the lowest byte, then the length
   end record frame_t;
   type frames_t is array (0 to 255) of frame_t;
 
@@ -74,10 +73,10 @@ begin
   join : process (clk)
 
     variable frames   : frames_t;
-    variable whole    : queue_t;           -- beats of whole frames
+    variable whole    : queue_t;           -- beats of complete frames
     variable is_first : boolean := true;   -- the next beat is the first of a burst
 
-    -- Put all of `tail` behind `queue`.
+    -- Append all of `tail` to `queue`.
     procedure append(queue : inout queue_t; tail : inout queue_t) is
     begin
       if queue.first = null then
@@ -94,7 +93,7 @@ begin
       report "burst of id " & integer'image(id) & " " & what severity failure;
     end procedure fault;
 
-    -- Its bytes count for the frame; those of the header are kept.
+    -- Count the beat's bytes for the frame; those of the header are stored.
     procedure count_bytes(frame : inout frame_t) is
     begin
       for lane in 0 to LANES-1 loop
@@ -129,7 +128,7 @@ begin
         fault(ID, "begins with another id");
       end if;
       if is_first and frames(ID).bytes > 0 then
-        -- The beat that a resumed frame goes on with carries nothing but the id.
+        -- The first beat of a resumed burst carries only the id.
         if s_axis_tlast = '1' then
           fault(ID, "resumes a frame without a beat of it");
         end if;

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// The host of firm_sim_pipe.vhd for simulators of Verilog: the same requests, reports and stalls, cycle by cycle. SEED and
-// STALL_PERCENT can be set anew where the simulator is started, as in +SEED=7. It is SystemVerilog for its queues alone,
+// The host of firm_sim_pipe.vhd for simulators of Verilog: the same requests, reports and stalls, cycle by cycle. SEED
+// and STALL_PERCENT can be set at the start of the simulator, as in +SEED=7. It is SystemVerilog only for its queues,
 // since frames have any size.
 //
-// Inputs are read before the rising edge; what the host drives changes with the falling edge, so no order of events
-// matters. Where a stream carries nothing, it drives 'x'.
+// Inputs are sampled before the rising edge. Outputs change at the falling edge, so the order of events does not
+// matter. A stream without a beat carries 'x'.
 
 `timescale 1ns / 1ps
 
 module firm_sim_pipe #(
   parameter WIDTH = 8,
-  // Bits of `frame_error`, one a converter.
+  // Bits of `frame_error`, one per converter.
   parameter ERRORS = 1,
-  // All randomness follows from it.
+  // Determines all random choices.
   parameter SEED = 1,
-  // The chance, each cycle and direction, that the host offers no beat or takes none.
+  // The chance per cycle and direction that the host stalls.
   parameter STALL_PERCENT = 0
 ) (
   output reg                clk,
@@ -52,24 +52,24 @@ module firm_sim_pipe #(
 
   reg [63:0] cycle;
   integer    quiet;                      // cycles since the last beat, or MOST_QUIET
-  reg        is_reported;                // something that ends a run
+  reg        is_reported;                // an event that ends a run
   integer    request, cycles_left;
 
-  // The stream to the system: the frames that are still to be offered.
+  // The stream to the system: the frames that wait to be offered.
   reg [7:0]  bytes [$];
   integer    sizes [$];
-  integer    sending;                    // the size of the frame that is on its way; 0 for none
+  integer    sending;                    // the size of the frame being sent; 0 for none
   integer    bytes_sent;                 // of it, without the beat on offer
   reg        is_offered;
   reg [63:0] first_in;
 
-  // The stream from the system: the burst that comes in.
+  // The stream from the system: the incoming burst.
   reg [7:0]  burst [$];
   reg [7:0]  burst_tid;
   reg [63:0] first_out;
   reg        is_accepting;
 
-  // The inputs as they are before the rising edge.
+  // The inputs as sampled before the rising edge.
   reg               tready, tvalid, tlast;
   reg [WIDTH-1:0]   tdata;
   reg [LANES-1:0]   tkeep;
@@ -77,7 +77,7 @@ module firm_sim_pipe #(
   reg               id_pulse;
   reg [ERRORS-1:0]  frame_pulses;
 
-  // What the stream from the system must still show, as it waited for `tready`.
+  // A beat that waited for `tready`, and that the stream from the system must still show.
   reg               is_held, held_tlast;
   reg [WIDTH-1:0]   held_tdata;
   reg [LANES-1:0]   held_tkeep;
@@ -85,7 +85,7 @@ module firm_sim_pipe #(
 
   // ------------------------------------------------------------------ faults
 
-  // What has been reported shall be read before the simulation ends.
+  // Reports must be read before the simulation ends.
   task fail;
     begin
       $fflush(reports);
@@ -493,7 +493,7 @@ module firm_sim_pipe #(
       #HALF_PERIOD clk = 0;
     end
     request = $fgetc(requests);
-    // The end of the requests is as good as Q.
+    // The end of the requests has the same effect as Q.
     while (request >= 0) begin
       if (request == "F")
         read_frame;

@@ -1,11 +1,11 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The host beside the hardware at the end of a pipe: makes clock and reset, and does what is requested on file
--- descriptor 3: it takes frames for the system, and runs so many cycles. What happened in them is reported on file
--- descriptor 4. docs/reference/transports.md says what requests and reports look like.
+-- The simulated host at the end of a pipe: it generates clock and reset, and serves the requests on file descriptor 3:
+-- it takes frames for the system, and runs for a number of cycles. It reports the events in them on file descriptor 4.
+-- docs/reference/transports.md describes requests and reports.
 --
--- Between two requests no time passes, so a simulation depends on the requests, on SEED and STALL_PERCENT alone. What
--- breaks a rule ends it with a message. As in firm_sim_host, one process reads the inputs before the rising edge, and
--- what it drives changes HOLD after it.
+-- No time passes between two requests, so a simulation depends only on the requests, SEED and STALL_PERCENT. A violated
+-- rule ends it with a message. As in firm_sim_host, one process samples the inputs before the rising edge, and
+-- its outputs change HOLD after it.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;
@@ -17,11 +17,11 @@ use firm.firm_sim_pkg.all;
 entity firm_sim_pipe is
   generic (
     WIDTH : integer := 8;
-    -- Bits of `frame_error`, one a converter.
+    -- Bits of `frame_error`, one per converter.
     ERRORS : integer := 1;
-    -- All randomness follows from it.
+    -- Determines all random choices.
     SEED : integer := 1;
-    -- The chance, each cycle and direction, that the host offers no beat or takes none.
+    -- The chance per cycle and direction that the host stalls.
     STALL_PERCENT : integer := 0
   );
   port (
@@ -73,7 +73,7 @@ architecture simulation of firm_sim_pipe is
   attribute foreign : string;
   attribute foreign of flush_all_files : procedure is "VHPIDIRECT libc.so.6 fflush";
 
-  -- A cycle's number, since an integer's 31 bits are over after some minutes of a fast simulator.
+  -- A cycle's number; the 31 bits of an integer would overflow after some minutes of a fast simulator.
   type cycle_t is record
     high : natural;
     low  : natural;  -- 24 bits
@@ -88,7 +88,7 @@ architecture simulation of firm_sim_pipe is
     return (cycle.high, cycle.low + 1);
   end function next_cycle;
 
-  -- A frame that is to be sent; byte k is character k+1.
+  -- A frame that waits to be sent; byte k is character k+1.
   type frame_t;
   type frame_ptr_t is access frame_t;
   type frame_t is record
@@ -118,7 +118,7 @@ begin
 
     variable cycle       : cycle_t := FIRST_CYCLE;
     variable quiet       : natural := 0;        -- cycles since the last beat, or integer'high
-    variable is_reported : boolean := false;    -- something that ends a run
+    variable is_reported : boolean := false;    -- an event that ends a run
     variable random_1    : positive;
     variable random_2    : positive := 1;
 
@@ -129,21 +129,21 @@ begin
     variable is_offered : boolean := false;
     variable first_in   : cycle_t;
 
-    -- The stream from the system: the burst that comes in, as text that grows.
+    -- The stream from the system: the incoming burst, as text that grows.
     variable burst        : line;
     variable burst_size   : natural := 0;
     variable burst_tid    : byte_t;
     variable first_out    : cycle_t;
     variable is_accepting : boolean := false;
 
-    -- What the stream from the system must still show, as it waited for `tready`.
+    -- A beat that waited for `tready`, and that the stream from the system must still show.
     variable is_held    : boolean := false;
     variable held_tdata : std_logic_vector(s_axis_tdata'range);
     variable held_tkeep : std_logic_vector(s_axis_tkeep'range);
     variable held_tid   : std_logic_vector(s_axis_tid'range);
     variable held_tlast : std_logic;
 
-    -- What has been reported shall be read before the simulation ends.
+    -- Reports must be read before the simulation ends.
     procedure fail(what : in string) is
     begin
       flush_all_files(0);
@@ -510,7 +510,7 @@ begin
     end loop;
     rst_n <= '1' after HOLD;
 
-    -- The end of the requests is as good as Q.
+    -- The end of the requests has the same effect as Q.
     while request /= 'Q' and not endfile(requests) loop
       read(requests, request);
       case request is

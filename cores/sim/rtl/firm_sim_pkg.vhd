@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The frame files of the simulation host (docs/reference/simulation-host.md): read, checked and kept in memory, a
--- character a byte. Simulation only. A fault of form ends the simulation with `file:line: what`.
+-- The frame files of the simulation host (docs/reference/simulation-host.md): reads them, checks them and keeps them in
+-- memory, one character per byte. Simulation only. A fault of form ends the simulation with `file:line: message`.
 library ieee;
 use ieee.std_logic_1164.all;
 use std.textio.all;
@@ -15,9 +15,9 @@ package firm_sim_pkg is
   type frame_ptr_t is access frame_t;
   type frame_t is record
     label_text  : line;         -- without the mark and without `@n`
-    cause       : integer;      -- index of the stimulus frame that causes this one; -1 where the file does not say
+    cause       : integer;      -- index of the stimulus frame that causes this one; -1 if the file does not say
     bytes       : line;         -- byte k is character k+1
-    any_byte    : line;         -- '.' at byte k+1 where every value is right; null where there is no such byte
+    any_byte    : line;         -- '.' at byte k+1 if it may have any value; null if there is no such byte
     size        : natural;      -- bytes
     first_cycle : natural;      -- the host notes when the first and the last beat of a stimulus frame were taken
     last_cycle  : natural;
@@ -50,8 +50,8 @@ package firm_sim_pkg is
 
   procedure print(text : in string);
 
-  -- Text of which so many characters are used, for so many as are wanted: it grows by doubling, so that a long frame is
-  -- not copied once a line.
+  -- Gives a text, of which `used` characters are in use, room for `wanted`. The text grows by doubling, so that a long
+  -- frame is not copied for every line.
   procedure make_room(text : inout line; used : in natural; wanted : in positive);
 
   -- A bench that writes results to a file can compare them at once. EXPECTED is the file with the right ones, or empty:
@@ -235,7 +235,7 @@ package body firm_sim_pkg is
     return number;
   end function parse_number;
 
-  -- The place behind the blank that follows `first`, or behind the end.
+  -- The position after the blank that follows `first`, or after the end.
   function next_word(text : string; first : positive) return positive is
     variable place : positive := first;
   begin
@@ -331,7 +331,7 @@ package body firm_sim_pkg is
     end if;
   end procedure announce_errors;
 
-  -- The last frame is complete: check it and put it behind the others with its id.
+  -- The last frame is complete: check it and append it to the others with its id.
   procedure close_frame(path : in string; line_number : in natural; mark : in character;
     content : inout frame_file_t) is
     variable announced : natural := HEADER_BYTES;

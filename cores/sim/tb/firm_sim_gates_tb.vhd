@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Three gates: one that nobody asks, one whose sink is always ready, one whose sink is ready now and then. Watches that
--- a valid that was let through stays so until it is taken, and counts the cycles in which each gate is closed.
+-- Three gates: one without requests, one whose sink is always ready, one whose sink is sometimes ready. Checks that a
+-- valid that passed a gate stays until it is taken, and counts the cycles in which each gate is closed.
 library ieee;
 use ieee.std_logic_1164.all;
 use std.textio.all;

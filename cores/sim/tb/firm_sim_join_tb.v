@@ -16,7 +16,7 @@ module firm_sim_join_tb;
   wire               burst_tready, frame_tready;
   wire [7:0]         frame_tid;
 
-  // The id of a frame stands in its first beat.
+  // The first beat of a frame contains its id.
   reg                first_r;
   reg  [7:0]         id_r;
   wire [7:0]         burst_tid = first_r ? burst_tdata[7:0] : id_r;

@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A system that is a wire, for benches of simulated hosts: what comes goes straight back. FAULT makes it break the
--- stream in one way, so that a test can see that the host finds it.
+-- A system that is a wire, for benches of simulated hosts: its input is its output. FAULT makes it violate the protocol
+-- in one way, so that a test can check that the host detects it.
 library ieee;
 use ieee.std_logic_1164.all;
 

@@ -1,12 +1,12 @@
-"""AXI DMA between memory and the system's streams, as the block design of a board with a processor has it.
+"""AXI DMA between memory and the system's streams, for the block design of a board with a processor.
 
-That is one with scatter and gather, 26 bits of length, 32 of address, and no realignment
-(docs/how-to/build-for-a-board.md). Each direction has a ring of descriptors with a buffer each: frames are copied
-into the buffers that are free, a burst comes into the next ones. What is longer than a buffer goes on in the next
-one. Registers and descriptors: PG021 (AXI DMA).
+The engine has scatter and gather, 26 bits of length, 32 bits of address, and no realignment
+(docs/how-to/build-for-a-board.md). Each direction has a ring of descriptors with a buffer each. Frames are copied into
+free buffers, and bursts fill the next free ones. A frame or burst that is longer than a buffer continues in the next
+one. PG021 (AXI DMA) describes registers and descriptors.
 
-Python has no barrier between memory and registers. It relies on the many instructions between a write to the one and a
-write to the other, which a program in C++ could not.
+Python has no barrier between memory and registers. It relies on the many instructions that the interpreter executes
+between a write to one and a write to the other; a program in C++ could not.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from types import TracebackType
 from fusesoc_firm.node.transport.dma_device import DmaDevice
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 
-# The first registers of the channels, the one to the system and the one from it, and offsets from there.
+# The first registers of the channels to and from the system; other registers are offsets from there.
 TO_SYSTEM, FROM_SYSTEM = 0x00, 0x30
 CONTROL, STATUS, FIRST_DESCRIPTOR, LAST_DESCRIPTOR = 0x00, 0x04, 0x08, 0x10
 _NAMES = {TO_SYSTEM: "MM2S", FROM_SYSTEM: "S2MM"}
@@ -58,7 +58,7 @@ _FAULTS = {
 DESCRIPTOR_BYTES = 64
 NEXT, BUFFER, DESCRIPTOR_CONTROL, DESCRIPTOR_STATUS = 0, 2, 6, 7
 LENGTH, END_OF_FRAME, START_OF_FRAME, COMPLETE = (1 << 26) - 1, 1 << 26, 1 << 27, 1 << 31
-# A buffer begins at a multiple of what the widest stream has.
+# Each buffer begins at a multiple of the widest stream's beat.
 _ALIGNMENT = 64
 _RESET_SECONDS = 1.0
 _SHORTEST_PAUSE, _LONGEST_PAUSE = 5e-6, 500e-6
@@ -66,7 +66,7 @@ _SHORTEST_PAUSE, _LONGEST_PAUSE = 5e-6, 500e-6
 
 @dataclass(frozen=True)
 class DmaBuffers:
-    """How many each direction has, and the bytes of each, a multiple of 64; 0: what the memory has room for."""
+    """The number of buffers per direction, and the bytes of each: a multiple of 64, or 0 for as many as fit."""
 
     send: int = 16
     receive: int = 16
@@ -77,7 +77,7 @@ class _Ring:
     """The descriptors and buffers of one direction, used in turn."""
 
     def __init__(self, device: DmaDevice, channel: int, count: int, places: tuple[int, int, int]) -> None:
-        """`places`: where in the memory the descriptors are, where the buffers, and the bytes of each buffer."""
+        """`places` are the offsets of descriptors and buffers in the memory, and the bytes of each buffer."""
         self._device, self._channel, self._count = device, channel, count
         self._descriptors, self._buffers, self.size = places
         self._words = device.memory.cast("I")
@@ -88,27 +88,27 @@ class _Ring:
             self._set(index, BUFFER, device.address + self._buffers + index * self.size)
 
     def start(self, interrupts: int) -> None:
-        """The engine may run; it waits for descriptors."""
+        """Start the channel; it waits for descriptors."""
         self._device.write(self._channel + FIRST_DESCRIPTOR, self._address(0))
         self._device.write(self._channel + CONTROL, Control.RUN | Control.ONE_FRAME_AN_INTERRUPT | interrupts)
 
     def next(self, index: int) -> int:
-        """The descriptor behind one."""
+        """Return the index of the next descriptor."""
         return (index + 1) % self._count
 
     def buffer(self, index: int) -> memoryview:
-        """The buffer of a descriptor."""
+        """Return the buffer of a descriptor."""
         first = self._buffers + index * self.size
         return self._device.memory[first : first + self.size]
 
     def hand_over(self, index: int, control: int) -> None:
-        """Give a descriptor to the engine, with what it is to do."""
+        """Hand a descriptor with its control word to the engine."""
         self._set(index, DESCRIPTOR_CONTROL, control)
         self._set(index, DESCRIPTOR_STATUS, 0)
         self._device.write(self._channel + LAST_DESCRIPTOR, self._address(index))
 
     def done(self, index: int) -> int | None:
-        """What the engine says of a descriptor; None if it is not done."""
+        """Return the engine's status of a descriptor, or None while it is not done."""
         status = self._words[self._place(index) + DESCRIPTOR_STATUS]
         return status if status & COMPLETE else None
 
@@ -126,7 +126,7 @@ class DmaTransport:
     """A transport over AXI DMA."""
 
     def __init__(self, device: DmaDevice, buffers: DmaBuffers | None = None, longest: int = 2**26) -> None:
-        """Reset the engine, and with it the system. No burst has more bytes than `longest`. Raises `TransportError`."""
+        """Reset the engine, and with it the system. No burst has more than `longest` bytes. Raises `TransportError`."""
         self._device = device
         self._longest = longest
         self._buffers = buffers or DmaBuffers()
@@ -142,14 +142,14 @@ class DmaTransport:
             self._buffers.receive,
             (self._buffers.send * DESCRIPTOR_BYTES, first_buffer + self._buffers.send * size, size),
         )
-        # Of the sender: the descriptor to use next, the first that the engine has, and how many it has.
+        # Sender: the next descriptor, the first that the engine has, and the number that it has.
         self._next_sent, self._first_sent, self._handed_over = 0, 0, 0
-        # Of the receiver: the descriptor that is filled next, and the burst of which a part has come.
+        # Receiver: the descriptor that is filled next, and the bytes of the current burst.
         self._next_received, self._burst = 0, bytearray()
         self._start()
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; waits while all buffers are on their way. Raises `TransportError`."""
+        """Send a whole frame; wait while all buffers are in use. Raises `TransportError`."""
         with self._sending:
             rest, mark = memoryview(frame), START_OF_FRAME
             while rest:
@@ -163,7 +163,7 @@ class DmaTransport:
                 mark = 0
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """The next burst, as `Transport.receive` has it."""
+        """Return the next burst, as `Transport.receive` does."""
         end = None if timeout is None else time.monotonic() + timeout
         with self._receiving:
             while not self._closing.is_set():
@@ -176,17 +176,17 @@ class DmaTransport:
                 rest = None if end is None else end - time.monotonic()
                 if rest is not None and rest <= 0:
                     break
-                # The interrupt is answered before it is looked for what came before it, so none is missed.
+                # Acknowledge the interrupt before looking at the descriptors, so that no completion is missed.
                 self._device.write(FROM_SYSTEM + STATUS, Status.INTERRUPTS)
                 if self._from_system.done(self._next_received) is None:
                     self._device.wait(rest)
         return None
 
     def is_at_rest(self) -> None:
-        """Nothing: the hardware behind the engine may work at something."""
+        """Return None: the hardware behind the engine may be working."""
 
     def close(self) -> None:
-        """Stop the engine, so that it does not write to memory that is somebody else's. A second call does nothing."""
+        """Stop the engine, so that it does not write to memory that has been released. A second call does nothing."""
         if self._closing.is_set():
             return
         self._closing.set()
@@ -203,7 +203,7 @@ class DmaTransport:
         self.close()
 
     def _buffer_bytes(self) -> int:
-        """The size of each buffer. Raises `TransportError` if it, or the number of them, cannot be."""
+        """Return the size of each buffer. Raises `TransportError` if it, or the number of buffers, is illegal."""
         count, size = self._buffers.send + self._buffers.receive, self._buffers.size
         room = len(self._device.memory) - count * DESCRIPTOR_BYTES
         most = min(max(0, room) // max(1, count), LENGTH) // _ALIGNMENT * _ALIGNMENT
@@ -231,7 +231,7 @@ class DmaTransport:
         return lambda: not self._device.read(channel + STATUS) & Status.HALTED
 
     def _reset(self) -> bool:
-        """Whether it has ended; a reset of one channel is of both."""
+        """Reset both channels, which one reset does; return whether the reset has finished."""
         self._device.write(TO_SYSTEM + CONTROL, Control.RESET)
         return _soon(lambda: not self._device.read(TO_SYSTEM + CONTROL) & Control.RESET)
 
@@ -246,12 +246,12 @@ class DmaTransport:
                 self._handed_over -= 1
             if self._handed_over < self._buffers.send:
                 return
-            # There is an interrupt, but the one of UIO is the receiver's.
+            # The only interrupt of UIO belongs to the receiver.
             time.sleep(pause)
             pause = min(2 * pause, _LONGEST_PAUSE)
 
     def _take(self, status: int) -> bool:
-        """Add what a buffer holds; whether the burst is over."""
+        """Append the content of a buffer; return whether the burst is complete."""
         size = status & LENGTH
         if size > self._from_system.size:
             raise TransportError("the DMA engine wrote beyond a buffer")
@@ -274,7 +274,7 @@ class DmaTransport:
 
 
 def _soon(condition: Callable[[], bool]) -> bool:
-    """Whether it is so, or becomes so at once."""
+    """Return whether a condition holds now or within a short time."""
     end = time.monotonic() + _RESET_SECONDS
     while not condition():
         if time.monotonic() > end:

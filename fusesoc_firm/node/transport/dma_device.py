@@ -1,6 +1,6 @@
-"""What a driver in user space needs of AXI DMA under Linux: registers, an interrupt, and memory that both see.
+"""AXI DMA for a driver in user space under Linux: registers, an interrupt, and memory shared with the engine.
 
-Registers and interrupt come by UIO, the memory by u-dma-buf (https://github.com/ikwzm/udmabuf).
+UIO provides registers and interrupt, u-dma-buf (https://github.com/ikwzm/udmabuf) the memory.
 """
 
 from __future__ import annotations
@@ -17,46 +17,47 @@ from fusesoc_firm.node.transport.transport import TransportError
 _WORD_BYTES = 4
 _POLL_SECONDS = 50e-6
 _REACH = 2**32
-# Of u-dma-buf: not cached, and not a device's memory either, which takes aligned accesses only.
+# A mode of u-dma-buf: neither cached nor mapped as device memory, which allows only aligned accesses.
 _WRITE_COMBINE = "2"
 
 
 class DmaDevice(Protocol):
-    """The engine as its driver sees it; a test may have one of its own."""
+    """The engine as its driver sees it; a test may provide its own."""
 
     @property
     def memory(self) -> memoryview:
-        """Bytes that processor and engine share."""
+        """The memory that processor and engine share."""
 
     @property
     def address(self) -> int:
-        """The address of the first of them for the engine."""
+        """The address of its first byte as the engine sees it."""
 
     def read(self, offset: int) -> int:
-        """A register, by its offset in bytes."""
+        """Read a register, by its offset in bytes."""
 
     def write(self, offset: int, value: int) -> None:
         """Set a register."""
 
     def wait(self, timeout: float | None) -> None:
-        """Sleep until an interrupt that has not been answered, until the time is over, or after `end`."""
+        """Sleep until an unacknowledged interrupt, until the timeout, or until `end`."""
 
     def end(self) -> None:
-        """Wake who waits, now and later."""
+        """Wake all threads that wait, now and later."""
 
 
 class LinuxDmaDevice:
     """The engine of a board that runs Linux."""
 
     def __init__(self, uio: str, buffer: str, *, has_interrupt: bool, root: Path = Path("/")) -> None:
-        """`uio` such as /dev/uio0, whose first map are the registers; `buffer` such as udmabuf0.
+        """`uio` is a device such as /dev/uio0, whose first map holds the registers; `buffer` a name such as udmabuf0.
 
-        Without an interrupt it is looked at every 50 us. All paths begin with `root`. Raises `TransportError`.
+        Without an interrupt, the registers are polled every 50 us. All paths begin with `root`. Raises
+        `TransportError`.
         """
         self._has_interrupt = has_interrupt
         about = root / "sys/class/u-dma-buf" / buffer
         if not about.is_dir():
-            # Older releases call it so.
+            # The path in older releases.
             about = root / "sys/class/udmabuf" / buffer
         self._address, size = _number(about / "phys_addr"), _number(about / "size")
         if self._address + size > _REACH:
@@ -78,16 +79,16 @@ class LinuxDmaDevice:
 
     @property
     def memory(self) -> memoryview:
-        """Bytes that processor and engine share."""
+        """The memory that processor and engine share."""
         return self._memory
 
     @property
     def address(self) -> int:
-        """The address of the first of them for the engine."""
+        """The address of its first byte as the engine sees it."""
         return self._address
 
     def read(self, offset: int) -> int:
-        """A register, by its offset in bytes."""
+        """Read a register, by its offset in bytes."""
         return self._registers[offset // _WORD_BYTES]
 
     def write(self, offset: int, value: int) -> None:
@@ -95,12 +96,12 @@ class LinuxDmaDevice:
         self._registers[offset // _WORD_BYTES] = value
 
     def wait(self, timeout: float | None) -> None:
-        """Sleep until an interrupt that has not been answered, until the time is over, or after `end`."""
+        """Sleep until an unacknowledged interrupt, until the timeout, or until `end`."""
         if not self._has_interrupt:
             time.sleep(_POLL_SECONDS)
             return
         try:
-            # The kernel has switched the interrupt off when it came.
+            # The kernel disables the interrupt when it occurs.
             os.write(self._interrupt, (1).to_bytes(_WORD_BYTES, "little"))
             if self._interrupt in select.select([self._interrupt, self._wake], [], [], timeout)[0]:
                 os.read(self._interrupt, _WORD_BYTES)
@@ -108,12 +109,12 @@ class LinuxDmaDevice:
             raise TransportError(f"the DMA engine's interrupt: {error.strerror}") from None
 
     def end(self) -> None:
-        """Wake who waits, now and later."""
+        """Wake all threads that wait, now and later."""
         os.close(self._woken)
 
 
 def _number(path: Path) -> int:
-    """What a device tells by a file of one line."""
+    """Return the number in a device's one-line file."""
     try:
         text = path.read_text(encoding="ascii").strip()
         return int(text, 0)

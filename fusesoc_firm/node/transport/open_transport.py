@@ -1,4 +1,4 @@
-"""A transport by its address, as it stands on a command line or in a launch file (docs/reference/transports.md).
+"""Opens a transport by its address, as given on a command line or in a launch file (docs/reference/transports.md).
 
 pipe:COMMAND                      a simulator
 uart:DEVICE:BAUD[:rtscts]         a serial line, with flow control by wires
@@ -22,7 +22,7 @@ LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts], dma:UIO:BUFFER[:poll]"
 def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Event], None] | None = None) -> Transport:
     """Open the transport with an address; `pace` and `observe` are for a simulator. Raises `TransportError`.
 
-    The command of a simulator is words as a shell has them, with quotes and without its other signs.
+    A simulator's command is split into words as by a shell, with quotes but no other special characters.
     """
     kind, _, rest = address.partition(":")
     if kind == "pipe" and rest.strip():
@@ -47,7 +47,7 @@ def _words(address: str, command: str) -> list[str]:
 
 
 def _device(text: str, option: str) -> tuple[str, str, bool]:
-    """`FIRST:SECOND`, with an option or not. The names of devices may hold colons, so it is read from its end."""
+    """Split `FIRST:SECOND` and an optional `option`, from the end: device names may hold colons."""
     has_option = text.endswith(option)
     first, _, second = text.removesuffix(option).rpartition(":")
     return first, second, has_option

@@ -9,7 +9,7 @@
         transport.send(pack_frame(0, payload))
         burst = transport.receive()
 
-The simulator is a process of its own. What it prints is kept, and shown when it ends unasked.
+The simulator is a separate process. Its output is kept, and shown if it ends unexpectedly.
 """
 
 from __future__ import annotations
@@ -29,23 +29,24 @@ from typing import NoReturn
 from fusesoc_firm.node.transport.transport import Burst, TransportError, TransportResetError
 
 MOST_CYCLES = 2**31 - 1
-"""Of one run; a frame has at most so many bytes, too."""
+"""The limit of the cycles of one run, and of the bytes of a frame."""
 
-# Puts the pipes where a simulator finds them. A shell copies no descriptor of two digits, but opens it by its name.
+# Puts the pipes at the descriptors that a simulator expects. A shell cannot copy descriptors of two digits, but opens
+# them by name.
 _SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
 _ID_ERROR = 65535
 _SHOWN_LINES = 20
-# One that has been asked to end, or whose pipes are closed, does so at once.
+# A simulator normally ends at once when it is asked to, or when its pipes close.
 _END_SECONDS = 10.0
 
-# A thread runs so long before it looks for frames again, and never fewer or more cycles.
+# A thread runs the simulator for this time before it looks for frames again, within the limits on cycles.
 _STEP_SECONDS = 0.001
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
 
 
 @dataclass(frozen=True)
 class Taken:
-    """The system took a frame: the cycles of its first and of its last beat."""
+    """The system took a frame: the cycles of its first and its last beat."""
 
     first_cycle: int
     last_cycle: int
@@ -53,7 +54,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class ErrorPulse:
-    """A pulse of a converter's bit of `frame_error`, or of `id_error` where there is no converter."""
+    """A pulse of a converter's bit of `frame_error`, or of `id_error` if the converter is None."""
 
     converter: int | None
     cycle: int
@@ -63,9 +64,9 @@ Event = Taken | Burst | ErrorPulse
 
 
 class Simulator:
-    """A simulator in lock-step: it does what is requested and nothing else. One thread uses it.
+    """A simulator in lock-step: it runs only on request. One thread uses it.
 
-    `cycle` is the number of cycles that have run; the last `quiet` of them had no beat in either direction.
+    `cycle` is the number of cycles run so far; the last `quiet` of them had no beat in either direction.
     """
 
     def __init__(self, command: Sequence[str], folder: Path | None = None) -> None:
@@ -85,7 +86,7 @@ class Simulator:
                 stdout=self._printed,
                 stderr=subprocess.STDOUT,
                 pass_fds=(from_us, to_us),
-                # Ctrl-C is for us; the simulator ends with its requests.
+                # Ctrl-C reaches only this process; the simulator ends with its requests.
                 start_new_session=True,
             )
         except OSError as error:
@@ -97,24 +98,24 @@ class Simulator:
 
     @property
     def pid(self) -> int:
-        """The simulator's process."""
+        """The id of the simulator's process."""
         return self._process.pid
 
     def request(self, frame: bytes) -> None:
-        """Put a frame behind those that are to be sent to the system. Raises `TransportError`."""
+        """Append a frame to those that are to be sent to the system. Raises `TransportError`."""
         if not 1 <= len(frame) <= MOST_CYCLES:
             raise ValueError(f"a frame of {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
         self._write(b"F" + len(frame).to_bytes(4, "little"), frame)
 
     def run(self, cycles: int) -> list[Event]:
-        """Run for so many cycles, or until the end of one in which something happens. Raises `TransportError`."""
+        """Run for `cycles`, or until the end of the first cycle with an event. Raises `TransportError`."""
         if not 0 <= cycles <= MOST_CYCLES:
             raise ValueError(f"{cycles} cycles; legal: 0 to {MOST_CYCLES}")
         self._write(b"R" + cycles.to_bytes(4, "little"))
         return self._events()
 
     def quit(self) -> None:
-        """End the simulation. Raises `TransportError` if it does not end well."""
+        """End the simulation. Raises `TransportError` if it does not end normally."""
         self._write(b"Q")
         self._events()
         status = self._wait()
@@ -123,7 +124,7 @@ class Simulator:
         self.close()
 
     def kill(self) -> None:
-        """End the simulator at once. Another thread may do so; the one that uses it gets a `TransportError`."""
+        """Kill the simulator at once. Another thread may do so; the one that uses it gets a `TransportError`."""
         self._process.kill()
 
     def close(self) -> None:
@@ -137,11 +138,11 @@ class Simulator:
             try:
                 file.close()
             except OSError:
-                # What was still to be written has no reader.
+                # Unwritten data has no reader.
                 continue
 
     def printed(self) -> str:
-        """The last lines that the simulator printed."""
+        """Return the last lines that the simulator printed."""
         if self._printed.closed:
             return ""
         text = os.pread(self._printed.fileno(), os.fstat(self._printed.fileno()).st_size, 0)
@@ -173,7 +174,7 @@ class Simulator:
         return int.from_bytes(self._read(size), "little")
 
     def _events(self) -> list[Event]:
-        """All reports up to that which says that the simulation stands."""
+        """Return all reports up to the one at which the simulation stops."""
         events: list[Event] = []
         while (kind := self._read(1)) != b"S":
             events.append(self._event(kind))
@@ -193,7 +194,7 @@ class Simulator:
         return self._fail(f"the simulator sent 0x{kind.hex()} where a report begins")
 
     def _wait(self) -> int | None:
-        """The status with which the simulator ends; None if it does not."""
+        """Return the exit status of the simulator; None if it does not end."""
         try:
             return self._process.wait(_END_SECONDS)
         except subprocess.TimeoutExpired:
@@ -215,12 +216,12 @@ class Simulator:
 
 @dataclass(frozen=True)
 class Pace:
-    """How a `SimulatorTransport` runs its simulator.
+    """The way in which a `SimulatorTransport` runs its simulator.
 
-    `send` waits while the system has not taken `most_frames` of those before. The simulator rests when `rest_cycles`
-    had no beat; every `idle_seconds` it runs some more then, for accelerators that send without being asked (None: it
-    does not). It stands while what nobody has received yet holds `most_bytes`, as hardware does that is not read. When
-    it ends unasked, another one is started, up to `restarts` times.
+    `send` waits while the system has not yet taken `most_frames` earlier frames. The simulator rests after
+    `rest_cycles` without a beat. At rest it still runs a little every `idle_seconds`, for accelerators that send
+    spontaneously (None: it does not). It stops while unreceived bursts hold `most_bytes`, as hardware does that is not
+    read. If it ends unexpectedly, another one is started, up to `restarts` times.
     """
 
     most_frames: int = 2
@@ -231,7 +232,7 @@ class Pace:
 
 
 class SimulatorTransport:
-    """A transport to a simulator that a thread of its own runs."""
+    """A transport to a simulator, which a thread of the transport runs."""
 
     def __init__(
         self,
@@ -239,9 +240,9 @@ class SimulatorTransport:
         pace: Pace | None = None,
         observe: Callable[[Event], None] | None = None,
     ) -> None:
-        """`start` makes the simulator; `observe` is called in the thread with every event, and must not raise.
+        """`start` creates the simulator; the thread calls `observe`, which must not raise, with every event.
 
-        Raises `TransportError` if it cannot be started.
+        Raises `TransportError` if the simulator cannot be started.
         """
         self._start = start
         self._pace = pace or Pace()
@@ -249,7 +250,7 @@ class SimulatorTransport:
         self._observe = observe
         self._changed = threading.Condition()
         self._sent: deque[bytes] = deque()
-        self._frames = 0  # that the system has not taken, those in `_sent` among them
+        self._frames = 0  # not yet taken by the system, including those in `_sent`
         self._received: deque[Burst | TransportResetError] = deque()
         self._bytes = 0  # in `_received`
         self._error: TransportError | None = None
@@ -260,7 +261,7 @@ class SimulatorTransport:
         self._thread.start()
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; waits while the system takes none. Raises `TransportError`."""
+        """Send a whole frame; wait while the system is not ready. Raises `TransportError`."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_over or self._frames < self._pace.most_frames)
             if self._is_closed:
@@ -272,7 +273,7 @@ class SimulatorTransport:
             self._changed.notify_all()
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """The next burst, as `Transport.receive` has it; what came before an error is there before it."""
+        """Return the next burst, as `Transport.receive` does; bursts that arrived before an error come first."""
         with self._changed:
             self._changed.wait_for(lambda: self._received or self._is_over, timeout)
             if not self._received:
@@ -287,7 +288,7 @@ class SimulatorTransport:
             return item
 
     def is_at_rest(self) -> bool:
-        """Whether the system has taken all that was sent, and has had no beat since `rest_cycles`."""
+        """Return whether the system has taken all frames, and then had no beat for `rest_cycles`."""
         with self._changed:
             is_busy = self._frames or self._received
             return not is_busy and self._simulator.quiet >= self._pace.rest_cycles
@@ -310,7 +311,7 @@ class SimulatorTransport:
 
     @property
     def waiting_bytes(self) -> int:
-        """The bytes of the bursts that have come and that nobody has received."""
+        """The number of bytes in bursts that wait to be received."""
         return self._bytes
 
     @property
@@ -318,7 +319,7 @@ class SimulatorTransport:
         return self._is_closed or self._error is not None
 
     def _serve(self) -> None:
-        """The thread: run the simulator, and start another one when it ends and may be followed."""
+        """Run the simulator in the thread; start another one when it ends and a restart is left."""
         try:
             while not self._is_over:
                 try:
@@ -330,7 +331,7 @@ class SimulatorTransport:
             self._end(TransportError("the thread that runs the simulator has ended"))
 
     def _wait_for_work(self) -> list[bytes]:
-        """Sleep while there is nothing to do; the frames to be sent next."""
+        """Sleep while there is no work; return the next frames to send."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_over or self._bytes < self._pace.most_bytes)
             if self._simulator.quiet >= self._pace.rest_cycles:
@@ -354,7 +355,7 @@ class SimulatorTransport:
             self._changed.notify_all()
 
     def _adapt(self, cycles: int, seconds: float) -> None:
-        """Step about so far as the simulator gets in a while."""
+        """Adapt the cycles of a step to the simulator's speed."""
         if cycles == self._step and seconds < _STEP_SECONDS / 2:
             self._step = min(2 * self._step, _MOST_CYCLES)
         elif seconds > 2 * _STEP_SECONDS:
@@ -368,7 +369,7 @@ class SimulatorTransport:
             self._bytes += len(event.data)
 
     def _recover(self, error: TransportError) -> None:
-        """Begin anew, with the frames that the simulator was not given yet, or end."""
+        """Restart with the frames not yet given to the simulator, or end."""
         if self._is_closed or not self._restarts:
             self._end(error)
             return
@@ -387,7 +388,7 @@ class SimulatorTransport:
             self._changed.notify_all()
 
     def _end(self, error: TransportError) -> None:
-        """Only the first error counts."""
+        """End the transport with an error; only the first error counts."""
         with self._changed:
             self._error = self._error or error
             self._changed.notify_all()

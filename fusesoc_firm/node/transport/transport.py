@@ -1,10 +1,10 @@
 """The one interface to the hardware: frames to it, bursts from it.
 
     with transport:
-        transport.send(pack_frame(0, payload))          # waits while the hardware takes no more
-        burst = transport.receive(timeout=1.0)          # None if none came in time
+        transport.send(pack_frame(0, payload))          # waits while the hardware is not ready
+        burst = transport.receive(timeout=1.0)          # None if none arrived in time
 
-A simulator's pipe, a UART and AXI DMA all are one. The same in C++ is `firm/transport.hpp` in the folder `cpp` above.
+A simulator's pipe, a UART and AXI DMA implement it. `cpp/firm/transport.hpp` in the folder above is the same in C++.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from typing import Protocol
 
 
 class TransportError(Exception):
-    """The hardware, or the way to it, is gone or does what it must not; the transport is of no more use."""
+    """The hardware, or the path to it, has gone or violates the protocol; the transport is unusable."""
 
 
 class TransportResetError(TransportError):
-    """The hardware began anew, and the transport goes on: what was under way in either direction is lost."""
+    """The hardware was reset, and the transport continues: all data under way in either direction is lost."""
 
 
 @dataclass(frozen=True)
 class Burst:
-    """The bytes of the system's stream up to a `tlast`, those that `tkeep` marks: a frame, or a part of one.
+    """The bytes of the system's stream up to a `tlast` that `tkeep` marks as valid: a frame or a part of one.
 
-    `tid` is the stream's where the transport carries it. Simulated hardware says in which cycles of clk the first and
-    the last beat were taken.
+    `tid` is the stream's, if the transport carries it. For simulated hardware, the cycles of clk in which the first and
+    the last beat were taken are known.
     """
 
     data: bytes
@@ -37,25 +37,25 @@ class Burst:
 
 
 class Transport(Protocol):
-    """One thread may send while another one receives; closing ends both."""
+    """One thread may send while another receives; closing ends both."""
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; returns when the hardware, or a bounded buffer, has it. Raises `TransportError`."""
+        """Send a whole frame; return when the hardware, or a bounded buffer, has it. Raises `TransportError`."""
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """The next burst; None if none came in `timeout` seconds (None: wait for ever), or when it is closed.
+        """Return the next burst; None after `timeout` seconds (None: no limit), or when the transport is closed.
 
-        Raises `TransportError`, and of that `TransportResetError` where frames that have begun are to be forgotten.
+        Raises `TransportError`, in particular `TransportResetError` if incomplete frames must be dropped.
         """
 
     def is_at_rest(self) -> bool | None:
-        """Whether all that was sent has had its effect, and all of that was received; None where no one can know."""
+        """Return whether all frames sent have had their effect, and all responses were received; None if unknown."""
 
     def close(self) -> None:
-        """Stop; what has been sent may be lost. A second call does nothing."""
+        """Stop; sent frames may be lost. A second call does nothing."""
 
     def __enter__(self) -> Transport:
-        """The transport itself; it is open since it was made."""
+        """Return the transport, which has been open since its creation."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -1,12 +1,12 @@
-"""Hardware at a serial line (cores/board, robot:board:firm_link): frames as they are, 8 bits, no parity, 1 stop bit.
+"""Hardware at a serial line (cores/board, robot:board:firm_link): raw frames, 8 bits, no parity, 1 stop bit.
 
     with UartTransport("/dev/ttyUSB1") as transport:
         transport.send(pack_frame(0, payload))
-        burst = transport.receive(timeout=1.0)          # a whole frame, since a link carries no parts of them
+        burst = transport.receive(timeout=1.0)          # a whole frame, since a link carries no parts of frames
 
-A row of bytes has no marks. To the board a break is one: what follows begins a frame. From the board only silence is.
-The transport makes use of both when it is opened, and again when what comes cannot be a frame: a length that there is
-not, or a pause within it.
+A byte stream has no markers. The board takes a break as one: the next byte begins a frame. From the board, only silence
+is a marker. The transport uses both when it is opened, and again when received bytes cannot form a frame: an illegal
+length, or a pause in the middle of a frame.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.node.transport.transport import Burst, TransportError, TransportResetError
 
 DEFAULT_BAUD = 1_000_000
-"""The generic BAUD of the hardware unless a board sets it."""
+"""The default of the hardware's generic BAUD; a board may set another one."""
 
 _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 _CHUNK_BYTES = 65536
-# What parts one frame from the next after bytes were lost; an adapter at the USB keeps some for milliseconds.
+# The silence that separates frames after bytes were lost; a USB adapter holds bytes back for milliseconds.
 _SILENT_SECONDS = 0.05
-# The line of a board that is never silent for so long cannot be understood.
+# After this time without silence, the transport gives up on the board.
 _MOST_SILENCE_SECONDS = 2.0
-# Within a frame from the board.
+# In the middle of a frame from the board.
 _LONGEST_PAUSE_SECONDS = 0.2
 
 
@@ -40,9 +40,9 @@ class UartTransport:
     def __init__(
         self, device: str, baud: int = DEFAULT_BAUD, *, has_flow_control: bool = False, longest: int = 2**26
     ) -> None:
-        """Open `device`, with the wires RTS and CTS where it `has_flow_control`, else as fast as the line is.
+        """Open `device`, with flow control by RTS and CTS if it `has_flow_control`, else at the line's full rate.
 
-        No payload has more bytes than `longest`. Raises `TransportError`.
+        No payload has more than `longest` bytes. Raises `TransportError`.
         """
         self._device = device
         self._longest = longest
@@ -51,7 +51,7 @@ class UartTransport:
         self._sending = threading.Lock()
         self._writing = threading.Lock()
         self._cuts = 0
-        self._last_byte = 0.0  # when it came
+        self._last_byte = 0.0  # time of its arrival
         self._is_closed = False
         speed = getattr(termios, f"B{baud}", None)
         if not speed:
@@ -60,7 +60,7 @@ class UartTransport:
             self._line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as error:
             raise TransportError(f"cannot open the serial line {device}: {error.strerror}") from None
-        # Closing wakes who waits.
+        # Closing wakes waiting threads.
         self._wake, self._woken = os.pipe()
         try:
             _configure(self._line, speed, has_flow_control=has_flow_control)
@@ -70,9 +70,9 @@ class UartTransport:
             raise TransportError(f"{device} is no serial line: {error.args[-1]}") from None
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; waits while the line is busy or held. Raises `TransportError`.
+        """Send a whole frame; wait while the line is busy or held. Raises `TransportError`.
 
-        And `TransportResetError` if a break ends the frame.
+        Raises `TransportResetError` if a break ends the frame.
         """
         rest = memoryview(frame)
         with self._sending:
@@ -80,7 +80,7 @@ class UartTransport:
             while rest:
                 if self._is_closed:
                     raise TransportError("the transport is closed")
-                # A held line is looked at again, as a break may have come.
+                # Check a held line again, because a break may have come.
                 select.select([self._wake], [self._line], [], _LONGEST_PAUSE_SECONDS)
                 with self._writing:
                     if self._cuts != cuts:
@@ -88,12 +88,12 @@ class UartTransport:
                     rest = rest[self._write(rest) :]
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """The next frame as a burst. Raises `TransportError`, and `TransportResetError` where none can begin so."""
+        """Return the next frame as a burst. Raises `TransportError`, `TransportResetError` for illegal bytes."""
         with self._receiving:
             return self._receive(timeout)
 
     def is_at_rest(self) -> None:
-        """Nothing: who is at the other end of a line may work at something."""
+        """Return None: the hardware at the other end of a line may be working."""
 
     def close(self) -> None:
         """Stop. A second call does nothing."""
@@ -101,7 +101,7 @@ class UartTransport:
             return
         self._is_closed = True
         os.close(self._woken)
-        # No descriptor is closed, and another file given its number, while a thread still uses it.
+        # While a thread still uses a descriptor, do not close it: another file could get its number.
         with self._receiving, self._sending:
             os.close(self._line)
             os.close(self._wake)
@@ -131,7 +131,7 @@ class UartTransport:
         return None
 
     def _cut(self) -> None:
-        """Send a break, and forget what came before it and what was to go."""
+        """Send a break, and drop all bytes received before it and all that are waiting to be sent."""
         with self._writing:
             self._cuts += 1
             termios.tcflush(self._line, termios.TCOFLUSH)
@@ -153,7 +153,7 @@ class UartTransport:
         return self._line in select.select([self._line, self._wake], [], [], seconds)[0]
 
     def _next_frame(self) -> bytes | None:
-        """A frame that has come wholly; None while there is none."""
+        """Return a complete frame; None while there is none."""
         if len(self._begun) < _HEADER_BYTES:
             return None
         length = int.from_bytes(self._begun[ID_BYTES:_HEADER_BYTES], "little")
@@ -190,15 +190,15 @@ class UartTransport:
 
 
 def _configure(line: int, speed: int, *, has_flow_control: bool) -> None:
-    """Bytes as they are, at a speed."""
+    """Set a line to raw bytes at a speed."""
     control = termios.CS8 | termios.CREAD | termios.CLOCAL
     if has_flow_control:
         control |= termios.CRTSCTS
     special = termios.tcgetattr(line)[6]
-    # Of what comes, breaks are no bytes; nothing is echoed or waited for.
+    # Ignore received breaks; no echo, no waiting for lines.
     termios.tcsetattr(line, termios.TCSANOW, [termios.IGNBRK, 0, control, 0, speed, speed, special])
 
 
 def _least(*seconds: float | None) -> float | None:
-    """The shortest of some times, None being none."""
+    """Return the shortest of some times; None means no time."""
     return min((max(0.0, item) for item in seconds if item is not None), default=None)

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Turns an image in rgb8 into one in mono8: (77 R + 150 G + 29 B + 128) / 256, rounded down. These are the weights of
--- ITU-R BT.601 in 1/256, and their sum is 256: gray stays what it is, white is 255, and nothing needs a limit.
--- A beat of bytes is taken every cycle, though pixels lie across beats: up to two bytes are kept for the next one.
+-- Converts an image in rgb8 to mono8: (77 R + 150 G + 29 B + 128) / 256, rounded down. These are the weights of
+-- ITU-R BT.601 in 1/256. Their sum is 256, so gray is unchanged, white is 255, and no limiter is needed.
+-- A beat of bytes is taken every cycle, although pixels span beats: up to two bytes are kept for the next one.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

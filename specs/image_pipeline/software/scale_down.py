@@ -1,4 +1,4 @@
-"""The accelerator `scale_down` in software: what rtl/scale_down.vhd does to a message, with NumPy."""
+"""The accelerator `scale_down` in software: NumPy code equivalent to rtl/scale_down.vhd."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FRAME_ID_BYTES = 256
 
 
 def scale_down(message: Message) -> Message:
-    """The nearest pixels of an image in `mono8`; an empty one of what is none."""
+    """Return the nearest pixels of an image in `mono8`; any other message gives an empty image."""
     height, width, step = message["height"], message["width"], message["step"]
     data = np.frombuffer(message["data"], np.uint8)
     if message["encoding"] != "mono8" or data.size != height * step or not width <= step or max(height, width) > 65535:

@@ -1,13 +1,13 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- geometry_msgs/Twist to four motors with encoders, and the twist that is measured back: a skid-steer robot.
 --
--- Once a period of control the encoders' counts are taken, a command that waits is taken and becomes the speeds that
--- the wheels of each side should have, each wheel's controller finds its duty, and a command is answered with the
--- twist of the period that just ended. Without a command for TIMEOUT periods the robot stops. While an answer is not
--- taken, neither is a command.
+-- Once per control period, the encoders' counts and a waiting command are taken. The command becomes the speeds that
+-- the wheels of each side should have, each wheel's controller computes its duty, and the response is the
+-- twist of the period that just ended. Without a command for TIMEOUT periods, the robot stops. While a response is not
+-- taken, no command is taken either.
 --
--- A command waits for the end of a period, and the one behind it in the converter; so nothing is lost, and a host that
--- sends more often than that waits.
+-- A command waits for the end of a period, and the next one waits in the converter. Nothing is lost, and a host that
+-- sends more often is stalled.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -22,7 +22,7 @@ entity mobile_robot is
     -- Between the middles of the left and the right wheels; effective, as a skid-steer robot's wheels slip.
     TRACK_WIDTH_UM  : positive := 400_000;
     WHEEL_RADIUS_UM : positive := 100_000;
-    -- 512 lines, four edges each, behind a gear of 100: 33 counts a period at 1 m/s.
+    -- 512 lines, four edges each, with a gear of 100: 33 counts per period at 1 m/s.
     COUNTS_PER_TURN : positive := 204_800;
     -- Counts a period that a wheel is asked for at most: 1.23 m/s.
     SPEED_LIMIT     : positive := 40;

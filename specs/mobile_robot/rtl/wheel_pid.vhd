@@ -1,12 +1,12 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The speed of a wheel held by a PID controller: once a period, from the speed that it should have to the duty.
+-- A PID controller for the speed of a wheel: once per period, it computes the duty from the setpoint of the speed.
 --
 --   e = setpoint - speed,  duty = KP e + I + KD (speed before - speed),  I = I before + KI e
 --
--- The derivative is that of the speed, so a new setpoint gives no kick. The duty stays within LIMIT; where it would
--- not, and e would drive it further, I stays as it was, so it does not wind up. A wheel that should stand and does,
--- but for a count, is let go: no duty, and I begins at 0 again; else it would swing about an edge of its encoder for
--- ever. One multiplier serves the three products.
+-- The derivative is that of the speed, so a new setpoint gives no kick. The duty stays within LIMIT. If it would not,
+-- and e would drive it further, I is unchanged, which prevents wind-up. A wheel that should stand still, and does
+-- except for one count, is released: no duty, and I restarts at 0. Otherwise it would oscillate about an edge of its
+-- encoder. One multiplier serves the three products.
 
 library ieee;
 use ieee.std_logic_1164.all;

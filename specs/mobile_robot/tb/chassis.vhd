@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- What is at the robot's pins in the simulation of the whole system: four motors, no two quite alike, and glitches on
--- one encoder's lines, which its decoder must not see.
+-- The environment of the robot's pins in the simulation of the whole system: four slightly different motors, and
+-- glitches on one encoder's lines, which its decoder must ignore.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
--- The accelerator with four motors in a closed loop, a line of a file a period of control.
+-- The accelerator with four motors in a closed loop; each line of a file is a control period.
 --
--- A line of SCENARIO is V x z H: whether a command waits at the period's end, the command as binary digits, and which
--- shafts are held from the period's begin on, wheel 3 first. A line of RESULTS is V x z S E: whether the command was
--- answered soon after the period's end, the answer, the wheels that report a stall, and the encoders' errors. The
--- values are judged by who reads RESULTS. The last period's line is written when it is over.
+-- A line of SCENARIO is V x z H: whether a command waits at the end of the period, the command as binary digits, and
+-- the shafts that are held from the beginning of the period on, wheel 3 first. A line of RESULTS is V x z S E: whether
+-- the command was answered soon after the end of the period, the response, the wheels that report a stall, and the
+-- encoders' errors. The reader of RESULTS checks the values. The last period's line is written when it is over.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -1,11 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Sine and cosine of an angle: CORDIC in rotation mode, one rotation a cycle, no multiplier.
 --
--- The unit vector, shortened by what the rotations will lengthen it, is turned by atan(2**-i), i = 0, 1, ...,
--- towards the angle. Angles beyond a quarter turn are folded by half a turn first, which turns the vector's sign.
--- All is kept with a few bits more than the result has, so that cutting them off in every rotation leaves the
--- result within about a unit. An angle takes ITERATIONS cycles and one to load; the next one is loaded while the
--- result is taken.
+-- The unit vector is shortened by the factor by which the rotations lengthen it. It is turned by atan(2**-i), i = 0, 1,
+-- ..., towards the angle. Angles beyond a quarter turn are first folded by half a turn, which negates the vector.
+-- All numbers have a few bits more than the result, so that truncation in every rotation leaves the result accurate to
+-- about a unit. An angle takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -32,7 +31,7 @@ entity firm_cordic_sincos is
 
     out_valid : out std_logic;
     out_ready : in  std_logic;
-    -- Two's complement, from -1 to 1 and perhaps a unit more.
+    -- Two's complement, from -1 to 1, with an excess of at most about a unit.
     out_cos   : out std_logic_vector(FRACTION+1 downto 0);
     out_sin   : out std_logic_vector(FRACTION+1 downto 0)
   );
@@ -42,11 +41,11 @@ architecture rtl of firm_cordic_sincos is
 
   -- 58 rotations at most.
   constant COUNT_WIDTH : positive := 6;
-  -- What all rotations cut off together stays below these bits.
+  -- The truncation errors of all rotations together stay below these bits.
   constant GUARD       : positive := 6;
   constant INNER       : positive := FRACTION + GUARD;
 
-  -- Sign and one bit before the point: the vector is never longer than 1 and its rounding.
+  -- Sign and one bit before the point: the vector's length is at most 1 plus rounding errors.
   subtype number_t is signed(INNER+1 downto 0);
   subtype angle_t is signed(INNER+2 downto 0);
   type angles_t is array (natural range 0 to 2**COUNT_WIDTH-1) of angle_t;
@@ -55,7 +54,7 @@ architecture rtl of firm_cordic_sincos is
     variable result : angles_t := (others => (others => '0'));
   begin
     for i in result'range loop
-      -- Illegal generics are for the asserts below, not for a bound check in here.
+      -- Illegal generics must reach the asserts below, not fail a bound check here.
       if i < ITERATIONS and i <= FRACTION and INNER <= 64 then
         result(i) := signed("000" & arctangent(i, INNER));
       end if;
@@ -63,7 +62,7 @@ architecture rtl of firm_cordic_sincos is
     return result;
   end function all_angles;
 
-  -- Divided by 2**places, rounded down. In unsigned, as ghdl 2.0 translates a shift of a signed number to Verilog
+  -- Divided by 2**places, rounded down. Unsigned, because ghdl 2.0 translates a shift of a signed number to Verilog
   -- without its sign.
   function shifted(number : number_t; places : natural) return number_t is
     variable sign      : unsigned(number_t'range);
@@ -98,7 +97,7 @@ architecture rtl of firm_cordic_sincos is
 
   signal cos_r      : number_t;
   signal sin_r      : number_t;
-  -- What is left to turn by.
+  -- The remaining angle.
   signal angle_r    : angle_t;
 
 begin

@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- The angles of a CORDIC rotation, atan(2**-i) in rad, as unsigned numbers with 96 fraction bits.
 --
--- ieee.math_real has 53 bits, too few for a fraction of 60, and does not synthesise everywhere: so the
--- angles stand here as literals. Each is round(atan(2**-i) * 2**96), from the series
+-- ieee.math_real has 53 bits, too few for a fraction of 60, and does not synthesise everywhere. The angles are
+-- therefore literals. Each is round(atan(2**-i) * 2**96), from the series
 -- x - x**3/3 + x**5/5 - ... summed in exact fractions; i = 0 by Machin's 4*atan(1/5) - atan(1/239).
--- tests/applications/test_quat2euler.py computes them again. Beside them stands what undoes the gain of all rotations.
+-- tests/applications/test_quat2euler.py recomputes them. The inverse of the gain of all rotations is here, too.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -18,8 +18,8 @@ package firm_cordic_table is
   -- atan(2**-index) in rad, rounded to the nearest multiple of 2**-fraction; index <= fraction <= 64.
   function arctangent(index : natural; fraction : positive) return unsigned;
 
-  -- The product of 1/sqrt(1 + 4**-i) over all i, 0.60725, cut off behind `fraction` bits; fraction <= 80. Of n
-  -- rotations it is 4**-n too small at most, which is nothing beside the angle that they leave over.
+  -- The product of 1/sqrt(1 + 4**-i) over all i, 0.60725, truncated after `fraction` bits; fraction <= 80. For n
+  -- rotations it is too small by at most 4**-n, which is negligible against the remaining angle.
   function inverse_gain(fraction : positive) return unsigned;
 
 end package firm_cordic_table;

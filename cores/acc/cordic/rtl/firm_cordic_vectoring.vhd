@@ -1,10 +1,10 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Angle and length of the vector (x, y): CORDIC in vectoring mode, one rotation a cycle, no multiplier.
 --
--- The vector is folded into the quadrant x >= 0, y >= 0, so mirrored vectors give the same length to the
--- bit and mirrored angles, and is then turned towards the x axis by atan(2**-i), i = 0, 1, ...
+-- The vector is folded into the quadrant x >= 0, y >= 0, so that mirrored vectors give exactly the same length and
+-- mirrored angles. It is then turned towards the x axis by atan(2**-i), i = 0, 1, ...
 -- `scaled_r` holds y * 2**i: it needs no shifter and loses no bit, so small vectors keep their accuracy.
--- As soon as y is 0 the angle is exact and stays: multiples of pi/4 come out without any error, and
+-- As soon as y is 0, the angle is exact and no longer changes: multiples of pi/4 have no error, and
 -- (0, 0) has the angle 0. Otherwise the error is at most 2**-(ITERATIONS-1) rad.
 -- A vector takes ITERATIONS cycles and one to load; the next one is loaded while the result is taken.
 
@@ -44,7 +44,7 @@ end entity firm_cordic_vectoring;
 
 architecture rtl of firm_cordic_vectoring is
 
-  -- 64 rotations are all that the table has and all that an angle of 64 fraction bits can use.
+  -- The table has 64 rotations, and an angle of 64 fraction bits cannot use more.
   constant COUNT_WIDTH : positive := 6;
 
   subtype magnitude_t is signed(WIDTH-1 downto 0);
@@ -57,7 +57,7 @@ architecture rtl of firm_cordic_vectoring is
     variable result : angles_t := (others => (others => '0'));
   begin
     for i in result'range loop
-      -- Illegal generics are for the asserts below, not for a bound check in here.
+      -- Illegal generics must reach the asserts below, not fail a bound check here.
       if i < ITERATIONS and i <= FRACTION and FRACTION <= 64 then
         result(i) := signed("000" & arctangent(i, FRACTION));
       end if;
@@ -65,7 +65,7 @@ architecture rtl of firm_cordic_vectoring is
     return result;
   end function all_angles;
 
-  -- Not numeric_std's abs, which ghdl 2.0 leaves as it is when it translates to Verilog.
+  -- Replaces numeric_std's abs, which ghdl 2.0 leaves unchanged when it translates to Verilog.
   function absolute(number : std_logic_vector) return magnitude_t is
   begin
     if number(number'left) = '1' then
@@ -92,7 +92,7 @@ architecture rtl of firm_cordic_vectoring is
   signal angle_r     : angle_t;
   -- The folded vector is mirrored: its angle counts backwards.
   signal mirrored_r  : std_logic;
-  -- y was 0 once: the angle stays.
+  -- y has been 0, so the angle no longer changes.
   signal exact_r     : std_logic;
 
 begin
@@ -169,7 +169,7 @@ begin
         end if;
       elsif busy_r = '1' then
         below := scaled_r(WIDTH) = '1';
-        -- One's complement stands for |y|: at most one unit short, and it saves the carry.
+        -- The one's complement approximates |y|: it is at most one unit short, and saves the carry.
         distance := unsigned(scaled_r);
         if below then
           distance := not unsigned(scaled_r);

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Feeds firm_cordic_vectoring from a file and writes its results; both sides stall now and then.
 --
--- A line of VECTORS is x y, a line of RESULTS magnitude angle, as binary digits. The values are judged by
--- who reads RESULTS; that there is one a vector and that it does not change is judged here.
+-- A line of VECTORS is x y, a line of RESULTS is magnitude angle, as binary digits. The reader of RESULTS checks
+-- the values; the bench checks that each vector gives one stable result.
 
 library ieee;
 use ieee.std_logic_1164.all;

@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A two's complement fixed-point number of 64 bits to float64, rounded to nearest, ties to even.
+-- Converts a 64-bit two's complement fixed-point number to float64, rounded to nearest, ties to even.
 --
--- Three registers long, a number every cycle, never stalls: magnitude, coarse and fine normalisation. The
--- rounding adder drives the output, so that the user's own register ends its path. Zero is always +0.
+-- Three pipeline registers, one number per cycle, no stalls: magnitude, coarse and fine normalisation. The
+-- rounding adder drives the output, so the user's own register must end its path. Zero is always +0.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -71,7 +71,7 @@ begin
   begin
     if rising_edge(clk) then
       if in_valid = '1' then
-        -- Not numeric_std's abs, which ghdl 2.0 leaves as it is when it translates to Verilog.
+        -- Replaces numeric_std's abs, which ghdl 2.0 leaves unchanged when it translates to Verilog.
         magnitude_r <= unsigned(in_number);
         sign_r      <= in_number(63);
         if in_number(63) = '1' then
@@ -119,7 +119,7 @@ begin
       up := "1";
     end if;
     exponent := TOP_EXPONENT - resize(zeros_r, 11);
-    -- A mantissa that rounds up to two carries into the exponent, which is what it should do.
+    -- A mantissa that rounds up to two correctly carries into the exponent.
     rounded    := (exponent & fine_r(62 downto 11)) + up;
     out_number <= fine_sign_r & std_logic_vector(rounded);
     if fine_r(63) = '0' then

@@ -1,9 +1,9 @@
 -- SPDX-License-Identifier: Apache-2.0
--- COUNT float64 numbers to two's complement with one common exponent (block floating point).
+-- Converts COUNT float64 numbers to two's complement with one common exponent (block floating point).
 --
--- The numbers stand in a ring that turns past one comparator, which finds the largest exponent, and then
--- past one shifter, which aligns each number to it: 2*COUNT + 2 cycles from taking the numbers to offering
--- them. The largest number is exact, the others are rounded to the nearest unit, ties away from zero.
+-- The numbers are in a ring. It first turns past one comparator, which finds the largest exponent, and then past one
+-- shifter, which aligns each number to it: 2*COUNT + 2 cycles from input to output. The largest number is exact; the
+-- others are rounded to the nearest unit, ties away from zero.
 -- A denormal number beside a normal one has its exact value.
 
 library ieee;
@@ -22,15 +22,15 @@ entity firm_float64_to_block is
 
     in_valid      : in  std_logic;
     in_ready      : out std_logic;
-    -- Number 0 lies lowest.
+    -- Number 0 is in the lowest bits.
     in_numbers    : in  std_logic_vector(64*COUNT-1 downto 0);
 
     out_valid     : out std_logic;
     out_ready     : in  std_logic;
-    -- The value taken is number k times 2**(out_exponent - 1022).
+    -- The input value is number k times 2**(out_exponent - 1022).
     out_numbers   : out std_logic_vector((FRACTION+1)*COUNT-1 downto 0);
     out_exponent  : out std_logic_vector(10 downto 0);
-    -- A number is infinite or not a number: the numbers mean nothing.
+    -- A number is infinite or NaN: the results are meaningless.
     out_undefined : out std_logic;
     -- All numbers taken are zero or denormal: all results are zero.
     out_zero      : out std_logic

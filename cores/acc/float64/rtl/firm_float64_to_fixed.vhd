@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A float64 number to two's complement fixed point, rounded to nearest, ties away from zero.
+-- Converts a float64 number to two's complement fixed point, rounded to nearest, ties away from zero.
 --
--- Three registers long, a number every cycle, never stalls: distance, shifting, rounding. What does not fit is
--- the largest number of its sign, and says so; so a command beyond all limits stays one in its direction.
+-- Three pipeline registers, one number per cycle, no stalls: distance, shifting, rounding. A number out of range
+-- becomes the largest of its sign and sets a flag. A command beyond all limits therefore keeps its direction.
 
 library ieee;
 use ieee.std_logic_1164.all;
@@ -25,9 +25,9 @@ entity firm_float64_to_fixed is
     -- High three cycles after in_valid.
     out_valid     : out std_logic;
     out_number    : out std_logic_vector(WIDTH-1 downto 0);
-    -- The number lies outside: the result is the largest one, 2**(WIDTH-1) - 1 units, with its sign.
+    -- The number is out of range: the result is the largest one, 2**(WIDTH-1) - 1 units, with its sign.
     out_overflow  : out std_logic;
-    -- It is not a number: the result is 0.
+    -- The number is NaN: the result is 0.
     out_undefined : out std_logic
   );
 end entity firm_float64_to_fixed;
@@ -36,7 +36,7 @@ architecture rtl of firm_float64_to_fixed is
 
   constant MANTISSA_WIDTH : positive := 53;
   constant SHIFT_WIDTH    : positive := 7;
-  -- The exponent of a float64 whose leading one comes to lie in the highest bit of a magnitude, and the one above.
+  -- The exponent of a float64 whose leading one is aligned to the highest bit of a magnitude, and the one above.
   constant TOP_EXPONENT   : integer  := 1023 + WIDTH - 2 - FRACTION;
 
   subtype magnitude_t is unsigned(WIDTH-2 downto 0);

@@ -1,7 +1,7 @@
 -- SPDX-License-Identifier: Apache-2.0
--- All of an accelerator for sensor_msgs/Image but what it does with pixels: the message comes in and goes out, the
--- pixels come by as groups, and what is made of them goes back as bytes. Nothing of an image is stored; only the beats
--- in the window and in the packer wait, so pixels leave as long as pixels come.
+-- All parts of an accelerator for sensor_msgs/Image except the pixel processing: it takes and sends the message, gives
+-- the pixels as groups, and takes the results as bytes. No image is stored; only the beats in the window and in the
+-- packer wait, so pixels leave at the rate at which they arrive.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;
@@ -74,7 +74,7 @@ entity firm_image_frame is
     out_msg_valid                   : out std_logic;
     out_msg_ready                   : in  std_logic;
 
-    -- High while the pixels of an image go by: a reset, when low, for all that remembers pixels.
+    -- High while the pixels of an image pass: low is a reset for all state that depends on pixels.
     run : out std_logic;
 
     -- As at firm_image_rows.
@@ -87,8 +87,8 @@ entity firm_image_frame is
     group_valid : out std_logic;
     group_ready : in  std_logic;
 
-    -- What was made of the pixels, as at firm_axis_pack; `result_last` follows `group_end`, without bytes.
-    -- It may come with the image's last bytes, too, which do not wait for it then.
+    -- The processed pixels, as at firm_axis_pack; `result_last` follows `group_end`, without bytes. It may also come
+    -- with the image's last bytes, which then do not wait for it.
     result_data  : in  std_logic_vector(WIDTH-1 downto 0);
     result_count : in  std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     result_last  : in  std_logic;
@@ -233,7 +233,7 @@ begin
   out_data_axis_tlast  <= packed_last;
   run                  <= running;
 
-  -- Without a pixel nothing is packed.
+  -- Without a pixel, nothing is packed.
   note_end : process (clk)
   begin
     if rising_edge(clk) then

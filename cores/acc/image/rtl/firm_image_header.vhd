@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
--- What an accelerator for images does with a sensor_msgs/Image but its pixels: takes all that stands before them,
--- finds out whether it can work on them, and announces the image that comes out. The lengths of that one must be known
--- with its first segment, and they follow from fields behind frame_id; so frame_id waits in a FIFO, of fixed size as
--- nothing may depend on a bound that nobody keeps. All products are made bit by bit, 35 cycles an image.
+-- Handles a sensor_msgs/Image except its pixels: it takes all fields before the pixels, checks whether the accelerator
+-- supports them, and announces the resulting image. The lengths of the result must be known with its first segment, but
+-- they depend on fields after frame_id. frame_id therefore waits in a FIFO, whose size is fixed because the message has
+-- no bound that could be relied on. All products are computed bit by bit, in 35 cycles per image.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -13,19 +13,19 @@ use firm.firm_message_pkg.all;
 entity firm_image_header is
   generic (
     WIDTH        : integer := 8;
-    -- The encoding that is taken and the one that is given, each with the bytes of a pixel.
+    -- The encodings of input and output, each with the bytes of a pixel.
     IN_ENCODING  : string  := "mono8";
     OUT_ENCODING : string  := "mono8";
     IN_BYTES     : integer := 1;
     OUT_BYTES    : integer := 1;
-    -- Of so many columns (rows) in so many come out, and a part of them counts as whole.
+    -- OUT columns (rows) result from IN columns (rows); a remainder counts as a whole group.
     COLUMNS_IN  : integer := 1;
     COLUMNS_OUT : integer := 1;
     ROWS_IN     : integer := 1;
     ROWS_OUT    : integer := 1;
     -- The widest image; 65535/OUT_BYTES at most.
     MAX_COLUMNS : integer := 65535;
-    -- A longer frame_id is cut.
+    -- A longer frame_id is truncated.
     FRAME_ID_BYTES : integer := 256
   );
   port (
@@ -71,14 +71,14 @@ entity firm_image_header is
     out_msg_valid                   : out std_logic;
     out_msg_ready                   : in  std_logic;
 
-    -- The pixels are worked on: low between images, and all that is known of them holds while it is high.
+    -- The pixels are processed: low between images; all values below are valid while it is high.
     run       : out std_logic;
-    is_empty  : out std_logic;                      -- there is no byte of data, nor any beat
-    has_none  : out std_logic;                      -- none comes out
+    is_empty  : out std_logic;                      -- there is no byte of data, and no beat
+    has_none  : out std_logic;                      -- the result has no pixels
     row_bytes : out std_logic_vector(17 downto 0);
-    padding   : out std_logic_vector(31 downto 0);  -- bytes behind each row
-    rows      : out std_logic_vector(15 downto 0);  -- none where all data is to be dropped
-    -- The beats of the pixels may be shown; they have all been taken.
+    padding   : out std_logic_vector(31 downto 0);  -- bytes after each row
+    rows      : out std_logic_vector(15 downto 0);  -- zero if all data must be dropped
+    -- The resulting pixels may be offered; all of the header has been taken.
     show      : out std_logic;
     done      : in  std_logic
   );
@@ -89,7 +89,7 @@ architecture rtl of firm_image_header is
   constant LANES     : positive := max(1, WIDTH/8);
   constant SIZE_BITS : positive := 16;
 
-  -- Beats of a text, a letter of it, and a beat; behind its end there are zeros.
+  -- The number of beats of a text, a letter of it, and a beat; zeros follow its end.
   function beats_of(text : string) return positive is
   begin
     return (text'length + LANES - 1) / LANES;
@@ -118,7 +118,7 @@ architecture rtl of firm_image_header is
   constant FRAME_ID_BEATS : positive := max(2, FRAME_ID_BYTES/LANES);
 
   -- FRAME_ID to SIZES take the message's parts, MULTIPLY and ROUND_UP check its sizes and scale them, MULTIPLY_OUT
-  -- makes the length of what comes out, SEND lasts until the message is over.
+  -- computes the length of the result, SEND lasts until the message is over.
   type state_t is (IDLE, FRAME_ID, ENCODING, SIZES, MULTIPLY, ROUND_UP, MULTIPLY_OUT, SEND);
 
   -- One dimension of the image, times OUT/IN, from the highest bit on.
@@ -149,7 +149,7 @@ architecture rtl of firm_image_header is
     value.quotient  <= (value.quotient(SIZE_BITS-2 downto 0) & '0') + digit;
   end procedure scale;
 
-  -- A part counts as whole.
+  -- A remainder counts as a whole.
   function rounded_up(value : scaled_t) return unsigned is
   begin
     if value.remainder /= 0 then
@@ -160,7 +160,7 @@ architecture rtl of firm_image_header is
 
   signal state_r    : state_t;
   signal is_there   : std_logic;  -- a message that was not withdrawn
-  signal matches_r  : std_logic;  -- the encoding is the one that is taken
+  signal matches_r  : std_logic;  -- the encoding is the supported one
   signal beat_r     : natural range 0 to max(IN_BEATS, OUT_BEATS);
   signal bit_r      : natural range 0 to SIZE_BITS-1;
 
@@ -216,7 +216,7 @@ begin
   is_there   <= in_segment_valid(0);
   is_sending <= is_there when state_r = SEND else '0';
 
-  -- frame_id goes into the store, and on from there when all lengths are known.
+  -- frame_id enters the store, and leaves it when all lengths are known.
   store_rst_n    <= '0' when state_r = IDLE or rst_n = '0' else '1';
   frame_id_ready <= '1' when state_r = FRAME_ID and (store_ready = '1' or stored_r = FRAME_ID_BEATS) else '0';
   frame_id_taken <= frame_id_ready and in_header_frame_id_axis_tvalid;
@@ -382,7 +382,7 @@ begin
 
   encoding_last <= '1' when beat_r = OUT_BEATS-1 else '0';
 
-  -- Lane by lane: GHDL 2.0 writes constants of more than 32 bits into Verilog as a text.
+  -- Lane by lane, because GHDL 2.0 writes constants of more than 32 bits into Verilog as a text.
   show_encoding : for lane in 0 to LANES-1 generate
     show_lane : process (beat_r)
     begin

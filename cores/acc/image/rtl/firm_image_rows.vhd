@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Cuts the data of an image into its rows, and these into groups of pixels from lane 0 up. Padding is dropped, and so
--- is all that lies behind the last row. A group of full size comes every cycle, wherever rows begin in the stream.
+-- Cuts the data of an image into rows, and these into groups of pixels from lane 0 up. Padding and all bytes after the
+-- last row are dropped. A full group leaves every cycle, wherever rows begin in the stream.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -10,7 +10,7 @@ use firm.firm_axis_pkg.all;
 entity firm_image_rows is
   generic (
     WIDTH       : integer := 8;
-    -- The bytes of every group but the last of a row, WIDTH/8 at most.
+    -- The bytes of every group except the last of a row, at most WIDTH/8.
     GROUP_BYTES : integer := 1
   );
   port (
@@ -28,13 +28,13 @@ entity firm_image_rows is
     s_axis_tlast  : in  std_logic;
     s_axis_tready : out std_logic;
 
-    -- Lanes beyond `group_count` are anything.
+    -- Lanes from `group_count` on are undefined.
     group_data  : out std_logic_vector(WIDTH-1 downto 0);
     group_count : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     group_first : out std_logic;  -- of a row
     group_last  : out std_logic;  -- of a row
     group_final : out std_logic;  -- of the image: it is the last one with pixels
-    -- No group but the image's end: the stream is over. It comes once, and also if the stream is too short.
+    -- Marks the image's end, without a group: the stream is over. It comes once, even if the stream is too short.
     group_end   : out std_logic;
     group_valid : out std_logic;
     group_ready : in  std_logic
@@ -54,11 +54,11 @@ architecture rtl of firm_image_rows is
   signal take            : count_t;
 
   signal rows_r    : unsigned(15 downto 0) := (others => '0');  -- rows to come, this one included
-  signal bytes_r   : unsigned(17 downto 0) := (others => '0');  -- of the row; none while its padding is dropped
+  signal bytes_r   : unsigned(17 downto 0) := (others => '0');  -- of the row; zero while its padding is dropped
   signal padding_r : unsigned(31 downto 0) := (others => '0');  -- to be dropped
   signal first_r   : std_logic;
-  signal over_r    : std_logic;              -- the stream is
-  signal told_r    : std_logic;              -- and that was told
+  signal over_r    : std_logic;              -- the stream is over
+  signal told_r    : std_logic;              -- and the end was reported
 
   signal in_row    : std_logic;
   signal in_gap    : std_logic;
@@ -103,7 +103,7 @@ begin
 
   has_group <= '1' when rst_n = '1' and over_r = '0' and in_row = '1' and available >= wanted else '0';
 
-  -- A row without all its bytes gives no group: the frame is broken, and the image is about to be withdrawn.
+  -- An incomplete row gives no group: the frame is broken, and the image is about to be withdrawn.
   choose : process (in_row, in_gap, ends_gap, has_group, group_ready, wanted, available, is_last, padding_r, over_r)
   begin
     take       <= available;

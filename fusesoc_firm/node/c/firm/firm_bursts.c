@@ -8,7 +8,7 @@
 
 void firm_joiner_init(firm_joiner_t *joiner) { memset(joiner->filled, 0, sizeof joiner->filled); }
 
-/* A frame of which `size` bytes have come, all that there is room for in its buffer. */
+/* Judge a frame by the `size` bytes received so far, as many as its buffer holds at most. */
 static firm_status_t judged(const uint8_t *frame, size_t size) {
     uint32_t length;
     if (size < FIRM_HEADER_BYTES) {
@@ -41,7 +41,7 @@ firm_status_t firm_joiner_push(firm_joiner_t *joiner, const uint8_t *burst, size
     mine = joiner->frames[burst[0]];
     begun = joiner->filled[burst[0]];
     joiner->filled[burst[0]] = 0;
-    /* A resumed frame has a beat that was inserted; the bytes behind it stay in their lanes. */
+    /* A resumed frame begins with an inserted beat; the bytes after it stay in their lanes. */
     inserted = begun > 0 ? BEAT_BYTES : 0;
     if (begun > 0 && size <= inserted) {
         return FIRM_ONLY_ID;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, "Bursts"): what fusesoc_firm/node/bursts.py does,
- * with a buffer for each publisher. Both are tested with the same bursts. */
+/* Joins the bursts of a preemptive Manager to frames (docs/reference/manager.md, "Bursts"), as
+ * fusesoc_firm/node/bursts.py does, with a buffer for each publisher. Both are tested with the same bursts. */
 #ifndef FIRM_BURSTS_H
 #define FIRM_BURSTS_H
 
@@ -14,12 +14,13 @@ typedef struct {
 
 void firm_joiner_init(firm_joiner_t *joiner);
 
-/* Take a burst. FIRM_FRAME: `frame` of `frame_bytes` is whole, there until the next push of its id. `tid` is the
- * stream's, or negative where the transport has none. Behind an error, what was there of the frame is dropped. */
+/* Take a burst. After FIRM_FRAME, `frame` holds a whole frame of `frame_bytes` until the next push of its id. `tid` is
+ * the stream's, or negative if the transport has none. After an error, the part of the frame received so far is
+ * dropped. */
 firm_status_t firm_joiner_push(firm_joiner_t *joiner, const uint8_t *burst, size_t size, int tid, const uint8_t **frame,
                                size_t *frame_bytes);
 
-/* How many frames have begun and are not over; they are dropped. */
+/* Drop all incomplete frames and return their number. */
 unsigned firm_joiner_close(firm_joiner_t *joiner);
 
 #endif

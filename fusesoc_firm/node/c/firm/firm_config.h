@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The sizes of a node, which are known before it is compiled: its memory is static. A node defines its own by -D, or in a
- * header that is named by FIRM_CONFIG_HEADER. */
+/* The sizes of a node. Its memory is static, so they must be known when it is compiled. A node defines its own sizes
+ * with
+ * -D, or in a header whose name is in FIRM_CONFIG_HEADER. */
 #ifndef FIRM_CONFIG_H
 #define FIRM_CONFIG_H
 
@@ -24,7 +25,7 @@
 #define FIRM_QUEUE_DEPTH 4 /* frames, for each subscriber */
 #endif
 #ifndef FIRM_WRITERS
-#define FIRM_WRITERS 1 /* tasks that put payloads at the same time */
+#define FIRM_WRITERS 1 /* tasks that may put payloads at the same time */
 #endif
 #ifndef FIRM_DMA_BUFFERS
 #define FIRM_DMA_BUFFERS 4 /* in each direction */
@@ -33,7 +34,7 @@
 #define FIRM_DMA_BUFFER_BYTES 2048 /* a multiple of 64; a longer frame takes several */
 #endif
 
-/* A line that cannot be compiled says what is wrong. */
+/* An illegal size stops the compiler at a line that names the rule. */
 typedef char firm_width_is_8_to_512[(FIRM_WIDTH >= 8 && FIRM_WIDTH <= 512 && (FIRM_WIDTH & (FIRM_WIDTH - 1)) == 0) ? 1 : -1];
 typedef char firm_ids_are_one_byte[(FIRM_SUBSCRIBERS >= 1 && FIRM_SUBSCRIBERS <= 256 && FIRM_PUBLISHERS >= 1 &&
                                     FIRM_PUBLISHERS <= 256)

@@ -52,7 +52,7 @@ static uint32_t status_of(volatile firm_descriptor_t *descriptor) {
     return descriptor->status;
 }
 
-/* Whether bits of a register are, or become soon, 0. */
+/* Return whether bits of a register are 0, or become 0 soon. */
 static int is_cleared(uintptr_t address, uint32_t bits) {
     const uint32_t begun = firm_milliseconds();
     while ((firm_read(address) & bits) != 0) {
@@ -70,7 +70,7 @@ static void start(uintptr_t channel, volatile firm_descriptor_t *ring, uint32_t 
 }
 
 static void give_back(firm_dma_t *dma, unsigned index) {
-    /* Nothing of the buffer may come out of a cache over what the engine writes. */
+    /* Flush, so that no stale cache line is written back over the engine's data. */
     firm_cache_flush(dma->memory->from_buffers[index], FIRM_DMA_BUFFER_BYTES);
     hand_over(dma->base + S2MM, &dma->memory->from_system[index], FIRM_DMA_BUFFER_BYTES);
 }
@@ -80,7 +80,7 @@ firm_dma_status_t firm_dma_open(firm_dma_t *dma, uintptr_t base, firm_dma_memory
     memset(dma, 0, sizeof *dma);
     dma->base = base;
     dma->memory = memory;
-    /* A reset of one channel is of both. */
+    /* The reset of one channel resets both. */
     firm_write(base + MM2S + CONTROL, RESET);
     if (!is_cleared(base + MM2S + CONTROL, RESET)) {
         return FIRM_DMA_STUCK;

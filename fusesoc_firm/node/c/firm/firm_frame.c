@@ -41,7 +41,7 @@ void firm_decoder_init(firm_decoder_t *decoder, uint8_t *buffer, size_t room, un
 
 void firm_decoder_reset(firm_decoder_t *decoder) { decoder->filled = 0; }
 
-/* How many bytes are missing of the id, then of the header, then of the frame. */
+/* Return the number of missing bytes: first of the id, then of the header, then of the frame. */
 static size_t missing(const firm_decoder_t *decoder) {
     if (decoder->filled == 0) {
         return 1;

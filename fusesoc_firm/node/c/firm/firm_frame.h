@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Frames: id (1 byte), length of the payload (4, little-endian), payload. C99, no memory but the caller's. */
+/* Frames: id (1 byte), length of the payload (4 bytes, little-endian), payload. C99; all memory is the caller's. */
 #ifndef FIRM_FRAME_H
 #define FIRM_FRAME_H
 
@@ -8,29 +8,29 @@
 
 #define FIRM_HEADER_BYTES 5u
 
-/* What came of bytes. */
+/* The result of taking bytes. */
 typedef enum {
-    FIRM_MORE,         /* no frame is whole yet */
-    FIRM_FRAME,        /* one is */
-    FIRM_BAD_ID,       /* no such publisher */
-    FIRM_TOO_LONG,     /* the frame announces more than there is room for */
+    FIRM_MORE,         /* no complete frame yet */
+    FIRM_FRAME,        /* a complete frame */
+    FIRM_BAD_ID,       /* unknown publisher */
+    FIRM_TOO_LONG,     /* the frame announces more than its buffer can hold */
     FIRM_EMPTY,        /* a burst without bytes */
-    FIRM_BAD_TID,      /* the stream's tid is not the id */
-    FIRM_ONLY_ID,      /* a burst that resumes a frame with nothing */
-    FIRM_WITHIN_BEAT,  /* a burst that ends within a beat, and its frame is not over */
-    FIRM_LONGER        /* a frame is longer than it announces */
+    FIRM_BAD_TID,      /* the stream's tid differs from the id */
+    FIRM_ONLY_ID,      /* a burst that resumes a frame but adds nothing */
+    FIRM_WITHIN_BEAT,  /* a burst that ends in the middle of a beat although its frame is incomplete */
+    FIRM_LONGER        /* more bytes than the frame announces */
 } firm_status_t;
 
-/* The header of a frame. */
+/* Write the header of a frame. */
 void firm_frame_header(uint8_t header[FIRM_HEADER_BYTES], uint8_t id, uint32_t length);
 
-/* The length that a header announces. */
+/* Return the length that a header announces. */
 uint32_t firm_frame_length(const uint8_t header[FIRM_HEADER_BYTES]);
 
-/* A frame in `frame`: its bytes, or 0 if `room` is too small. */
+/* Write a frame to `frame`. Returns its number of bytes, or 0 if `room` is too small. */
 size_t firm_frame_encode(uint8_t *frame, size_t room, uint8_t id, const uint8_t *payload, size_t size);
 
-/* Finds frames in a row of bytes without marks. `buffer` holds the frame. */
+/* Finds frames in a byte stream without markers. `buffer` holds the current frame. */
 typedef struct {
     uint8_t *buffer;
     size_t room;
@@ -38,17 +38,18 @@ typedef struct {
     size_t filled;
 } firm_decoder_t;
 
-/* `room` is for a header at least. */
+/* Prepare a decoder; `room` must suffice for a header at least. */
 void firm_decoder_init(firm_decoder_t *decoder, uint8_t *buffer, size_t room, unsigned publishers);
 
-/* Take bytes until a frame is whole, or all of them; `taken` is how many. Behind FIRM_FRAME, `buffer` holds `filled`
- * bytes until the next push. Behind an error nobody knows where frames begin: all up to the next mark must be dropped. */
+/* Take bytes until a frame is complete or none are left; `taken` is their number. After FIRM_FRAME, `buffer` holds
+ * `filled` bytes until the next push. After an error, the beginnings of frames are unknown: drop all bytes up to the
+ * next marker. */
 firm_status_t firm_decoder_push(firm_decoder_t *decoder, const uint8_t *bytes, size_t size, size_t *taken);
 
-/* Whether a frame has begun and is not whole. */
+/* Return whether a frame has begun but is not complete. */
 int firm_decoder_has_begun(const firm_decoder_t *decoder);
 
-/* Forget the frame that has begun. */
+/* Drop the incomplete frame. */
 void firm_decoder_reset(firm_decoder_t *decoder);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the node needs of a platform: the folder `ports` has two, another one is a file with these functions and a header
- * firm_port_types.h, which defines firm_lock_t. */
+/* The node's interface to a platform. The folder `ports` has two platforms; another one is a file with these functions
+ * and a header firm_port_types.h that defines firm_lock_t. */
 #ifndef FIRM_PORT_H
 #define FIRM_PORT_H
 
@@ -9,23 +9,23 @@
 
 #include "firm_port_types.h"
 
-/* A register of a device. */
+/* Access to a register of a device. */
 uint32_t firm_read(uintptr_t address);
 void firm_write(uintptr_t address, uint32_t value);
 
-/* Memory that a device reads next, or has written: the caches' contents go there, or are forgotten. Then it is certain
- * that the device, or the processor, sees them. */
+/* For memory that a device reads next or has written: write the caches' contents back, or discard them. Afterwards the
+ * device, or the processor, is certain to see the data. */
 void firm_cache_flush(const volatile void *memory, size_t size);
 void firm_cache_invalidate(const volatile void *memory, size_t size);
 
-/* A device's address of memory. */
+/* Return the address of memory as a device sees it. */
 uint32_t firm_bus_address(const volatile void *memory);
 
-/* Short sections that no other task or interrupt enters. */
+/* Delimit short sections that no other task or interrupt may enter. */
 void firm_lock(firm_lock_t *lock);
 void firm_unlock(firm_lock_t *lock);
 
-/* A clock that wraps, and a wait of about a millisecond, in which others may run. */
+/* A clock that wraps, and a wait of about a millisecond in which other tasks may run. */
 uint32_t firm_milliseconds(void);
 void firm_pause(void);
 

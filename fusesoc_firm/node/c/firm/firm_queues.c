@@ -17,7 +17,7 @@ void firm_queues_init(firm_queues_t *queues) {
     }
 }
 
-/* The slot of a subscriber's first frame, which waits no more. */
+/* Remove a subscriber's first frame from its queue and return its slot. */
 static uint16_t pop(firm_queues_t *queues, unsigned subscriber) {
     const uint16_t slot = queues->waiting[subscriber][queues->first[subscriber]];
     queues->first[subscriber] = (queues->first[subscriber] + 1) % FIRM_QUEUE_DEPTH;
@@ -59,7 +59,7 @@ bool firm_queues_put(firm_queues_t *queues, unsigned subscriber, const uint8_t *
     return true;
 }
 
-/* The subscriber that was served the longest time ago of those with frames, of equal ones the lowest. */
+/* Find the least recently served subscriber with frames; among equals, the lowest index. */
 static bool find_next(const firm_queues_t *queues, unsigned *next) {
     bool is_found = false;
     unsigned subscriber;

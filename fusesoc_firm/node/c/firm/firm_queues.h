@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Frames to the hardware: a queue for each subscriber, and the least recently used one is next (the dissertation's section
- * 6.3.3; docs/reference/host-queues.md). What fusesoc_firm/node/queues.py does by default, in a static array.
+/* Frames to the hardware: a queue for each subscriber; the least recently used queue is served next (the dissertation's
+ * section 6.3.3; docs/reference/host-queues.md). fusesoc_firm/node/queues.py does this by default; here the memory is
+ * static.
  *
- * A payload is copied once, outside of the lock, into a slot that becomes the frame's until it has been sent. */
+ * A payload is copied once, outside the lock, into a slot that belongs to its frame until the frame is sent. */
 #ifndef FIRM_QUEUES_H
 #define FIRM_QUEUES_H
 
@@ -12,7 +13,7 @@
 #include "firm_frame.h"
 #include "firm_port.h"
 
-/* Beside those that wait, one for each frame that is being written, and one that is being sent. */
+/* Slots for all waiting frames, for each frame that is being written, and for the one that is being sent. */
 #define FIRM_SLOTS (FIRM_SUBSCRIBERS * FIRM_QUEUE_DEPTH + FIRM_WRITERS + 1)
 
 typedef struct {
@@ -31,7 +32,7 @@ typedef struct {
 
 typedef char firm_slots_have_16_bits[FIRM_SLOTS <= 65535 ? 1 : -1];
 
-/* A frame that is to be sent; its slot is given back by firm_queues_release. */
+/* A frame to send; firm_queues_release gives its slot back. */
 typedef struct {
     unsigned subscriber;
     const uint8_t *frame;
@@ -41,11 +42,11 @@ typedef struct {
 
 void firm_queues_init(firm_queues_t *queues);
 
-/* Add a payload; a queue that is full drops its oldest. False for a subscriber or a size that there is not, and if more
- * tasks write than FIRM_WRITERS. Not within an interrupt. */
+/* Add a payload; a full queue drops its oldest. Returns false for an unknown subscriber or an illegal size, and if more
+ * than FIRM_WRITERS tasks write. Do not call it in an interrupt. */
 bool firm_queues_put(firm_queues_t *queues, unsigned subscriber, const uint8_t *payload, size_t size);
 
-/* The frame that is next; false if there is none. One task. */
+/* Get the next frame; returns false if no frame waits. One task only. */
 bool firm_queues_get(firm_queues_t *queues, firm_next_t *next);
 void firm_queues_release(firm_queues_t *queues, const firm_next_t *next);
 

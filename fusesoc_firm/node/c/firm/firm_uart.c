@@ -22,7 +22,7 @@ static int has(const firm_uart_t *uart, uint32_t bit) { return (firm_read(uart->
 
 static uint32_t since(uint32_t time) { return firm_milliseconds() - time; }
 
-/* Behind what is being sent. */
+/* Send a break after the bytes that are being sent. */
 static void cut(firm_uart_t *uart) {
     const uint32_t control = CONTROL_RX_ENABLE | CONTROL_TX_ENABLE;
     uint32_t begun;
@@ -58,7 +58,7 @@ void firm_uart_send(firm_uart_t *uart, const uint8_t *frame, size_t size) {
     }
 }
 
-/* Nothing came: what that means. */
+/* Handle silence on the line. */
 static void be_silent(firm_uart_t *uart) {
     if (uart->is_dropping) {
         uart->is_dropping = since(uart->moved_at) < SILENCE_MS;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Registers and memory of a Zynq, with or without an operating system. With FIRM_XILINX_BSP, caches are those of AMD's
- * standalone BSP; without it the board's code has to switch them off for what a DMA engine shares. */
+/* Registers and memory of a Zynq, with or without an operating system. With FIRM_XILINX_BSP, AMD's standalone BSP
+ * maintains the caches. Otherwise the board's code must disable them for memory that it shares with a DMA engine. */
 #include "firm_port.h"
 
 #ifdef FIRM_XILINX_BSP
@@ -11,7 +11,7 @@ uint32_t firm_read(uintptr_t address) { return *(volatile uint32_t *)address; }
 
 void firm_write(uintptr_t address, uint32_t value) { *(volatile uint32_t *)address = value; }
 
-/* All that was written is there before what follows. */
+/* Complete all earlier writes before later accesses. */
 static void barrier(void) {
 #if defined(__aarch64__) || defined(__arm__)
     __asm__ volatile("dsb sy" ::: "memory");

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bursts from a preemptive Manager, joined to frames (docs/reference/manager.md, "Bursts").
+// Joins the bursts of a preemptive Manager to frames (docs/reference/manager.md, "Bursts").
 //
 //     firm::BurstJoiner joiner(4, 64);                     // publishers, bits of the stream
-//     if (auto frame = joiner.push(bytes, size)) {         // the bytes between two tlast, those that tkeep marks
+//     if (auto frame = joiner.push(bytes, size)) {         // the bytes between two tlast that tkeep marks as valid
 //       deliver(frame->id, frame->payload);
 //     }
 //     joiner.close();
 //
-// Frames that nobody interrupted are bursts as well, so it serves a Manager without preemption, too. It does what
-// fusesoc_firm/node/bursts.py does, with the same messages; both are tested with the same bursts. C++17, no dependencies.
+// An uninterrupted frame is one burst, so the class also serves a Manager without preemption. It does the same as
+// fusesoc_firm/node/bursts.py, with the same messages; both are tested with the same bursts. C++17, no dependencies.
 #pragma once
 
 #include <cstddef>
@@ -23,23 +23,23 @@
 
 namespace firm {
 
-// A burst that no Manager sends. What was there of the frame it belongs to is dropped.
+// A burst that no Manager sends. The part of its frame received so far is dropped.
 class BurstError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// A whole frame: the publisher it came from and its payload.
+// A complete frame: the id of its publisher and its payload.
 struct JoinedFrame {
   std::uint8_t id;
   std::vector<std::uint8_t> payload;
 };
 
-// Joins bursts by id until the length that a frame announces is reached; one for each stream.
+// Joins bursts by id until a frame has the length that its header announces; each stream needs its own joiner.
 class BurstJoiner {
  public:
-  // `publishers` of the Manager (1 to 256), `width` of the stream in bits, the `longest` payload in bytes: a frame that
-  // announces more is refused when its header is there, before it takes the memory. Throws std::invalid_argument.
+  // For a Manager with `publishers` (1 to 256) and a stream of `width` bits. A frame that announces a payload of more
+  // than `longest` bytes is rejected when its header is complete, before it takes memory. Throws std::invalid_argument.
   BurstJoiner(unsigned publishers, unsigned width,
               std::size_t longest = std::numeric_limits<std::size_t>::max())
       : publishers_(publishers), beat_bytes_(width / 8), longest_(longest) {
@@ -51,8 +51,8 @@ class BurstJoiner {
     }
   }
 
-  // Take a burst; the frame that it completes, if it does. `tid` is the stream's, where the transport has one; it must
-  // repeat the id. Throws BurstError.
+  // Take a burst and return the frame that it completes, if any. `tid` is the stream's `tid`, if the transport has one;
+  // it must equal the id. Throws BurstError.
   std::optional<JoinedFrame> push(const std::uint8_t* burst, std::size_t size,
                                   std::optional<std::uint8_t> tid = std::nullopt) {
     const std::uint8_t id = checked_id(burst, size, tid);
@@ -63,7 +63,7 @@ class BurstJoiner {
       if (size <= beat_bytes_) {
         throw BurstError("the burst that resumes the frame of id " + std::to_string(id) + " holds nothing but the id");
       }
-      // Only these bytes were inserted; they are a beat, so that those behind it stay in their lanes.
+      // Only these bytes were inserted. They fill a beat, so that the bytes after them stay in their lanes.
       frame.insert(frame.end(), burst + beat_bytes_, burst + size);
     } else {
       frame.assign(burst, burst + size);
@@ -85,14 +85,14 @@ class BurstJoiner {
     return push(burst.data(), burst.size(), tid);
   }
 
-  // The ids of which a frame has begun and is not over, in ascending order.
+  // The ids of incomplete frames in ascending order.
   std::vector<std::uint8_t> unfinished() const {
     std::vector<std::uint8_t> ids;
     for (const auto& begun : begun_) ids.push_back(begun.first);
     return ids;
   }
 
-  // Say that the stream is over. Throws BurstError if a frame is not.
+  // End the stream. Throws BurstError if a frame is incomplete.
   void close() {
     std::string parts;
     for (const auto& [id, frame] : begun_) {
@@ -104,7 +104,7 @@ class BurstJoiner {
   }
 
  private:
-  static constexpr std::size_t kHeaderBytes = 5;  // id, and the length of the payload
+  static constexpr std::size_t kHeaderBytes = 5;  // the id and the length of the payload
 
   std::uint8_t checked_id(const std::uint8_t* burst, std::size_t size, std::optional<std::uint8_t> tid) const {
     if (size == 0) throw BurstError("the burst is empty");

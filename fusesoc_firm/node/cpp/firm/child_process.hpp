@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A command in a child process, with a pipe to it and one from it at the file descriptors that it expects.
+// A command in a child process, with a pipe to it and one from it, at the file descriptors that it expects.
 //
-// Writing to a child that has died must be an error and not SIGPIPE, which ends the whole node: pipes have no flag for
-// that, so the signal is held back in the thread that writes.
+// A write to a dead child must fail and not raise SIGPIPE, which would end the whole node. Pipes have no flag for this,
+// so the writing thread blocks the signal.
 #pragma once
 
 #include <fcntl.h>
@@ -28,7 +28,7 @@ extern "C" char** environ;
 
 namespace firm {
 
-// Keeps SIGPIPE from the thread for as long as it lives; write() gives EPIPE.
+// Blocks SIGPIPE in this thread during its lifetime; write() then fails with EPIPE.
 class SigpipeHeld {
  public:
   SigpipeHeld() {
@@ -37,7 +37,7 @@ class SigpipeHeld {
     ::pthread_sigmask(SIG_BLOCK, &sigpipe_, &before_);
   }
   ~SigpipeHeld() {
-    // One that waits was ours: it would be delivered now.
+    // A pending signal is this thread's own, and would be delivered when unblocked.
     const timespec at_once{};
     if (!sigismember(&before_, SIGPIPE)) {
       while (::sigtimedwait(&sigpipe_, nullptr, &at_once) == SIGPIPE) {
@@ -55,7 +55,7 @@ class SigpipeHeld {
 
 class ChildProcess {
  public:
-  // Run `command` by the shell, with what is written to it at descriptor `input` and what it writes at `output`. Throws
+  // Run `command` in the shell. The child reads descriptor `input` and writes descriptor `output`. Throws
   // TransportError.
   ChildProcess(const std::string& command, int input, int output) {
     auto [child_reads, we_write] = make_pipe();
@@ -69,7 +69,7 @@ class ChildProcess {
     }
     posix_spawn_file_actions_adddup2(&actions, child_reads.get(), input);
     posix_spawn_file_actions_adddup2(&actions, child_writes.get(), output);
-    // A group of its own: what the shell has started ends with it, and Ctrl-C is for us to handle.
+    // A process group of its own: the shell's children end with it, and this process handles Ctrl-C.
     posix_spawnattr_setpgroup(&attributes, 0);
     sigset_t none;
     sigemptyset(&none);
@@ -97,7 +97,7 @@ class ChildProcess {
     wait();
   }
 
-  // Write all; false if the child reads no more. The caller holds SIGPIPE.
+  // Write all bytes; false if the child no longer reads. The caller holds a SigpipeHeld.
   bool write(const std::uint8_t* bytes, std::size_t size) {
     while (size > 0) {
       const ssize_t written = ::write(to_child_.get(), bytes, size);
@@ -110,7 +110,7 @@ class ChildProcess {
     return true;
   }
 
-  // Read what is there, at least one byte; 0 at the end.
+  // Read the available bytes, at least one; 0 at the end.
   std::size_t read(std::uint8_t* bytes, std::size_t size) {
     for (;;) {
       const ssize_t found = ::read(from_child_.get(), bytes, size);
@@ -119,40 +119,40 @@ class ChildProcess {
     }
   }
 
-  // To wait for what it writes.
+  // The descriptor to wait on for the child's output.
   int output() const { return from_child_.get(); }
 
-  // What it reads is over.
+  // Close the child's input.
   void end_input() { to_child_.reset(); }
 
-  // End it and all that it has started; any thread.
+  // Kill the child and all processes that it has started; any thread.
   void kill() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!has_ended_) ::kill(-pid_, SIGKILL);
   }
 
-  // Wait until it has ended: how it did, such as "ended with status 3". One thread only.
+  // Wait for the end of the child and describe it, such as "ended with status 3". One thread only.
   std::string wait() {
     siginfo_t information;
-    // It stays a zombie until nobody can kill it any more: its number may be another process' then.
+    // The child stays a zombie as long as kill() may be called, because its number could be given to another process.
     while (!has_ended_ && ::waitid(P_PID, static_cast<id_t>(pid_), &information, WEXITED | WNOWAIT) < 0 &&
            errno == EINTR) {
     }
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!has_ended_) {
-      ::kill(-pid_, SIGKILL);  // what it has left behind
+      ::kill(-pid_, SIGKILL);  // processes that it left running
       ::waitpid(pid_, &status_, 0);
       has_ended_ = true;
     }
     if (WIFSIGNALED(status_)) return "was ended by signal " + std::to_string(WTERMSIG(status_));
-    // The shell's way to say that what it had started was ended by a signal.
+    // By convention, the shell adds this to the number of the signal that ended its command.
     constexpr int kSignals = 128;
     const int status = WEXITSTATUS(status_);
     const std::string signal = status > kSignals ? " (signal " + std::to_string(status - kSignals) + ")" : "";
     return "ended with status " + std::to_string(status) + signal;
   }
 
-  // The same, but after `patience` the child is killed.
+  // Do the same, but kill the child after `patience`.
   std::string wait(std::chrono::nanoseconds patience) {
     const auto end = std::chrono::steady_clock::now() + patience;
     siginfo_t information{};
@@ -169,7 +169,7 @@ class ChildProcess {
   }
 
  private:
-  // Numbers above those that a child expects, so that no dup2 closes what another one needs; closed on exec.
+  // Use numbers above those that the child expects, so that no dup2 closes another's descriptor; closed on exec.
   static Descriptor above(const Descriptor& low) {
     constexpr int kLowest = 10;
     const int high = ::fcntl(low.get(), F_DUPFD_CLOEXEC, kLowest);
@@ -186,7 +186,7 @@ class ChildProcess {
 
   pid_t pid_ = 0;
   int status_ = 0;
-  std::mutex mutex_;  // of what follows
+  std::mutex mutex_;  // protects the members below
   bool has_ended_ = false;
   Descriptor to_child_;
   Descriptor from_child_;

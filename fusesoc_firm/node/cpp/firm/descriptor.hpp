@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// File descriptors that close themselves, and waiting for one that another thread can end.
+// File descriptors that close themselves, and a wait for a descriptor that another thread can end.
 #pragma once
 
 #include <poll.h>
@@ -19,7 +19,7 @@
 
 namespace firm {
 
-// An open file descriptor; negative is none.
+// An owned file descriptor; a negative number means none.
 class Descriptor {
  public:
   explicit Descriptor(int number = -1) : number_(number) {}
@@ -42,7 +42,7 @@ class Descriptor {
   throw TransportError(what + ": " + std::strerror(errno));
 }
 
-// When a time that has been given is over.
+// The end of a given time span.
 class Deadline {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -55,7 +55,7 @@ class Deadline {
     if (timeout) end_ = std::chrono::steady_clock::now() + *timeout;
   }
   bool is_over() const { return end_ && std::chrono::steady_clock::now() >= *end_; }
-  // What is left, in milliseconds as poll() has them: rounded up, negative for ever.
+  // The remaining time in milliseconds, as poll() expects it: rounded up, negative for no limit.
   int milliseconds() const {
     if (!end_) return -1;
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(*end_ - std::chrono::steady_clock::now()).count();
@@ -70,14 +70,14 @@ class Deadline {
   std::optional<Time> end_;
 };
 
-// Waits for a descriptor until a time, or until a thread says that nobody shall wait any more.
+// Waits for a descriptor until a deadline, or until a thread ends all waiting.
 class Waiter {
  public:
   Waiter() : event_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     if (event_.get() < 0) fail_with_errno("eventfd");
   }
 
-  // Whether `descriptor` is ready for `events` of poll(), or broken; false when the time is over, or after end().
+  // Return whether `descriptor` is ready for `events` of poll(), or broken; false at the deadline or after end().
   bool wait(int descriptor, short events, const Deadline& deadline) const {
     pollfd both[] = {{descriptor, events, 0}, {event_.get(), POLLIN, 0}};
     for (;;) {
@@ -89,10 +89,10 @@ class Waiter {
     }
   }
 
-  // Nobody waits any more; any thread.
+  // End all current and later waits; any thread.
   void end() {
     const std::uint64_t one = 1;
-    // It fails only if it has been done before.
+    // It fails only if it has been called before.
     if (::write(event_.get(), &one, sizeof one) < 0) return;
   }
 

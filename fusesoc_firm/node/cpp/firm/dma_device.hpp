@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a driver in user space needs of AXI DMA under Linux: its registers and its interrupt by UIO, and memory that
-// processor and engine share by u-dma-buf (https://github.com/ikwzm/udmabuf). Which device tree this needs is in
-// docs/reference/node-library.md.
+// AXI DMA for a driver in user space under Linux: registers and interrupt through UIO, and memory shared by processor
+// and engine through u-dma-buf (https://github.com/ikwzm/udmabuf). docs/reference/node-library.md describes the device
+// tree that this needs.
 #pragma once
 
 #include <fcntl.h>
@@ -20,22 +20,22 @@
 
 namespace firm {
 
-// The engine as its driver sees it; a test may have one of its own.
+// The engine as its driver sees it; a test may provide its own.
 class DmaDevice {
  public:
   virtual ~DmaDevice() = default;
   virtual std::uint32_t read(std::size_t offset) = 0;
   virtual void write(std::size_t offset, std::uint32_t value) = 0;
-  // Memory that both see, not cached, and the address of its first byte for the engine.
+  // Uncached memory that processor and engine share, and the address of its first byte as the engine sees it.
   virtual std::uint8_t* memory() = 0;
   virtual std::size_t memory_bytes() const = 0;
   virtual std::uint32_t address() const = 0;
-  // Sleep until an interrupt of S2MM that has not been answered, until the time is over, or after end().
+  // Sleep until an unacknowledged interrupt of S2MM, until the deadline, or until end().
   virtual void wait(const Deadline& deadline) = 0;
   virtual void end() = 0;
 };
 
-// Memory of a device file.
+// A memory mapping of a device file.
 class Mapping {
  public:
   Mapping(const std::string& path, std::size_t size) : size_(size) {
@@ -58,7 +58,7 @@ class Mapping {
   void* place_ = nullptr;
 };
 
-// What devices tell by files of one line. Throws TransportError.
+// The number in a device's one-line file. Throws TransportError.
 inline std::uint64_t number_in(const std::string& path) {
   std::ifstream file(path);
   std::string text;
@@ -72,8 +72,8 @@ inline std::uint64_t number_in(const std::string& path) {
 
 class LinuxDmaDevice : public DmaDevice {
  public:
-  // `uio` such as /dev/uio0, whose first map are the registers; `buffer` such as udmabuf0. Without an interrupt it is
-  // looked at every 50 us. All paths begin with `root`. Throws TransportError.
+  // `uio` is a device such as /dev/uio0, whose first map holds the registers; `buffer` is a name such as udmabuf0.
+  // Without an interrupt, the registers are polled every 50 us. All paths begin with `root`. Throws TransportError.
   LinuxDmaDevice(const std::string& uio, const std::string& buffer, bool has_interrupt, const std::string& root = "")
       : registers_(root + uio, register_bytes(uio, root)),
         address_(checked_address(buffer, root)),
@@ -91,7 +91,7 @@ class LinuxDmaDevice : public DmaDevice {
       std::this_thread::sleep_for(std::chrono::microseconds(50));
       return;
     }
-    // The kernel has switched the interrupt off when it came.
+    // The kernel disables the interrupt when it occurs.
     const std::uint32_t on = 1;
     if (::write(registers_.file(), &on, sizeof on) != sizeof on) fail_with_errno("the interrupt");
     std::uint32_t count;
@@ -109,7 +109,7 @@ class LinuxDmaDevice : public DmaDevice {
     return static_cast<std::size_t>(number_in(root + "/sys/class/uio/" + name + "/maps/map0/size"));
   }
 
-  // Where u-dma-buf tells of a buffer; older releases call it otherwise.
+  // The folder in which u-dma-buf describes a buffer; older releases use another name.
   static std::string folder(const std::string& buffer, const std::string& root) {
     const std::string now = root + "/sys/class/u-dma-buf/" + buffer;
     return ::access(now.c_str(), F_OK) == 0 ? now : root + "/sys/class/udmabuf/" + buffer;
@@ -121,7 +121,7 @@ class LinuxDmaDevice : public DmaDevice {
     if (address + size > std::uint64_t{1} << 32) {
       throw TransportError(buffer + " ends beyond the 4 GiB that the DMA engine reaches");
     }
-    // Not cached, and not a device's memory either, which takes aligned accesses only.
+    // Neither cached nor mapped as device memory, which allows only aligned accesses.
     if (!(std::ofstream(about + "/sync_mode") << 2 << std::flush)) {
       throw TransportError(about + "/sync_mode cannot be written");
     }

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// AXI DMA between memory and the system's streams, as the block design of a board with a processor has it
-// (docs/how-to/build-for-a-board.md): scatter and gather, 26 bits of length, 32 of address, no realignment.
+// AXI DMA between memory and the system's streams, for the block design of a board with a processor
+// (docs/how-to/build-for-a-board.md): scatter and gather, 26 bits of length, 32 bits of address, no realignment.
 //
-// Each direction has a ring of descriptors with a buffer each. Frames are copied into the buffers that are free and
-// follow each other without a pause; a burst comes into the next buffers that are free, so several may come while the
-// processor is elsewhere. A frame or burst that is longer than a buffer goes on in the next one. Registers and descriptors:
-// PG021 (AXI DMA).
+// Each direction has a ring of descriptors with a buffer each. Frames are copied into free buffers and follow each
+// other without a pause. Bursts fill the next free buffers, so several may arrive while the processor is busy. A frame
+// or burst that is longer than a buffer continues in the next one. PG021 (AXI DMA) describes registers and descriptors.
 #pragma once
 
 #include <algorithm>
@@ -26,11 +25,11 @@ namespace firm {
 struct DmaOptions {
   std::size_t send_buffers = 16;
   std::size_t receive_buffers = 16;
-  std::size_t buffer_bytes = 0;  // a multiple of 64; 0: what the memory has room for
+  std::size_t buffer_bytes = 0;  // a multiple of 64; 0: as large as the memory allows
 };
 
-// All that was written to memory is there before the engine hears of it, and nothing is read before it has said so.
-// Memory and registers are different things to the processor, so a barrier between threads is not enough.
+// Completes all writes to memory before the engine is notified, and delays reads until it has reported.
+// The processor orders memory and registers separately, so a barrier between threads is not enough.
 inline void dma_barrier() {
 #if defined(__aarch64__) || defined(__arm__)
   __asm__ volatile("dsb sy" ::: "memory");
@@ -39,7 +38,7 @@ inline void dma_barrier() {
 #endif
 }
 
-// Registers of a channel, from its first one on, and their bits.
+// Offsets of the registers from the first register of a channel, and their bits.
 namespace dma {
 constexpr std::size_t kMm2s = 0x00, kS2mm = 0x30;
 constexpr std::size_t kControl = 0x00, kStatus = 0x04, kFirstDescriptor = 0x08, kLastDescriptor = 0x10;
@@ -47,12 +46,12 @@ constexpr std::uint32_t kRun = 1U << 0, kReset = 1U << 2, kInterruptOnComplete =
 constexpr std::uint32_t kOneFrameAnInterrupt = 1U << 16;
 constexpr std::uint32_t kHalted = 1U << 0, kHasScatterGather = 1U << 3, kInterrupts = 7U << 12;
 
-// Words of a descriptor, and their bits.
+// Words of a descriptor and their bits.
 constexpr std::size_t kDescriptorBytes = 64;
 constexpr std::size_t kNext = 0, kBuffer = 2, kDescriptorControl = 6, kDescriptorStatus = 7;
 constexpr std::uint32_t kLength = (1U << 26) - 1, kEndOfFrame = 1U << 26, kStartOfFrame = 1U << 27;
 constexpr std::uint32_t kComplete = 1U << 31;
-// A buffer begins at a multiple of what the widest stream has.
+// Each buffer begins at a multiple of the widest stream's beat.
 constexpr std::size_t kAlignment = 64;
 }  // namespace dma
 
@@ -75,7 +74,7 @@ class DmaRing {
     }
   }
 
-  // The engine may run; it waits for descriptors.
+  // Start the channel; it waits for descriptors.
   void start(std::uint32_t interrupts) {
     dma_barrier();
     device_.write(channel_ + dma::kFirstDescriptor, address_of(0));
@@ -85,7 +84,7 @@ class DmaRing {
   std::size_t buffer_bytes() const { return buffer_bytes_; }
   std::uint8_t* buffer(std::size_t index) { return device_.memory() + buffers_ + index * buffer_bytes_; }
 
-  // Hand a descriptor to the engine, with what it is to do.
+  // Hand a descriptor with its control word to the engine.
   void hand_over(std::size_t index, std::uint32_t control) {
     word(index, dma::kDescriptorControl) = control;
     word(index, dma::kDescriptorStatus) = 0;
@@ -93,7 +92,7 @@ class DmaRing {
     device_.write(channel_ + dma::kLastDescriptor, address_of(index));
   }
 
-  // What the engine says of a descriptor; nothing if it is not done.
+  // The engine's status of a descriptor; nothing while it is not done.
   std::optional<std::uint32_t> done(std::size_t index) {
     const std::uint32_t status = word(index, dma::kDescriptorStatus);
     if ((status & dma::kComplete) == 0) return std::nullopt;
@@ -169,14 +168,14 @@ class DmaTransport : public Transport {
       }
       check(dma::kS2mm, "S2MM");
       if (is_closed_ || deadline.is_over()) break;
-      // First the engine's interrupt is answered, then it is looked for what came before: so none is missed.
+      // Acknowledge the interrupt before looking at the descriptors, so that no completion is missed.
       device_->write(dma::kS2mm + dma::kStatus, dma::kInterrupts);
       if (!from_system_.done(receiving_)) device_->wait(deadline);
     }
     return std::nullopt;
   }
 
-  // The engine is stopped, so that it does not write to memory that is somebody else's.
+  // Stop the engine, so that it does not write to memory that has been released.
   void close() override {
     if (is_closed_.exchange(true)) return;
     device_->end();
@@ -199,13 +198,13 @@ class DmaTransport : public Transport {
     return DmaRing(*device_, channel, count, before * dma::kDescriptorBytes, descriptors + before * bytes, bytes);
   }
 
-  // A reset of one channel is of both. Whether it has ended.
+  // Reset both channels, which one reset does. Return whether the reset has finished.
   bool reset() {
     device_->write(dma::kMm2s + dma::kControl, dma::kReset);
     return is_cleared(dma::kMm2s + dma::kControl, dma::kReset);
   }
 
-  // Whether a bit of a register is, or becomes soon, 0.
+  // Return whether a bit of a register is 0, or becomes 0 soon.
   bool is_cleared(std::size_t offset, std::uint32_t bit) {
     const Deadline deadline(std::chrono::milliseconds(100));
     while ((device_->read(offset) & bit) != 0) {
@@ -223,7 +222,7 @@ class DmaTransport : public Transport {
         reclaiming_ = to_system_.next(reclaiming_);
         --handed_over_;
       } else {
-        // There is an interrupt, but the one of UIO is the receiver's.
+        // The only interrupt of UIO belongs to the receiver.
         std::this_thread::sleep_for(pause);
         pause = std::min(2 * pause, std::chrono::microseconds(500));
       }
@@ -232,7 +231,7 @@ class DmaTransport : public Transport {
     if (is_closed_) throw TransportError("the transport is closed");
   }
 
-  // Add what a buffer holds; whether the burst is over.
+  // Append the content of a buffer; return whether the burst is complete.
   bool take(std::uint32_t status) {
     const std::size_t size = status & dma::kLength;
     const std::size_t longest = options_.longest_payload + kFrameHeaderBytes + dma::kAlignment;
@@ -277,13 +276,13 @@ class DmaTransport : public Transport {
   const DmaOptions count_;
   std::atomic<bool> is_closed_{false};
 
-  // The sender's own.
+  // Used by the sender only.
   DmaRing to_system_;
   std::size_t sending_ = 0;
   std::size_t reclaiming_ = 0;
   std::size_t handed_over_ = 0;
 
-  // The receiver's own.
+  // Used by the receiver only.
   DmaRing from_system_;
   std::size_t receiving_ = 0;
   Burst burst_;

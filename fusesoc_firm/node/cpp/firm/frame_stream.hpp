@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A row of bytes without marks, as a UART or a process has it: frames end where their announced lengths say.
+// A byte stream without markers, as from a UART or a process: the announced lengths tell where frames end.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace firm {
 
-// Bytes that begin no frame: some were lost, or some were added.
+// Bytes that cannot begin a frame: some were lost or inserted.
 class FrameError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -21,10 +21,10 @@ class FrameError : public std::runtime_error {
 
 class FrameStream {
  public:
-  // Ids from `publishers` on and payloads longer than `longest` bytes are no frames.
+  // Ids from `publishers` on and payloads longer than `longest` bytes are illegal.
   FrameStream(unsigned publishers, std::size_t longest) : publishers_(publishers), longest_(longest) {}
 
-  // Take bytes until a frame is whole, or all of them: how many. Throws FrameError.
+  // Take bytes until a frame is complete or none are left; return their number. Throws FrameError.
   std::size_t push(const std::uint8_t* bytes, std::size_t size) {
     std::size_t taken = 0;
     while (taken < size && !is_whole()) {
@@ -39,13 +39,13 @@ class FrameStream {
   bool is_whole() const { return frame_.size() >= kFrameHeaderBytes && missing() == 0; }
   bool has_begun() const { return !frame_.empty(); }
 
-  // The frame that is whole; the next one may begin.
+  // Return the complete frame and begin the next one.
   Bytes pop() { return std::exchange(frame_, {}); }
 
  private:
-  // Of the header, and when that is there, of the frame.
+  // The number of missing bytes of the id, then of the header, then of the frame.
   std::size_t missing() const {
-    if (frame_.empty()) return kIdBytes;  // it is looked at before the length comes
+    if (frame_.empty()) return kIdBytes;  // it is checked before the length arrives
     if (frame_.size() < kFrameHeaderBytes) return kFrameHeaderBytes - frame_.size();
     return kFrameHeaderBytes + payload_length(frame_.data()) - frame_.size();
   }

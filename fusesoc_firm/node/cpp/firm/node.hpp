@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// A node's engine, whatever its middleware: payloads to the hardware, payloads from it (docs/reference/node-library.md).
+// A node's engine, independent of the middleware: payloads to and from the hardware (docs/reference/node-library.md).
 //
 //     firm::NodeConfiguration system;                       // its width, subscribers, publishers
 //     firm::Node node(system, "dma:/dev/uio0:udmabuf0", publish);   // called with publisher, payload, size
 //     std::thread engine([&] { status = node.run(); shut_the_middleware_down(); });
-//     node.put(subscriber, payload, size);                  // any thread, a middleware's callback
-//     node.stop(std::chrono::seconds(10));                  // what was put is sent, what comes back is published
+//     node.put(subscriber, payload, size);                  // any thread, such as a callback of the middleware
+//     node.stop(std::chrono::seconds(10));                  // send all queued payloads, publish the responses
 //     engine.join();
 //
-// Payloads are what the middleware has serialised; nothing here parses them. C++17, no dependencies but POSIX.
+// The middleware has serialised the payloads; nothing here parses them. C++17, no dependencies but POSIX.
 #pragma once
 
 #include <atomic>
@@ -41,31 +41,31 @@ struct NodeConfiguration {
   std::size_t longest_payload = 1 << 26;    // bytes, in either direction
   std::size_t queue_depth = 10;             // frames, for each subscriber
   Overflow overflow = Overflow::kDropOldest;
-  std::function<std::unique_ptr<Policy>()> policy = nullptr;  // none: least recently used
-  unsigned restarts = 0;                    // how often a transport that failed is opened again
+  std::function<std::unique_ptr<Policy>()> policy = nullptr;  // default: least recently used
+  unsigned restarts = 0;                    // how often a failed transport is reopened
   std::chrono::nanoseconds restart_delay = std::chrono::milliseconds(500);
-  // For so long nothing comes from hardware that does not tell when it is at rest: then all has come.
+  // If the hardware cannot report that it is at rest, it is considered at rest after this time without output.
   std::chrono::nanoseconds settling_time = std::chrono::milliseconds(200);
-  std::ostream* log = nullptr;    // one line for each fault
-  std::ostream* trace = nullptr;  // CSV, a line for each step of a message (firm/trace.hpp)
+  std::ostream* log = nullptr;    // one line per fault
+  std::ostream* trace = nullptr;  // CSV, one line per step of a message (firm/trace.hpp)
 };
 
 struct NodeStatistics {
-  std::uint64_t received = 0;   // payloads that were put
-  std::uint64_t dropped = 0;    // of these, for want of room in a queue
+  std::uint64_t received = 0;   // payloads passed to put()
+  std::uint64_t dropped = 0;    // those dropped because their queue was full
   std::uint64_t sent = 0;       // frames that the transport has taken
-  std::uint64_t published = 0;  // payloads that came back
-  std::uint64_t errors = 0;     // pulses of frame_error and id_error, bytes lost, bursts that are none
+  std::uint64_t published = 0;  // payloads received from the hardware
+  std::uint64_t errors = 0;     // pulses of frame_error and id_error, losses of bytes, illegal bursts
   std::uint64_t restarts = 0;   // of the transport
 };
 
 class Node {
  public:
-  // Called by a thread of the node; the payload is gone when it returns. It must not stop the node.
+  // Called by a thread of the node. The payload is valid during the call only. The function must not stop the node.
   using Publish = std::function<void(unsigned publisher, const std::uint8_t* payload, std::size_t size)>;
   using Open = std::function<std::unique_ptr<Transport>(const TransportOptions&)>;
 
-  // `open` makes the transport, when the node runs and when it restarts. Throws std::invalid_argument.
+  // `open` creates the transport at the start of run() and at each restart. Throws std::invalid_argument.
   Node(NodeConfiguration configuration, Open open, Publish publish)
       : configuration_(checked(std::move(configuration))),
         open_(std::move(open)),
@@ -74,16 +74,16 @@ class Node {
                 configuration_.policy ? configuration_.policy() : nullptr, configuration_.overflow),
         trace_(configuration_.trace) {}
 
-  // The transport by its address (firm/open_transport.hpp).
+  // Create the transport from its address (firm/open_transport.hpp).
   Node(NodeConfiguration configuration, const std::string& address, Publish publish)
       : Node(
             std::move(configuration),
             [address](const TransportOptions& options) { return open_transport(address, options); },
             std::move(publish)) {}
 
-  // Take a payload for a subscriber; it is copied once. Whether it is in its queue now: it is not if the queue is full
-  // and drops the newest, or when the node stops. Waits for room if the queues block. Any thread. Throws
-  // std::out_of_range for a subscriber that there is not, and std::length_error for a payload that is too long.
+  // Queue a payload for a subscriber; it is copied once. Return whether it is queued: it is not if the queue is full
+  // and drops the newest, or if the node stops. If the queues block, the call waits for room. Any thread. Throws
+  // std::out_of_range for an unknown subscriber, and std::length_error for a payload that is too long.
   bool put(unsigned subscriber, const std::uint8_t* payload, std::size_t size) {
     if (subscriber >= configuration_.subscribers) {
       throw std::out_of_range("subscriber is " + std::to_string(subscriber) + "; legal: 0 to " +
@@ -106,7 +106,8 @@ class Node {
     }
   }
 
-  // Run until stop(), or until the transport has failed for good. The status of a process: 0, or 1 with error(). Once.
+  // Run until stop(), or until the transport fails for good. Return a process's exit status: 0, or 1 with error(). Call
+  // once.
   int run() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -119,7 +120,7 @@ class Node {
       wait_before_restart();
       fault = session();
     }
-    // Nobody reads the queues any more: who waits for room in them must hear of it.
+    // Nothing reads the queues any more, so wake all threads that wait for room in them.
     queues_.close();
     const std::lock_guard<std::mutex> lock(mutex_);
     if (is_abandoned_) fault = "the time to stop is over, and not all was sent and received";
@@ -129,8 +130,8 @@ class Node {
     return fault ? 1 : 0;
   }
 
-  // Take no more payloads, send what waits, publish what comes back, and end. What is not done in the time given is
-  // abandoned, and run() says so. Returns when run() is about to. Any thread but that of `publish`.
+  // Take no more payloads, send the queued ones, publish the responses, and end. Work that is not done within `drain`
+  // is abandoned, and run() reports it. Returns when run() is about to return. Any thread except that of `publish`.
   void stop(std::chrono::nanoseconds drain = std::chrono::seconds(10)) {
     queues_.close();
     std::unique_lock<std::mutex> lock(mutex_);
@@ -155,7 +156,7 @@ class Node {
     return statistics;
   }
 
-  // Why run() gave 1.
+  // The reason why run() returned 1.
   std::string error() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return error_;
@@ -166,7 +167,7 @@ class Node {
     std::uint64_t number;
     Bytes frame;
   };
-  // How long the sender does not see that the receiver has failed.
+  // The longest time until the sender notices that the receiver has failed.
   static constexpr std::chrono::milliseconds kGlance{50};
 
   static NodeConfiguration checked(NodeConfiguration configuration) {
@@ -180,7 +181,7 @@ class Node {
 
   // --- a session: the life of one transport ---------------------------------------------------------------------------
 
-  // What went wrong; nothing if the node is done.
+  // Run one transport; return its fault, or nothing if the node is done.
   std::optional<std::string> session() {
     std::optional<std::string> fault;
     try {
@@ -197,7 +198,7 @@ class Node {
       receiver.join();
       const std::lock_guard<std::mutex> lock(mutex_);
       transport_ = nullptr;
-      // It saw the cause, the sender what followed.
+      // The receiver saw the cause, the sender only its effect.
       if (receiver_fault_) fault = receiver_fault_;
     } catch (const std::exception& error) {
       fault = error.what();
@@ -231,7 +232,7 @@ class Node {
     changed_.wait_for(lock, configuration_.restart_delay, [this] { return is_stopping_; });
   }
 
-  // Until the queues are closed and all is read. What could not be sent is the first thing that the next session sends.
+  // Send until the queues are closed and empty. The next session first sends the frame that could not be sent.
   void send_all(Transport& transport) {
     while (!has_receiver_failed()) {
       if (!unsent_) {
@@ -252,7 +253,7 @@ class Node {
     }
   }
 
-  // Wait until all that was sent has had its effect.
+  // Wait until everything that was sent has had its effect.
   void settle(const Transport& transport) {
     while (!has_receiver_failed() && !is_abandoned()) {
       const auto is_at_rest = transport.is_at_rest();
@@ -334,16 +335,16 @@ class Node {
   const Publish publish_;
   SubscriberQueues<Numbered> queues_;
   Trace trace_;
-  std::optional<Numbered> unsent_;  // the sender's own
+  std::optional<Numbered> unsent_;  // used by the sender only
 
   std::atomic<std::uint64_t> received_{0}, sent_{0}, published_{0}, errors_{0};
   std::atomic<unsigned> restarts_{0};
-  std::atomic<std::int64_t> moved_{0};  // when something was sent or came, ns
+  std::atomic<std::int64_t> moved_{0};  // time of the last frame sent or burst received, ns
 
   std::mutex log_mutex_;
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
-  Transport* transport_ = nullptr;  // while a session lasts
+  Transport* transport_ = nullptr;  // only during a session
   std::optional<std::string> receiver_fault_;
   bool has_publishing_failed_ = false;
   bool has_begun_ = false;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A transport by its address, as it stands in a launch file or on a command line (docs/reference/transports.md):
+// Opens a transport by its address, as given in a launch file or on a command line (docs/reference/transports.md):
 //
 //     pipe:COMMAND                      a simulator
 //     uart:DEVICE:BAUD[:rtscts]         a serial link, with flow control by wires
@@ -20,11 +20,12 @@
 
 namespace firm {
 
-// An address in its parts; the names of devices may hold colons, so an option and the part before it come from the end.
+// The parts of an address. Device names may hold colons, so the option and the part before it are split off from the
+// end.
 struct TransportAddress {
   std::string kind;
-  std::string first;   // all that follows, of a command
-  std::string second;  // empty if there is none
+  std::string first;   // for a command, everything after the kind
+  std::string second;  // empty if missing
   bool has_option = false;
 
   // Throws TransportError.
@@ -64,7 +65,7 @@ struct TransportAddress {
   }
 };
 
-// Throws TransportError, also for an address that is none.
+// Open the transport at an address. Throws TransportError, also for an illegal address.
 inline std::unique_ptr<Transport> open_transport(const std::string& address, TransportOptions options = {}) {
   const auto parts = TransportAddress::of(address);
   if (parts.kind == "pipe") return std::make_unique<PipeTransport>(parts.first, std::move(options));

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// A simulator as hardware: a command that does what it is asked through a pipe (docs/reference/transports.md, "A simulator's pipe").
+// A simulator as hardware: a command that serves requests through a pipe (docs/reference/transports.md,
+// "A simulator's pipe").
 //
-// A thread of its own asks: it hands over the frames that wait, lets the simulator run, and takes its reports. It sleeps
-// when nothing has moved for a while, and when nobody takes the bursts that have come: that is the back-pressure.
+// A thread sends the requests: it hands over waiting frames, lets the simulator run, and takes its reports. It sleeps
+// when nothing has moved for a while. It also sleeps while received bursts are not taken, which gives back-pressure.
 #pragma once
 
 #include <algorithm>
@@ -22,18 +23,18 @@
 namespace firm {
 
 struct PipeOptions {
-  std::size_t frames_in_flight = 2;       // sent, and not yet taken by the system
-  std::size_t bytes_waiting = 1 << 24;    // of bursts that have come, and not yet been received
-  // A run takes so long by the wall clock: a frame that comes in the meantime waits for its end.
+  std::size_t frames_in_flight = 2;       // sent, but not yet taken by the system
+  std::size_t bytes_waiting = 1 << 24;    // of bursts that are waiting for receive()
+  // The duration of a run by the wall clock. A frame that arrives during a run waits for its end.
   std::chrono::nanoseconds run_time = std::chrono::milliseconds(1);
-  std::uint32_t cycles_to_rest = 100000;  // without a beat, after which the system is thought to have come to rest
-  Timeout idle_run = std::nullopt;        // how often a system at rest runs, for accelerators that send without being asked
-  std::chrono::nanoseconds patience = std::chrono::seconds(2);  // with a simulator that is to end
+  std::uint32_t cycles_to_rest = 100000;  // the system is considered at rest after so many cycles without a beat
+  Timeout idle_run = std::nullopt;        // how often a system at rest runs, for accelerators that send spontaneously
+  std::chrono::nanoseconds patience = std::chrono::seconds(2);  // longest wait for the simulator to end
 };
 
 class PipeTransport : public Transport {
  public:
-  // Starts `command`. Throws TransportError.
+  // Start `command`. Throws TransportError.
   explicit PipeTransport(const std::string& command, TransportOptions options = {}, PipeOptions pipe = {})
       : options_(std::move(options)), pipe_(pipe), child_(command, kRequests, kReports), buffer_(kBufferBytes) {
     thread_ = std::thread([this] { run(); });
@@ -54,7 +55,7 @@ class PipeTransport : public Transport {
     changed_.notify_all();
   }
 
-  // What had come before an error is received before the error is thrown.
+  // Bursts that arrived before an error are returned before the error is thrown.
   std::optional<Burst> receive(Timeout timeout = std::nullopt) override {
     std::unique_lock<std::mutex> lock(mutex_);
     const auto is_ready = [this] { return is_over_ || !bursts_.empty(); };
@@ -89,7 +90,7 @@ class PipeTransport : public Transport {
   }
 
  private:
-  // What the simulator expects.
+  // The file descriptors that the simulator expects.
   static constexpr int kRequests = 3;
   static constexpr int kReports = 4;
   static constexpr std::size_t kBufferBytes = 1 << 16;
@@ -130,7 +131,7 @@ class PipeTransport : public Transport {
     changed_.notify_all();
   }
 
-  // Sleep until the simulator is to run; false when the transport is closed.
+  // Sleep until the simulator should run; false when the transport is closed.
   bool wait_for_work() {
     std::unique_lock<std::mutex> lock(mutex_);
     changed_.wait(lock, [this] { return is_closing_ || bytes_waiting_ < pipe_.bytes_waiting; });
@@ -143,7 +144,7 @@ class PipeTransport : public Transport {
     return !is_closing_;
   }
 
-  // Hand over all frames, and let the simulator run; false if it reads no more.
+  // Hand over all frames and let the simulator run; false if it no longer reads.
   bool request() {
     std::deque<Bytes> frames;
     {
@@ -160,7 +161,7 @@ class PipeTransport : public Transport {
     return child_.write(run.data(), run.size());
   }
 
-  // The next run shall take as long as runs are to take, as far as the last one tells.
+  // Choose the number of cycles so that the next run takes the set time, judging by the last run.
   void adapt(std::uint64_t cycles, std::chrono::nanoseconds time) {
     constexpr double kFewest = 16, kMost = 1 << 20;
     if (cycles == 0 || time.count() <= 0) return;
@@ -175,7 +176,7 @@ class PipeTransport : public Transport {
     return bytes;
   }
 
-  // Take a report; whether more are to come.
+  // Take a report; return whether more follow.
   bool take_report() {
     const std::uint64_t place = place_;
     const auto letter = static_cast<std::uint8_t>(number(1));
@@ -217,7 +218,7 @@ class PipeTransport : public Transport {
     burst.tid = static_cast<std::uint8_t>(number(1));
     burst.cycles = cycles();
     const std::uint64_t size = number(4);
-    // A resumed burst has one beat more than is the frame's.
+    // A resumed burst has one beat more than its part of the frame.
     if (size == 0 || size > options_.longest_payload + kFrameHeaderBytes + kWidestBeat) {
       throw TransportError("the simulator reports a burst of " + std::to_string(size) + " bytes; legal: 1 to " +
                            std::to_string(options_.longest_payload + kFrameHeaderBytes + kWidestBeat));
@@ -245,7 +246,7 @@ class PipeTransport : public Transport {
     }
     cycle_ = cycle;
     const std::lock_guard<std::mutex> lock(mutex_);
-    // A frame that the system does not take for so long is no reason to go on.
+    // A frame that the system has not taken for so long does not keep the simulation running.
     is_at_rest_ = std::min(quiet, cycle - busy_) >= pipe_.cycles_to_rest && waiting_.empty();
     changed_.notify_all();
   }
@@ -267,7 +268,7 @@ class PipeTransport : public Transport {
     return value;
   }
 
-  // So many bytes of the reports.
+  // Read `size` bytes of the reports.
   void take(std::uint8_t* bytes, std::size_t size) {
     while (size > 0) {
       if (read_ == filled_) {
@@ -291,20 +292,20 @@ class PipeTransport : public Transport {
   const TransportOptions options_;
   const PipeOptions pipe_;
 
-  // The thread's own.
+  // Used by the thread only.
   ChildProcess child_;
   Bytes buffer_;
   std::size_t read_ = 0;
   std::size_t filled_ = 0;
-  std::uint64_t place_ = 0;  // bytes of reports so far
-  std::uint64_t cycle_ = 0;  // where the simulator stands
-  std::uint64_t busy_ = 0;   // where it stood when it got a frame last
+  std::uint64_t place_ = 0;  // number of report bytes so far
+  std::uint64_t cycle_ = 0;  // current cycle of the simulator
+  std::uint64_t busy_ = 0;   // cycle at which it last got a frame
   double cycles_a_run_ = 1000;
 
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // protects the members below
   std::condition_variable changed_;
   std::deque<Bytes> waiting_;
-  std::size_t requested_ = 0;  // frames that the simulator has and the system does not
+  std::size_t requested_ = 0;  // frames handed to the simulator, but not yet taken by the system
   std::deque<Burst> bursts_;
   std::size_t bytes_waiting_ = 0;
   bool is_at_rest_ = false;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames to the hardware: a queue for each subscriber, and a policy that says which is next (the dissertation's section
-// 6.3.3, figure 6.4b; docs/reference/host-queues.md).
+// Frames to the hardware: a queue for each subscriber, and a policy that chooses the next one (the dissertation's
+// section 6.3.3, figure 6.4b; docs/reference/host-queues.md).
 //
 //     firm::SubscriberQueues<Frame> queues(3, 10);         // subscribers, frames in each; least recently used
-//     queues.put(subscriber, frame);                       // any thread, a middleware's callback
+//     queues.put(subscriber, frame);                       // any thread, such as a callback of the middleware
 //     while (auto next = queues.get()) send(next->item);   // the thread that owns the DMA, until close()
 //
-// It does what fusesoc_firm/node/queues.py does; both are tested with the same histories. C++17, no dependencies.
+// It does the same as fusesoc_firm/node/queues.py; both are tested with the same histories. C++17, no dependencies.
 #pragma once
 
 #include <chrono>
@@ -25,13 +25,13 @@
 
 namespace firm {
 
-// Which subscriber goes next: the one whose first frame has the smallest key, of equal ones the lowest index.
+// Chooses the next subscriber: the one whose first frame has the smallest key; among equals, the lowest index.
 class Policy {
  public:
   virtual ~Policy() = default;
-  // The key of a subscriber whose first frame came at `arrival` (ns).
+  // The key of a subscriber whose first frame arrived at `arrival` (ns).
   virtual std::int64_t key(std::size_t subscriber, std::int64_t arrival) const = 0;
-  // A subscriber's frame was handed out.
+  // Called after a subscriber's frame is taken.
   virtual void served(std::size_t) {}
 };
 
@@ -43,7 +43,7 @@ class FixedPriority : public Policy {
   }
 };
 
-// The next index behind the one served last, cyclic; index 0 at first.
+// The next index after the one served last, cyclic; index 0 at first.
 class RoundRobin : public Policy {
  public:
   explicit RoundRobin(std::size_t subscribers) : subscribers_(subscribers) {}
@@ -57,8 +57,8 @@ class RoundRobin : public Policy {
   std::size_t first_ = 0;
 };
 
-// The one that was served the longest time ago (section 4.2.1); at first, the lowest index. A subscriber waits for at
-// most `subscribers` - 1 others.
+// The subscriber served least recently (section 4.2.1); at first, the lowest index. A subscriber waits for at most
+// `subscribers` - 1 others.
 class LeastRecentlyUsed : public Policy {
  public:
   explicit LeastRecentlyUsed(std::size_t subscribers) : served_at_(subscribers, -1) {}
@@ -70,7 +70,7 @@ class LeastRecentlyUsed : public Policy {
   std::int64_t now_ = 0;
 };
 
-// The one whose first frame has the earliest deadline: its arrival and the subscriber's relative deadline (ns).
+// The subscriber whose first frame has the earliest deadline: its arrival plus the subscriber's relative deadline (ns).
 class EarliestDeadlineFirst : public Policy {
  public:
   explicit EarliestDeadlineFirst(std::vector<std::int64_t> deadlines) : deadlines_(std::move(deadlines)) {}
@@ -82,8 +82,8 @@ class EarliestDeadlineFirst : public Policy {
   std::vector<std::int64_t> deadlines_;
 };
 
-// The one whose first frame has the least slack: the time until its deadline less the time of its transfer (ns). The key
-// is the latest time to start, which is the slack but for the present time, which is everybody's.
+// The subscriber whose first frame has the least slack: the time until its deadline minus its transfer time (ns). The
+// key is the latest time to start. It differs from the slack by the present time, which is the same for all.
 class LeastSlackTime : public Policy {
  public:
   LeastSlackTime(std::vector<std::int64_t> deadlines, const std::vector<std::int64_t>& transfer_times)
@@ -101,8 +101,8 @@ class LeastSlackTime : public Policy {
   std::vector<std::int64_t> latest_starts_;
 };
 
-// What put() does with a frame for a queue that is full: drop the queue's oldest as ROS' KEEP_LAST, drop the frame itself,
-// or wait until there is room.
+// The action of put() if a queue is full: drop the queue's oldest frame as ROS's KEEP_LAST does, drop the new frame, or
+// wait for room.
 enum class Overflow { kDropOldest, kDropNewest, kBlock };
 
 // The queues are closed.
@@ -116,7 +116,7 @@ inline std::int64_t steady_nanoseconds() {
       .count();
 }
 
-// Bounded queues, one a subscriber, read as one. Any number of threads may write and read.
+// Bounded queues, one per subscriber, read as one. Any number of threads may write and read.
 template <typename Item>
 class SubscriberQueues {
  public:
@@ -124,10 +124,10 @@ class SubscriberQueues {
     std::size_t subscriber;
     Item item;
   };
-  using Timeout = std::optional<std::chrono::nanoseconds>;  // none: for ever
+  using Timeout = std::optional<std::chrono::nanoseconds>;  // nothing: no limit
   using Clock = std::function<std::int64_t()>;              // ns
 
-  // `capacity` frames each; no policy is least recently used. Throws std::invalid_argument.
+  // Each queue holds `capacity` frames; without a policy, it is least recently used. Throws std::invalid_argument.
   SubscriberQueues(std::size_t subscribers, std::size_t capacity, std::unique_ptr<Policy> policy = nullptr,
                    Overflow overflow = Overflow::kDropOldest, Clock clock = steady_nanoseconds)
       : policy_(policy ? std::move(policy) : std::make_unique<LeastRecentlyUsed>(subscribers)),
@@ -142,8 +142,8 @@ class SubscriberQueues {
     }
   }
 
-  // Add an item; whether it is in its queue now. It is not if it was the newest one to drop, or if there was no room for
-  // the time given. Throws ClosedError, also while it waits, and std::out_of_range for a subscriber that there is not.
+  // Add an item; return whether it is queued. It is not if the full queue drops the newest, or if no room was found in
+  // time. Throws ClosedError, even during the wait, and std::out_of_range for an unknown subscriber.
   bool put(std::size_t subscriber, Item item, Timeout timeout = std::nullopt) {
     auto& queue = queues_.at(subscriber);
     std::unique_lock<std::mutex> lock(mutex_);
@@ -161,8 +161,8 @@ class SubscriberQueues {
     return true;
   }
 
-  // The subscriber that is next, and its first item. Nothing when the time is over, or when the queues are closed and all
-  // is read: is_drained() tells which.
+  // Return the next subscriber and its first item. Returns nothing on timeout, or when the queues are closed and empty;
+  // is_drained() distinguishes the two.
   std::optional<Next> get(Timeout timeout = std::nullopt) {
     std::unique_lock<std::mutex> lock(mutex_);
     wait_for(lock, timeout, [&] { return closed_ || first_waiting().has_value(); });
@@ -176,20 +176,20 @@ class SubscriberQueues {
     return next;
   }
 
-  // Take no more; what is there can still be read. Wakes everybody who waits.
+  // Take no more items; queued ones can still be read. Wakes all waiting threads.
   void close() {
     const std::lock_guard<std::mutex> lock(mutex_);
     closed_ = true;
     changed_.notify_all();
   }
 
-  // Whether the queues are closed and all is read.
+  // Return whether the queues are closed and empty.
   bool is_drained() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return closed_ && !first_waiting();
   }
 
-  // How many items of a subscriber were dropped.
+  // The number of dropped items of a subscriber.
   std::uint64_t dropped(std::size_t subscriber) const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return dropped_.at(subscriber);

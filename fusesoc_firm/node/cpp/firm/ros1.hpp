@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// ROS 1 as a carrier of bytes: roscpp without the classes of any message, so that a node needs no message package where it
-// is compiled, and no message is parsed on its way.
+// ROS 1 as a carrier of bytes: roscpp without message classes. A node therefore needs no message packages to compile,
+// and messages are never parsed.
 //
-//     firm::Ros1 ros(argc, argv, "quat2euler");                     // takes ROS' own arguments out of argv
+//     firm::Ros1 ros(argc, argv, "quat2euler");                     // removes ROS's own arguments from argv
 //     ros.subscribe(topic, 10, [](const std::uint8_t* data, std::size_t size) { ... });
 //     firm::MessageHandler publish = ros.advertise(topic, 10);      // any thread may call it
 //     while (running) ros.spin(std::chrono::milliseconds(50));
@@ -30,18 +30,18 @@
 
 namespace firm {
 
-// A message that is on its way out, as roscpp's serialisation takes it.
+// An outgoing message, in the form that roscpp serialises.
 struct RawMessage {
   const std::uint8_t* data;
   std::size_t size;
 };
 
-// What roscpp calls for a message that came in. It would have a message parsed; here its bytes are kept.
+// The handler that roscpp calls for an incoming message. Instead of parsing the message, it keeps the bytes.
 class RawCallback : public ros::SubscriptionCallbackHelper {
  public:
   explicit RawCallback(MessageHandler handler) : handler_(std::move(handler)) {}
 
-  // roscpp keeps the bytes no longer than this call; the result may be shared by several subscriptions of a topic.
+  // roscpp keeps the bytes only during this call; several subscriptions of a topic may share the result.
   ros::VoidConstPtr deserialize(const ros::SubscriptionCallbackHelperDeserializeParams& received) override {
     return boost::make_shared<const Bytes>(received.buffer, received.buffer + received.length);
   }
@@ -53,7 +53,7 @@ class RawCallback : public ros::SubscriptionCallbackHelper {
 
   const std::type_info& getTypeInfo() override { return typeid(Bytes); }
   bool isConst() override { return true; }
-  // A header's sequence number is the publisher's own.
+  // The sequence number in a header belongs to its publisher.
   bool hasHeader() override { return false; }
 
  private:
@@ -67,7 +67,7 @@ class Ros1 {
   static constexpr bool kHasQuality = false;
   static constexpr const char* kArguments = "ROS' own arguments: NAME:=VALUE remaps a topic, __name:=, __ns:=, __log:=";
 
-  // Takes ROS' own arguments out of `argv`. `name` is that of the node unless `__name:=` gives another.
+  // Remove ROS's own arguments from `argv`. The node is called `name` unless `__name:=` is given.
   Ros1(int& argc, char** argv, const std::string& name) {
     ros::init(argc, argv, name, ros::init_options::NoSigintHandler);
   }
@@ -80,7 +80,7 @@ class Ros1 {
   Ros1(const Ros1&) = delete;
   Ros1& operator=(const Ros1&) = delete;
 
-  // Become a node; `is_stopped` is asked while there is no master yet. Whether it is one.
+  // Become a node; call `is_stopped` while waiting for a master. Return whether the node has started.
   bool start(const std::function<bool()>& is_stopped) {
     for (bool is_first = true; !ros::master::check(); is_first = false) {
       if (is_first) ROS_WARN("waiting for a master at %s", ros::master::getURI().c_str());
@@ -92,16 +92,16 @@ class Ros1 {
     return true;
   }
 
-  // Hand every message of a topic to `handler`, in the thread that calls spin().
+  // Pass every message of a topic to `handler`, in the thread that calls spin().
   void subscribe(const Topic& topic, std::size_t depth, MessageHandler handler) {
     ros::SubscribeOptions options(topic.name, static_cast<std::uint32_t>(depth), topic.signature, topic.type);
     options.helper = boost::make_shared<RawCallback>(std::move(handler));
-    // A small message is not to wait for the next one.
+    // Send small messages at once, without waiting for the next one.
     options.transport_hints.tcpNoDelay();
     subscribers_.push_back(node_->subscribe(options));
   }
 
-  // A function that publishes messages of a topic.
+  // Return a function that publishes messages of a topic.
   MessageHandler advertise(const Topic& topic, std::size_t depth) {
     ros::AdvertiseOptions options(topic.name, static_cast<std::uint32_t>(depth), topic.signature, topic.type,
                                   topic.definition);
@@ -110,7 +110,7 @@ class Ros1 {
     };
   }
 
-  // Handle what comes, for about `duration`. False if ROS wants the node to end.
+  // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end.
   bool spin(std::chrono::milliseconds duration) {
     callbacks_.callAvailable(ros::WallDuration(std::chrono::duration<double>(duration).count()));
     return ros::ok();
@@ -119,7 +119,7 @@ class Ros1 {
   // Take no more messages.
   void unsubscribe() { subscribers_.clear(); }
 
-  // Give what has been published the time to leave: roscpp sends in a thread of its own and does not say when it is done.
+  // Give published messages time to leave: roscpp sends them in its own thread and does not report completion.
   void flush() { std::this_thread::sleep_for(std::chrono::milliseconds(300)); }
 
  private:
@@ -130,7 +130,7 @@ class Ros1 {
 
 }  // namespace firm
 
-// For roscpp a RawMessage is of any type: its topic has been advertised with one.
+// To roscpp, a RawMessage is of any type; its topic is advertised with a concrete one.
 namespace ros::message_traits {
 
 template <>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// ROS 2 as a carrier of bytes: rcl with serialised messages. The support of a message's type is looked for when the node
-// runs, so no message package is needed where it is compiled, and no message is parsed on its way.
+// ROS 2 as a carrier of bytes: rcl with serialised messages. The node looks up the type support of messages at run
+// time, so it needs no message packages to compile, and messages are never parsed.
 //
-//     firm::Ros2 ros(argc, argv, "quat2euler");                     // takes ROS' own arguments out of argv
+//     firm::Ros2 ros(argc, argv, "quat2euler");                     // removes ROS's own arguments from argv
 //     ros.subscribe(topic, 10, [](const std::uint8_t* data, std::size_t size) { ... });
 //     firm::MessageHandler publish = ros.advertise(topic, 10);      // any thread may call it
 //     while (running) ros.spin(std::chrono::milliseconds(50));
@@ -22,7 +22,7 @@
 #include <rcl/subscription.h>
 #include <rcl/wait.h>
 #include <rcutils/logging_macros.h>
-#if __has_include(<rosidl_runtime_c/type_hash.h>)  // not before Iron
+#if __has_include(<rosidl_runtime_c/type_hash.h>)  // since Iron
 #include <rosidl_runtime_c/type_hash.h>
 #define FIRM_HAS_TYPE_HASH
 #endif
@@ -40,7 +40,7 @@
 
 namespace firm {
 
-// Throw MiddlewareError for anything but RCL_RET_OK; `what` was to be done.
+// Throw MiddlewareError for any result except RCL_RET_OK; `what` names the attempted action.
 inline void check_rcl(rcl_ret_t result, const std::string& what) {
   if (result == RCL_RET_OK) return;
   const std::string reason = rcl_get_error_string().str;
@@ -48,17 +48,17 @@ inline void check_rcl(rcl_ret_t result, const std::string& what) {
   throw MiddlewareError("cannot " + what + ": " + reason);
 }
 
-// For what is done at the end, when nothing can be done about a failure.
+// For cleanup calls, whose failure cannot be handled.
 inline void ignore(rcl_ret_t) { rcl_reset_error(); }
 
-// The support of a type such as `geometry_msgs/msg/Quaternion`, out of the library of its package. Throws MiddlewareError if
-// it is not installed, or not with the definition that `topic` was made with.
+// Return the type support of a type such as `geometry_msgs/msg/Quaternion`, from the library of its package. Throws
+// MiddlewareError if the package is not installed, or if its definition differs from that of `topic`.
 inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
   const std::string package = topic.type.substr(0, topic.type.find('/'));
   const std::string library = "lib" + package + "__rosidl_typesupport_c.so";
   std::string symbol = "rosidl_typesupport_c__get_message_type_support_handle__";
   for (const char letter : topic.type) symbol += letter == '/' ? "__" : std::string(1, letter);
-  // It stays open: publishers and subscriptions point into it as long as the process runs.
+  // Never closed: publishers and subscriptions point into the library as long as the process runs.
   void* handle = dlopen(library.c_str(), RTLD_LAZY | RTLD_LOCAL);
   if (handle == nullptr) {
     throw MiddlewareError("the message " + topic.type + " of " + topic.name + " is not installed: " + dlerror() +
@@ -92,7 +92,7 @@ class Ros2 {
   static constexpr const char* kArguments =
       "ROS' own arguments stand behind --ros-args: -r NAME:=VALUE remaps a topic, -r __node:=, -r __ns:=, --log-level";
 
-  // Takes ROS' own arguments out of `argv`. `name` is that of the node unless `__node:=` gives another. Throws
+  // Remove ROS's own arguments from `argv`. The node is called `name` unless `__node:=` is given. Throws
   // MiddlewareError.
   Ros2(int& argc, char** argv, std::string name) : name_(std::move(name)) {
     rcl_init_options_t options = rcl_get_zero_initialized_init_options();
@@ -129,7 +129,7 @@ class Ros2 {
     return true;
   }
 
-  // Hand every message of a topic to `handler`, in the thread that calls spin(). Throws MiddlewareError.
+  // Pass every message of a topic to `handler`, in the thread that calls spin(). Throws MiddlewareError.
   void subscribe(const Topic& topic, std::size_t depth, MessageHandler handler) {
     auto made = std::make_unique<Subscription>(depth, std::move(handler));
     rcl_subscription_options_t options = rcl_subscription_get_default_options();
@@ -140,7 +140,7 @@ class Ros2 {
     check_rcl(rcl_wait_set_resize(&waiting_, subscriptions_.size(), 0, 0, 0, 0, 0), "wait for messages");
   }
 
-  // A function that publishes messages of a topic; it throws MiddlewareError, as this does.
+  // Return a function that publishes messages of a topic. Both this call and the function throw MiddlewareError.
   MessageHandler advertise(const Topic& topic, std::size_t depth) {
     auto made = std::make_unique<Publisher>();
     rcl_publisher_options_t options = rcl_publisher_get_default_options();
@@ -150,17 +150,17 @@ class Ros2 {
     publishers_.push_back(std::move(made));
     return [publisher = &publishers_.back()->rcl, name = topic.name](const std::uint8_t* data, std::size_t size) {
       rcl_serialized_message_t message = rmw_get_zero_initialized_serialized_message();
-      // It is read only; the structure serves both ways.
+      // It is only read; the structure serves both directions.
       message.buffer = const_cast<std::uint8_t*>(data);
       message.buffer_length = message.buffer_capacity = size;
       check_rcl(rcl_publish_serialized_message(publisher, &message, nullptr), "publish on " + name);
     };
   }
 
-  // Handle what comes, for about `duration`. False if ROS wants the node to end. Throws MiddlewareError.
+  // Handle incoming messages for about `duration`. Returns false if ROS asks the node to end. Throws MiddlewareError.
   bool spin(std::chrono::milliseconds duration) {
     if (subscriptions_.empty()) {
-      // rcl would not wait for nothing.
+      // rcl does not wait on an empty set.
       std::this_thread::sleep_for(duration);
       return rcl_context_is_valid(&context_);
     }
@@ -186,13 +186,13 @@ class Ros2 {
     subscriptions_.clear();
   }
 
-  // Wait until reliable peers have what has been published, but not for ever.
+  // Wait, for a limited time, until reliable peers have received all published messages.
   void flush() {
     const rcl_duration_value_t second = 1'000'000'000;
     for (auto& publisher : publishers_) ignore(rcl_publisher_wait_for_all_acked(&publisher->rcl, second));
   }
 
-  // Take messages of peers that do not promise to deliver (sensors), too, and make no such promise.
+  // Also take messages from peers that do not promise delivery (sensors), and make no such promise.
   void be_best_effort() { reliability_ = RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT; }
 
  private:
@@ -200,7 +200,7 @@ class Ros2 {
     rcl_publisher_t rcl = rcl_get_zero_initialized_publisher();
   };
 
-  // A subscription with room for a message, which grows to the largest.
+  // A subscription with a buffer that grows to the largest message.
   struct Subscription {
     Subscription(std::size_t most, MessageHandler handle_message) : depth(most), handler(std::move(handle_message)) {
       const rcl_allocator_t allocator = rcl_get_default_allocator();
@@ -210,7 +210,7 @@ class Ros2 {
     Subscription(const Subscription&) = delete;
     Subscription& operator=(const Subscription&) = delete;
 
-    // No more than are kept for it: a peer that never stops is not to keep others waiting.
+    // Take no more than its queue holds, so that a peer that never stops does not starve others.
     void take_all() {
       for (std::size_t number = 0; number < depth; ++number) {
         const rcl_ret_t result = rcl_take_serialized_message(&rcl, &message, nullptr, nullptr);
@@ -238,7 +238,7 @@ class Ros2 {
     int count = 0;
     check_rcl(rcl_remove_ros_arguments(argv, &context_.global_arguments, rcl_get_default_allocator(), &count, &rest),
               "read the arguments");
-    // They point to the strings of `argv`.
+    // The pointers refer to the strings of `argv`.
     for (int index = 0; index < count; ++index) argv[index] = const_cast<char*>(rest[index]);
     argc = count;
     if (rest != nullptr) rcl_get_default_allocator().deallocate(rest, nullptr);

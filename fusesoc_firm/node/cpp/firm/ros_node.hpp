@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The main program of a system's node: command line, topics, signals, exit status. A generated node is a table and a call:
+// The main program of a system's node: command line, topics, signals, exit status. A generated node is a table and a
+// call:
 //
 //     int main(int argc, char** argv) { return firm::run<firm::Ros1>(kSystem, argc, argv); }
 //
-// C++17; the middleware is a parameter, firm/ros1.hpp or firm/ros2.hpp.
+// C++17; the middleware is a parameter: firm/ros1.hpp or firm/ros2.hpp.
 #pragma once
 
 #include <algorithm>
@@ -29,20 +30,20 @@
 
 namespace firm {
 
-// Where a message of software comes from or goes to: a topic, or a converter of the hardware.
+// The other end of a software port: a topic, or a converter of the hardware.
 struct SoftwarePort {
   std::string topic;
   std::optional<unsigned> converter;
 };
 
-// The blocks in software; the places are the ids of their own.
+// The blocks in software; their ids count separately from those of the hardware.
 struct Software {
   std::vector<SoftwarePort> inputs;
   std::vector<SoftwarePort> outputs;
 };
 
-// What a node must know of a system: the bits of its streams, how many converters it has of either kind, how many messages
-// a queue holds unless the command line says so, the topics, and the software.
+// The system as its node sees it: the width of its streams in bits, the number of subscribers and publishers, the
+// default queue depth in messages, the topics, and the software.
 struct System {
   std::string name;
   unsigned width;
@@ -56,7 +57,7 @@ struct System {
   bool has_software() const { return !software.inputs.empty(); }
 };
 
-// A command line that is none.
+// An illegal command line.
 class UsageError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -74,7 +75,7 @@ struct NodeArguments {
   bool wants_help = false;
 };
 
-// A whole number from 1 on. Throws UsageError.
+// Parse a positive whole number. Throws UsageError.
 inline std::size_t positive_number(const std::string& option, const std::string& text) {
   constexpr std::size_t kMostDigits = 9;
   if (text.empty() || text.size() > kMostDigits || text.find_first_not_of("0123456789") != std::string::npos ||
@@ -84,7 +85,7 @@ inline std::size_t positive_number(const std::string& option, const std::string&
   return std::stoul(text);
 }
 
-// One of several words: what it stands for. Throws UsageError.
+// Return the value of one of several words. Throws UsageError.
 template <typename Value>
 Value word_of(const std::string& option, const std::string& text, const std::map<std::string, Value>& words) {
   if (const auto found = words.find(text); found != words.end()) return found->second;
@@ -93,8 +94,8 @@ Value word_of(const std::string& option, const std::string& text, const std::map
   throw UsageError(option + " is '" + text + "'; legal: " + legal);
 }
 
-// The arguments that ROS has left; `has_quality` says whether topics of this ROS have a quality of service. Throws
-// UsageError.
+// Parse the arguments that ROS has left; `has_quality` tells whether topics of this ROS have a quality of service.
+// Throws UsageError.
 inline NodeArguments parse_arguments(const System& system, bool has_quality, int argc, char** argv) {
   NodeArguments arguments;
   arguments.depth = system.queue_depth;
@@ -160,19 +161,19 @@ inline void print_help(std::ostream& out, const System& system, const std::strin
       << "exit status: 0, 1 if the hardware or ROS failed, 2 for a wrong command line\n";
 }
 
-// Whether SIGINT or SIGTERM has come.
+// Set by SIGINT or SIGTERM.
 inline volatile std::sig_atomic_t is_interrupted = 0;
 
 inline void handle_signals() {
   struct sigaction action {};
   action.sa_handler = [](int) { is_interrupted = 1; };
-  // The second one does what it does to every program.
+  // The second signal has its default effect.
   action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }
 
-// An engine that runs in a thread of its own for as long as this lives.
+// An engine that runs in its own thread during the lifetime of this object.
 class RunningNode {
  public:
   RunningNode(Node& node, std::chrono::seconds drain) : node_(node), drain_(drain), thread_([this] { run(); }) {}
@@ -182,7 +183,7 @@ class RunningNode {
 
   bool has_ended() const { return has_ended_; }
 
-  // Let it finish what it has; the exit status.
+  // Let the engine finish its queued messages; return the exit status.
   int stop() {
     node_.stop(drain_);
     if (thread_.joinable()) thread_.join();
@@ -202,10 +203,10 @@ class RunningNode {
   std::thread thread_;
 };
 
-// The hardware and, where the system has some, the software, each with an engine; and the ways between them and topics.
+// An engine for the hardware and, if the system has software, one for it, with the paths between them and the topics.
 class Engines {
  public:
-  // `publish` are the topics of the system, by name. Throws std::invalid_argument.
+  // `publish` maps the names of the system's topics to their publishers. Throws std::invalid_argument.
   Engines(const System& system, const NodeArguments& arguments, std::map<std::string, MessageHandler> publish,
           std::ostream* trace)
       : system_(system), publish_(std::move(publish)), from_hardware_(system.publisher_count) {
@@ -238,7 +239,7 @@ class Engines {
     }
   }
 
-  // What takes the messages of a topic.
+  // Return the handler for the messages of a topic.
   MessageHandler taker(const Topic& topic) {
     std::vector<MessageHandler> takers;
     if (topic.id) takers.push_back(into(*hardware_, *topic.id));
@@ -257,8 +258,8 @@ class Engines {
   Node& hardware() { return *hardware_; }
   Node* software() { return software_.get(); }
 
-  // Wait, as long as there is something to do: of messages that go to and fro between hardware and software, neither
-  // knows whether there are more to come.
+  // Wait while work remains. Messages may alternate between hardware and software, and neither knows whether more will
+  // follow.
   void settle(std::chrono::nanoseconds longest) const {
     const auto end = std::chrono::steady_clock::now() + longest;
     for (std::uint64_t before = 0, now = moved(); now != before && std::chrono::steady_clock::now() < end; now = moved()) {
@@ -291,7 +292,7 @@ class Engines {
   std::unique_ptr<Node> software_;
 };
 
-// What an engine has done, for people.
+// Print an engine's counts.
 inline void print_statistics(const std::string& name, const Node& node) {
   const NodeStatistics counted = node.statistics();
   std::cerr << name << ": " << counted.received << " received, " << counted.dropped << " dropped, " << counted.sent
@@ -299,7 +300,7 @@ inline void print_statistics(const std::string& name, const Node& node) {
             << " restarts" << std::endl;
 }
 
-// Be the node until a signal, ROS, or the hardware ends it. The exit status.
+// Run the node until a signal, ROS, or the hardware ends it. Return the exit status.
 template <typename Ros>
 int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   std::ofstream trace;
@@ -319,7 +320,7 @@ int serve(Ros& ros, const System& system, const NodeArguments& arguments) {
   const auto is_running = [&] { return !hardware.has_ended() && !(software && software->has_ended()); };
   while (!is_interrupted && is_running() && ros.spin(std::chrono::milliseconds(50))) {
   }
-  // What ROS has for us already.
+  // Handle messages that ROS has already received.
   ros.spin(std::chrono::milliseconds(0));
   ros.unsubscribe();
   if (software && is_running()) engines.settle(arguments.drain);

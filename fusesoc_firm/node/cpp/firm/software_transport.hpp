@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Blocks in software as if they were hardware: a child process that takes frames at its standard input and gives frames
-// at its standard output, with ids of its own (docs/reference/node-library.md, "Blocks in software").
+// Blocks in software behind the interface of hardware: a child process that reads frames from its standard input and
+// writes frames to its standard output, with its own ids (docs/reference/node-library.md, "Blocks in software").
 //
-// `python3 -m fusesoc_firm.node.software_process SPEC` is one; any program may be.
+// `python3 -m fusesoc_firm.node.software_process SPEC` is one; any program can serve.
 #pragma once
 
 #include <array>
@@ -19,18 +19,18 @@ namespace firm {
 
 class SoftwareTransport : public Transport {
  public:
-  // Starts `command`. Throws TransportError.
+  // Start `command`. Throws TransportError.
   explicit SoftwareTransport(const std::string& command, TransportOptions options = {})
       : stream_(options.publishers, options.longest_payload), child_(command, STDIN_FILENO, STDOUT_FILENO) {}
 
   void send(const std::uint8_t* frame, std::size_t size) override {
     if (is_closed_) throw TransportError("the transport is closed");
     const SigpipeHeld held;
-    // A reader that is gone is the receiver's to report, who knows how it ended.
+    // The receiver, which knows how the child ended, also reports its end.
     if (!child_.write(frame, size)) throw TransportError("the software takes no more frames");
   }
 
-  // Nothing more is sent: the software ends when it has answered all.
+  // Close the child's input: the software ends after its last response.
   void finish() override {
     is_finishing_ = true;
     child_.end_input();
@@ -86,7 +86,7 @@ class SoftwareTransport : public Transport {
   std::atomic<bool> is_done_{false};
   Waiter waiter_;
 
-  // The receiver's own.
+  // Used by the receiver only.
   FrameStream stream_;
   std::array<std::uint8_t, 1 << 16> buffer_;
   std::size_t read_ = 0;

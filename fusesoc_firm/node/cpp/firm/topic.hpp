@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A topic of a system, and what a node asks of a middleware: firm/ros1.hpp and firm/ros2.hpp are two. C++17.
+// A topic of a system, and the interface of a middleware, which firm/ros1.hpp and firm/ros2.hpp implement. C++17.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,9 @@
 
 namespace firm {
 
-// A topic, and the id of its converter in the hardware; none where only software has to do with it. `signature` is that of the message's definition, ROS 1's MD5
-// sum or ROS 2's hash (RIHS01), and `definition` its text with those of all messages within it, as ROS 1 announces it.
+// A topic and the id of its converter in the hardware; no id if only software uses it. `signature` is that of the
+// message's definition: ROS 1's MD5 sum or ROS 2's hash (RIHS01). `definition` is its text with those of all nested
+// messages, as ROS 1 announces it.
 struct Topic {
   std::optional<unsigned> id;
   std::string name;
@@ -21,10 +22,10 @@ struct Topic {
   std::string definition{};
 };
 
-// A serialised message: taken from the middleware, or to be published. The bytes are the caller's.
+// Handles a serialised message: one from the middleware, or one to publish. The caller owns the bytes.
 using MessageHandler = std::function<void(const std::uint8_t* data, std::size_t size)>;
 
-// The middleware is not there, or does not know what it is asked for.
+// The middleware is missing, or does not know a requested item.
 class MiddlewareError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Each message's way as lines of CSV: what happened when, by the wall clock and, in simulated hardware, in which cycles.
+// Traces each message as lines of CSV: the steps with their times by the wall clock and, in simulated hardware, the
+// cycles.
 //
 //     wall_ns     std::chrono::steady_clock
 //     event       received (put), queued, sent; taken (simulated hardware took the frame); burst, published
-//     converter   the subscriber, or for what comes back the publisher
-//     message     messages to the hardware are counted as they are put, those from it as they are published
-//     bytes       of the payload; of a burst, all
-//     first_cycle, last_cycle    of the frame's or burst's beats, empty for the others
+//     converter   the subscriber, or the publisher for messages from the hardware
+//     message     number of the message: to the hardware in the order of put(), from it in the order of publishing
+//     bytes       length of the payload; for a burst, of the whole burst
+//     first_cycle, last_cycle    of the beats of the frame or burst, otherwise empty
 #pragma once
 
 #include <cstddef>
@@ -23,7 +24,7 @@ namespace firm {
 
 class Trace {
  public:
-  // Without a stream nothing is written.
+  // Without a stream, nothing is written.
   explicit Trace(std::ostream* stream) : stream_(stream) {
     if (stream_) *stream_ << "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n";
   }
@@ -35,14 +36,14 @@ class Trace {
     write_line(event, {converter, message, bytes}, cycles);
   }
 
-  // A message is about to be sent: simulated hardware may take it before the transport returns.
+  // Record a message before it is sent: simulated hardware may take it before the transport returns.
   void sending(unsigned converter, std::uint64_t message, std::size_t bytes) {
     if (!stream_) return;
     const std::lock_guard<std::mutex> lock(mutex_);
     sent_.push_back({converter, message, bytes});
   }
 
-  // The next one of those sent was taken.
+  // Record that simulated hardware took the next sent message.
   void taken(const Cycles& cycles) {
     if (!stream_) return;
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -51,7 +52,7 @@ class Trace {
     sent_.pop_front();
   }
 
-  // What was sent will not be taken any more.
+  // Forget all sent messages, which will never be taken.
   void forget_sent() {
     const std::lock_guard<std::mutex> lock(mutex_);
     sent_.clear();
@@ -75,7 +76,7 @@ class Trace {
 
   std::ostream* stream_;
   std::mutex mutex_;
-  std::deque<Message> sent_;  // and not yet taken
+  std::deque<Message> sent_;  // but not yet taken
 };
 
 }  // namespace firm

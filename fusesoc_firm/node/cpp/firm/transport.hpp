@@ -2,10 +2,10 @@
 // The one interface to the hardware: frames to it, bursts from it (docs/reference/transports.md).
 //
 //     auto transport = firm::open_transport("pipe:./simulator");   // firm/open_transport.hpp
-//     transport->send(frame.data(), frame.size());                 // waits while the hardware takes no more
-//     auto burst = transport->receive(std::chrono::seconds(1));    // nothing if none came in time
+//     transport->send(frame.data(), frame.size());                 // waits while the hardware is not ready
+//     auto burst = transport->receive(std::chrono::seconds(1));    // nothing if none arrived in time
 //
-// It is what fusesoc_firm/node/transport/transport.py is in Python. C++17, no dependencies but POSIX.
+// The counterpart in Python is fusesoc_firm/node/transport/transport.py. C++17, no dependencies but POSIX.
 #pragma once
 
 #include <chrono>
@@ -19,78 +19,78 @@
 namespace firm {
 
 using Bytes = std::vector<std::uint8_t>;
-// None: for ever.
+// Nothing: no limit.
 using Timeout = std::optional<std::chrono::nanoseconds>;
 
-// A frame begins with the id and the length of its payload, little-endian.
+// A frame begins with the id and the length of its payload, which is little-endian.
 constexpr std::size_t kIdBytes = 1;
 constexpr std::size_t kFrameHeaderBytes = 5;
 
-// The hardware, or the way to it, is gone or does what it must not; the transport is of no more use.
+// The hardware, or the path to it, has gone or violates the protocol; the transport is unusable.
 class TransportError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// In which cycles of clk simulated hardware took the first and the last beat.
+// The cycles of clk in which simulated hardware took the first and the last beat.
 struct Cycles {
   std::uint64_t first;
   std::uint64_t last;
 };
 
-// The bytes of the system's stream up to a tlast, those that tkeep marks: a frame, or a part of one. `tid` is the stream's
-// where the transport carries it, `cycles` are known of simulated hardware.
+// The bytes of the system's stream up to a tlast that tkeep marks as valid: a frame or a part of one. `tid` is the
+// stream's, if the transport carries it; `cycles` is known for simulated hardware.
 struct Burst {
   Bytes data;
   std::optional<std::uint8_t> tid = std::nullopt;
   std::optional<Cycles> cycles = std::nullopt;
 };
 
-// Something went wrong, and the transport goes on.
+// An error after which the transport continues.
 struct HardwareError {
-  // Of which converter frame_error pulsed; none for id_error, and for bytes that a link lost.
+  // The converter whose frame_error pulsed; nothing for id_error, and for bytes that a link lost.
   std::optional<unsigned> converter = std::nullopt;
   std::optional<std::uint64_t> cycle = std::nullopt;
 };
 
-// What a transport must know of a system, and what it can tell beside bursts. The functions are called by its threads.
+// A transport's parameters from the system, and its callbacks beside bursts. Its threads call the functions.
 struct TransportOptions {
   unsigned publishers = 256;              // of the Manager
   std::size_t longest_payload = 1 << 26;  // bytes, in either direction
-  std::function<void(const Cycles&)> on_taken = nullptr;  // simulated hardware took the next one of the frames sent
+  std::function<void(const Cycles&)> on_taken = nullptr;  // simulated hardware took the next sent frame
   std::function<void(const HardwareError&)> on_error = nullptr;
 };
 
-// One thread may send while another one receives; closing ends both.
+// One thread may send while another receives; closing ends both.
 class Transport {
  public:
   virtual ~Transport() = default;
 
-  // Send a whole frame; returns when the hardware, or a bounded buffer, has it. Throws TransportError, also when the
+  // Send a whole frame; returns when the hardware, or a bounded buffer, has it. Throws TransportError, even if the
   // transport is closed.
   virtual void send(const std::uint8_t* frame, std::size_t size) = 0;
 
-  // The next burst; none if none came in the time given, or when the transport is closed. Throws TransportError.
+  // Return the next burst; nothing on timeout or when the transport is closed. Throws TransportError.
   virtual std::optional<Burst> receive(Timeout timeout = std::nullopt) = 0;
 
-  // Nothing more is sent. By the thread that sends; most hardware need not know.
+  // Declare that no more frames follow. Called by the sending thread; most hardware ignores it.
   virtual void finish() {}
 
-  // Whether all that was sent has had its effect, and all of that was received; nothing where no one can know.
+  // Return whether all frames sent have had their effect, and all responses were received; nothing if unknown.
   virtual std::optional<bool> is_at_rest() const { return std::nullopt; }
 
-  // Stop; what has been sent may be lost. Any thread; a second call does nothing.
+  // Stop; sent frames may be lost. Any thread; a second call does nothing.
   virtual void close() = 0;
 };
 
-// How long a frame's payload is, by its header.
+// Return the length of a frame's payload from its header.
 inline std::uint32_t payload_length(const std::uint8_t* frame) {
   std::uint32_t length = 0;
   for (std::size_t place = kFrameHeaderBytes; place > kIdBytes; --place) length = length << 8 | frame[place - 1];
   return length;
 }
 
-// A frame with this payload. Throws std::length_error if the length does not fit its field.
+// Return a frame with this payload. Throws std::length_error if the length does not fit its field.
 inline Bytes pack_frame(std::uint8_t id, const std::uint8_t* payload, std::size_t size) {
   if (size > UINT32_MAX) throw std::length_error("a payload of 4 GiB and more does not fit a frame");
   Bytes frame;

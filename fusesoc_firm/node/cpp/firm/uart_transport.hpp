@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// A board's serial link (cores/board/README.md): frames as they are, byte after byte, 8 bits, no parity.
+// A board's serial link (cores/board/README.md): raw frames, byte by byte, 8 bits, no parity.
 //
-// A row of bytes has no marks. To the board a break is one: what follows begins a frame. From the board only silence is,
-// so all is dropped until the line is silent, and in the meantime nothing is sent that would be answered. The transport
-// does both when it is opened, and whenever what comes cannot be a frame: an id or a length that there is not, or a pause
-// within a frame.
+// A byte stream has no markers. The board takes a break as one: the next byte begins a frame. From the board, only
+// silence is a marker: all bytes are dropped until the line is silent, and meanwhile nothing is sent that would cause a
+// response. The transport does both when it is opened, and whenever received bytes cannot form a frame: an illegal id
+// or length, or a pause in the middle of a frame.
 #pragma once
 
 #include <fcntl.h>
@@ -29,15 +29,15 @@ namespace firm {
 struct UartOptions {
   unsigned baud = 1000000;
   bool has_flow_control = false;  // RTS and CTS
-  std::chrono::nanoseconds silence = std::chrono::milliseconds(50);        // that parts what comes from what came
-  std::chrono::nanoseconds longest_pause = std::chrono::milliseconds(200);  // within a frame from the board
-  std::chrono::nanoseconds patience = std::chrono::seconds(2);               // with a board that is not silent
+  std::chrono::nanoseconds silence = std::chrono::milliseconds(50);        // that separates new bytes from old ones
+  std::chrono::nanoseconds longest_pause = std::chrono::milliseconds(200);  // in the middle of a frame from the board
+  std::chrono::nanoseconds patience = std::chrono::seconds(2);               // longest wait for a silent line
   std::function<int(int descriptor)> send_break = [](int descriptor) { return ::tcsendbreak(descriptor, 0); };
 };
 
 class UartTransport : public Transport {
  public:
-  // Opens the device and makes a cut. Throws TransportError.
+  // Open the device and resynchronise with a break. Throws TransportError.
   explicit UartTransport(const std::string& device, TransportOptions options = {}, UartOptions uart = {})
       : options_(std::move(options)),
         uart_(std::move(uart)),
@@ -115,11 +115,11 @@ class UartTransport : public Transport {
         ::tcsetattr(line_.get(), TCSANOW, &settings) != 0) {
       fail_with_errno(device_ + " at " + std::to_string(uart_.baud) + " baud");
     }
-    // Two programs that read one line both get nonsense.
+    // If two programs read one line, both get fragments.
     if (::ioctl(line_.get(), TIOCEXCL) != 0) fail_with_errno(device_);
   }
 
-  // Take what is there, or wait for it; whether a frame is whole.
+  // Take available bytes, or wait for them; return whether a frame is complete.
   bool receive_within(const Deadline& deadline) {
     if (read_ < filled_) return take();
     const bool is_timed = is_dropping_ || stream_.has_begun();
@@ -136,8 +136,8 @@ class UartTransport : public Transport {
     return false;
   }
 
-  // Bring both sides together. A frame of ours that is on its way comes first: who receives must not wait for it, as the
-  // board may take no more before we have received.
+  // Resynchronise both sides with a break. A frame that is being sent is finished first. The receiver must not wait for
+  // this, because the board may accept more only after its own bytes are received.
   void cut() {
     set_dropping(true);
     stream_.pop();
@@ -157,7 +157,7 @@ class UartTransport : public Transport {
     cut();
   }
 
-  // Move bytes that were read to the frame; whether it is whole.
+  // Move received bytes to the frame; return whether it is complete.
   bool take() {
     const std::uint8_t* bytes = buffer_.data() + read_;
     const std::size_t count = filled_ - read_;
@@ -206,15 +206,15 @@ class UartTransport : public Transport {
   Descriptor line_;
   Waiter waiter_;
   std::atomic<bool> is_closed_{false};
-  std::mutex sending_;  // a frame, or a break
+  std::mutex sending_;  // held for a frame or a break
   std::atomic<bool> is_break_wanted_{false};
   std::mutex dropping_;
   std::condition_variable changed_;
-  std::atomic<bool> is_dropping_{false};  // what comes, until the line is silent
+  std::atomic<bool> is_dropping_{false};  // drop received bytes until the line is silent
 
-  // The receiver's own.
+  // Used by the receiver only.
   FrameStream stream_;
-  std::chrono::steady_clock::time_point moved_;  // when bytes came last
+  std::chrono::steady_clock::time_point moved_;  // time of the last received bytes
   std::array<std::uint8_t, 4096> buffer_;
   std::size_t read_ = 0;
   std::size_t filled_ = 0;

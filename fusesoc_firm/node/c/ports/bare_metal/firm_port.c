@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Without an operating system. The timer is the board's: its interrupt, or its loop, counts firm_ticks up every
- * millisecond. */
+/* A platform without an operating system. The board provides the timer: an interrupt or a loop increments firm_ticks
+ * every millisecond. */
 #include "firm_port.h"
 
 volatile uint32_t firm_ticks;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* FreeRTOS: short sections are its critical ones, and a wait lets other tasks run. */
+/* FreeRTOS: a lock is a critical section of the kernel, and a wait lets other tasks run. */
 #include "firm_port.h"
 
 #include "FreeRTOS.h"
@@ -17,5 +17,5 @@ void firm_unlock(firm_lock_t *lock) {
 
 uint32_t firm_milliseconds(void) { return (uint32_t)xTaskGetTickCount() * (uint32_t)portTICK_PERIOD_MS; }
 
-/* At least one tick, so that tasks of a lower priority run, too. */
+/* Wait at least one tick, so that tasks of lower priority also run. */
 void firm_pause(void) { vTaskDelay(1); }
