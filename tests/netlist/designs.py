@@ -688,7 +688,10 @@ class _Maker(Expressions):
             return f"{part} {sign} {self.moving(scope, vector.kind, width, self.depth(), sign == ':=')};"
         if kind < 0.3 and target.may_be_memory and vector.width > 1:
             return f"{vector.name}({self.index(scope, vector, 2)}) {sign} {self.bit(scope, 2)};"
-        return f"{vector.name} {sign} {self.moving(scope, vector.kind, vector.width, self.depth(), sign == ':=')};"
+        value = self.moving(scope, vector.kind, vector.width, self.depth(), sign == ":=")
+        # Left out: what a target has already. Behind a conditional assignment, GHDL 2.0 confuses the two.
+        value = self.input(vector.kind, scope, vector.width) if value == vector.name else value
+        return f"{vector.name} {sign} {value};"
 
     def moving(self, scope: Scope, kind: str, width: int, depth: int, is_variable: bool = True) -> str:
         """A value that GHDL does not know: of a variable, it would evaluate what is made of it.
