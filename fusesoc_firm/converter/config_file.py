@@ -29,16 +29,16 @@ class Project(Section):
     """What holds for all messages."""
 
     name: Text = key("the project's name", is_required=True)
-    platform: Platform | None = key("what the hardware is for", form="section", section=Platform)
-    width: int = key("bits of the streams", form="integer", choices=WIDTHS, default=8)
-    prefix: Text | None = key("what the names of all generated units but the interfaces begin with, such as left")
+    platform: Platform | None = key("the target hardware; for information only", form="section", section=Platform)
+    width: int = key("the streams' width in bits", form="integer", choices=WIDTHS, default=8)
+    prefix: Text | None = key("prefix of the names of all generated units except the interfaces, such as left")
 
 
 @dataclass(frozen=True)
 class MessageInterfaces(Section):
     """A message and the converters that are wanted of it."""
 
-    type: Text = key("whose message it is", is_required=True, choices=tuple(MIDDLEWARES))
+    type: Text = key("the message's middleware", is_required=True, choices=tuple(MIDDLEWARES))
     name: Text = key("the message's type, such as sensor_msgs/Image", is_required=True)
     subscribers: tuple[Text, ...] = key("names of converters from frames to the message", form="texts")
     publishers: tuple[Text, ...] = key("names of converters from the message to frames", form="texts")
@@ -48,7 +48,7 @@ class MessageInterfaces(Section):
 class ConfigFile(Section):
     """The whole file."""
 
-    project: Project = key("what holds for all messages", form="section", section=Project, is_required=True)
+    project: Project = key("settings for all messages", form="section", section=Project, is_required=True)
     messages: tuple[MessageInterfaces, ...] = key(
         "the messages and their interfaces", form="sections", section=MessageInterfaces, is_required=True
     )
@@ -72,7 +72,7 @@ def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
     """Every message has an interface, and every interface a name that an entity can have alone."""
     prefix = config.project.prefix
     if prefix is not None and not is_prefix(prefix):
-        faults.error(f"no entity can be called '{prefix}_axis_to_...'", prefix.source, PREFIX_RULE)
+        faults.error(f"'{prefix}_axis_to_...' is not a legal entity name", prefix.source, PREFIX_RULE)
     seen: dict[str, Text] = {}
     for message in config.messages:
         names = (*message.subscribers, *message.publishers)
@@ -81,8 +81,8 @@ def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
             faults.error(f"'{message.name}' has no interface", message.name.source, hint)
         for name in names:
             if identifier(name) != name:
-                hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
-                faults.error(f"no entity can be called '{name}'", name.source, hint)
+                hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+                faults.error(f"'{name}' is not a legal entity name", name.source, hint)
             first = seen.setdefault(name.lower(), name)
             if first is not name:
-                faults.error(f"a second interface is called '{name}'; the first is at {first.source}", name.source)
+                faults.error(f"duplicate interface '{name}'; the first is at {first.source}", name.source)

@@ -184,7 +184,7 @@ def _readers(path: Path) -> list[Reader]:
         # Who records ends the folder with this file; what is there can be read without it.
         files = sorted((file for file in path.iterdir() if file.suffix in _SUFFIXES[1:]), key=_natural)
         if not files:
-            raise FileNotFoundError("there is no metadata.yaml in it, no .db3 and no .mcap")
+            raise FileNotFoundError("it contains neither metadata.yaml nor a .db3 or .mcap file")
         return [Rosbag2Reader(file) for file in files]
     return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
 
@@ -232,4 +232,4 @@ def _readable(path: Path, hint: str = "") -> Iterator[None]:
     except Exception as error:  # noqa: BLE001 - rosbags and what it uses raise anything
         said = str(error) or type(error).__name__
         remedies = (text.format(path=path) for words, text in _REMEDIES.items() if words in said)
-        fail(f"{path} is not a bag that can be read: {said}", hint=next(remedies, hint))
+        fail(f"{path} is not a readable bag: {said}", hint=next(remedies, hint))

@@ -41,8 +41,8 @@ def check(modules: Modules, files: Iterable[str]) -> None:
             statement = _statement(texts[file], int(line), int(column))
             if width in set(_widths(statement)) or named[width] & set(map(str.lower, _NAME.findall(statement))):
                 raise NetlistError(
-                    f"{place}: error: GHDL makes zero of a constant of {width} bits of which only the highest {_WORD} "
-                    "have a bit set; assign it in two slices"
+                    f"{place}: error: GHDL turns a constant of {width} bits into zero if only its highest {_WORD} bits "
+                    "are not zero; assign it in two slices"
                 )
 
 

@@ -67,7 +67,7 @@ def subtractions_from_integers(file: str, index: str, analyse: Analyse, folder: 
             yield f"{file}:{line + 1}:{start + 1 - before.count(_USE) * len(_USE)}"
             lines[line] = lines[line][:start] + lines[line][start:].replace("-", "+", 1)
     if messages:
-        raise NetlistError(f"{messages}\n{file}: error: GHDL does not tell where it subtracts a signed number")
+        raise NetlistError(f"{messages}\n{file}: error: GHDL does not report where it subtracts a signed number")
 
 
 def _bodies(file: str, index: str) -> str:
@@ -75,7 +75,7 @@ def _bodies(file: str, index: str) -> str:
     text = _text(file)
     units = re.search(_UNITS.format(re.escape(file)), index, re.MULTILINE)
     if not units:
-        raise NetlistError(f"{file}: error: GHDL's index of the library does not have it")
+        raise NetlistError(f"{file}: error: it is not in GHDL's index of the library")
     starts = [(int(place), kind) for kind, place in _UNIT.findall(units[1])]
     found = ""
     for (start, kind), (end, _) in pairwise([(0, ""), *starts, (len(text), "")]):

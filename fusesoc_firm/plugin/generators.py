@@ -86,9 +86,9 @@ _MESSAGES = Parameter(
     "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
 )
 
-_DISTRO = Parameter("distro", "str", "the ROS distribution whose standard messages are meant")
+_DISTRO = Parameter("distro", "str", "the ROS distribution that provides the standard messages")
 
-_LOCKED = Parameter("locked", "str", "a lock file, relative to the core: what differs from it is refused")
+_LOCKED = Parameter("locked", "str", "a lock file, relative to the core; differences from it are errors")
 
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
@@ -99,17 +99,21 @@ GENERATORS: Mapping[str, Generator] = {
                 "the type of a message, service or action, such as geometry_msgs/Quaternion",
                 is_required=True,
             ),
-            Parameter("ros", "int", "the ROS version whose wire format is spoken", is_required=True, choices=(1, 2)),
-            Parameter("direction", "str", "which converters", "both", choices=("subscriber", "publisher", "both")),
-            Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter(
+                "ros", "int", "the ROS version, which determines the serialisation", is_required=True, choices=(1, 2)
+            ),
+            Parameter(
+                "direction", "str", "the converters' directions", "both", choices=("subscriber", "publisher", "both")
+            ),
+            Parameter("width", "int", "the stream's width in bits", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
             Parameter(
                 "name",
                 "str",
-                "what the names of all generated units begin with, such as left; a second core of a message needs one",
+                "prefix of the names of all generated units, such as left; a second core of a message needs one",
                 rule=(PREFIX_RULE, is_prefix),
             ),
             Parameter("include", "list", "fields that get ports, such as pose.position; all unless given"),
-            Parameter("exclude", "list", "fields that get none of these; a publisher sends their defaults"),
+            Parameter("exclude", "list", "fields that get no ports; a publisher sends their defaults"),
             Parameter(
                 "config",
                 "str",
@@ -126,22 +130,28 @@ GENERATORS: Mapping[str, Generator] = {
     "far": Generator(
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
-            Parameter("product", "str", "what to make of it", "system", choices=("system", "simulation", "live")),
-            Parameter("board", "str", "the board it is for: one of ours, or a YAML file relative to the core"),
+            Parameter("product", "str", "the product to generate", "system", choices=("system", "simulation", "live")),
+            Parameter("board", "str", "the board: a name that fusesoc_firm knows, or a YAML file relative to the core"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
-            Parameter("model", "str", "a Python file with the function that says what the system answers"),
+            Parameter("model", "str", "a Python file with the function that computes the system's responses"),
             Parameter(
-                "environment", "list", "VHDL files that play what is at the pins; the last is called as its entity"
+                "environment", "list", "VHDL files of the environment at the pins; the last has its entity's name"
             ),
             Parameter(
                 "simulator",
                 "str",
-                "what shall run the simulation",
+                "the simulator",
                 default_simulator(),
                 choices=tuple(SIMULATORS),
             ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
-            Parameter("stall_percent", "int", "how often the simulation stalls a stream", 25, bounds=(0, 99)),
+            Parameter(
+                "stall_percent",
+                "int",
+                "percentage of cycles in which the simulation stalls a stream",
+                25,
+                bounds=(0, 99),
+            ),
             Parameter("files", "list", "further files that the model and functions in software read"),
             _PATHS,
             _MESSAGES,

@@ -74,7 +74,7 @@ def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None
     Such a text gets into comments, strings, labels and messages: everywhere it is one line that can be shown. So it
     has no control characters, Unicode's line ends, lone surrogates, or characters that change the direction of writing.
     """
-    legal = f"legal is one line of at most {longest} printable characters"
+    legal = f"legal: one line of at most {longest} printable characters"
     if len(text) > longest:
         return f"has {len(text)} characters", legal
     if unprintable := next((character for character in text if not character.isprintable()), None):

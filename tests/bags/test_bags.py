@@ -151,7 +151,7 @@ def test_a_bag_without_a_message_for_anybody(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("name", ["notes.txt", "broken.bag", "broken.mcap", "broken.db3"])
 def test_what_is_no_bag(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"This is no bag, whatever it is called.\n" * 10)
-    with pytest.raises(InputError, match=r"is not a bag that can be read: .*\n +=? .*YAML"):
+    with pytest.raises(InputError, match=r"is not a readable bag: .*\n +=? .*YAML"):
         read_stimuli(tmp_path / name, [subscriber("p", "geometry_msgs/Point", ROS1)])
 
 
@@ -279,7 +279,7 @@ def test_another_message_of_the_same_name(tmp_path: Path, kind: str) -> None:
     name = parse_name("geometry_msgs/Point")
     ours = signature(name, MessageLibrary(version(kind)).closure(name))
     assert routed(path, kind, ours) == [""]
-    assert routed(path, kind, "other") == [f"it is another geometry_msgs/Point than that of 'p': {ours}, not other"]
+    assert routed(path, kind, "other") == [f"its geometry_msgs/Point differs from that of 'p': {ours}, not other"]
 
 
 @pytest.mark.parametrize(

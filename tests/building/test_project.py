@@ -216,8 +216,8 @@ def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatc
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["me:p:bush"], "'me:p:bush' is no core that FuseSoC knows here"),
-        (["me:p:a bush"], "'me:p:a bush' is no core that FuseSoC knows here"),
+        (["me:p:bush"], "unknown core 'me:p:bush'"),
+        (["me:p:a bush"], "unknown core 'me:p:a bush'"),
         (["me:p:top", "--target", "fly"], "'me:p:top:1.0' has no target 'fly'"),
     ],
 )

@@ -152,7 +152,7 @@ def test_faults(tmp_path: Path, capsys: Captured) -> None:
         f"{copy / 'quat2euler/rtl/quat2euler.vhd'}:1"
     )
     (copy / "robot.vhd").write_text("")
-    assert "'robot.vhd' is none of the generated core's files" in fault(f"{copy / 'robot.vhd'}:1")
+    assert "'robot.vhd' is not a file of the generated core" in fault(f"{copy / 'robot.vhd'}:1")
     path.write_text(path.read_text() + "-- edited\n")
     assert "is not what would be generated now" in fault(f"{path}:1")
     (tmp_path / "a.vhd").write_text("")

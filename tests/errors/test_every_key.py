@@ -131,7 +131,7 @@ def sites(checker: Checker) -> list[KeySite]:
 
 def problem(checker: Checker, answer: Answer) -> str:
     """What is wrong with an answer whatever was asked: places that are none, or a status that does not fit."""
-    if (answer.code == 0) != (not answer.faults) or (answer.code == 0) != (" is right: " in answer.output):
+    if (answer.code == 0) != (not answer.faults) or (answer.code == 0) != (" is valid: " in answer.output):
         return f"exit status {answer.code} with {len(answer.faults)} faults"
     lines = answer.text.splitlines()
     for fault in answer.faults:

@@ -152,7 +152,7 @@ def test_a_break_ends_the_frame_that_is_held(board: Board, transport: Transport)
     with pytest.raises(TransportResetError, match="stops before its end"):
         transport.receive(0.01)
     sender.join()
-    assert refusals == [f"{board.device}: a break ended the frame that was on its way"]
+    assert refusals == [f"{board.device}: a break interrupted a frame"]
 
 
 def test_a_line_that_is_never_silent(board: Board, breaks: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,7 +213,7 @@ def test_a_board_that_goes(board: Board, transport: Transport) -> None:
         ("uart:/dev/none:115200", "cannot open the serial line /dev/none: No such file"),
         ("uart:/dev/null:115200", "/dev/null is no serial line"),
         ("uart:/dev/null:123", "123 is no speed of a serial line"),
-        ("uart:/dev/null:fast", "the baud rate is 'fast', which is no number"),
+        ("uart:/dev/null:fast", "the baud rate is 'fast', which is not a number"),
         ("uart:/dev/null", "the transport is 'uart:/dev/null'; legal: pipe:COMMAND, uart:"),
         ("pipe:", "the transport is 'pipe:'; legal: pipe:COMMAND"),
         ("pipe:'a", "whose command is none: No closing quotation"),

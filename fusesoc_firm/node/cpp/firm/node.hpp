@@ -122,7 +122,7 @@ class Node {
     // Nobody reads the queues any more: who waits for room in them must hear of it.
     queues_.close();
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (is_abandoned_) fault = "the time to stop is over, and not all was sent and received";
+    if (is_abandoned_) fault = "the time limit for stopping is over, but some frames were not sent or received";
     if (fault) log(error_ = *fault);
     has_ended_ = true;
     changed_.notify_all();
