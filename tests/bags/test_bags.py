@@ -115,7 +115,7 @@ def test_messages_go_by_topic_or_type_in_order_of_time(tmp_path: Path, kind: str
 def test_a_damaged_bag(tmp_path: Path, kind: str, share: float) -> None:
     path = write(tmp_path, kind, many(kind, 100))
     cut(path, share)
-    with pytest.raises(InputError, match="is not a bag that can be read"):
+    with pytest.raises(InputError, match="is not a readable bag"):
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", version(kind))])
 
 
@@ -156,7 +156,7 @@ def test_what_is_no_bag(tmp_path: Path, name: str) -> None:
 
 
 def test_a_folder_that_is_no_bag(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is not a bag that can be read"):
+    with pytest.raises(InputError, match="is not a readable bag"):
         read_stimuli(tmp_path, [subscriber("p", "geometry_msgs/Point", ROS1)])
 
 

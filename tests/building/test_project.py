@@ -319,7 +319,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
 def test_what_is_no_lock_file_is_a_fault(project: Path, capsys: Captured, text: str) -> None:
     assert "cannot read" in locked(capsys)[0]
     (project / "top/top.lock").write_text(text)
-    assert "is no lock file" in locked(capsys)[0]
+    assert "is not a lock file" in locked(capsys)[0]
 
 
 def test_what_a_dependency_has_generated_is_locked_too(project: Path, capsys: Captured) -> None:

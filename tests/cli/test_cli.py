@@ -286,7 +286,7 @@ def test_software_is_counted_apart(capsys: Captured) -> None:
 
 @pytest.mark.parametrize("distro", ["noetic", "humble"])
 def test_a_distribution_of_either_version_serves_a_specification(distro: str, capsys: Captured) -> None:
-    assert "is right" in out(capsys, "system", "check", str(SPEC), "--distro", distro)
+    assert "is valid" in out(capsys, "system", "check", str(SPEC), "--distro", distro)
 
 
 def test_the_derived_system_has_the_content_of_the_dissertations_listings(capsys: Captured) -> None:

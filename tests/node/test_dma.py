@@ -266,7 +266,7 @@ def test_a_fault_of_the_engine(root: Path, engine: Engine, bits: int, message: s
 
 def test_an_engine_that_is_none(root: Path, engine: Engine) -> None:
     engine.stop()
-    with pytest.raises(TransportError, match="does not end its reset"):
+    with pytest.raises(TransportError, match="does not leave its reset"):
         DmaTransport(device(root))
 
 

@@ -466,9 +466,9 @@ def test_a_trace_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "picture", "message"),
     [
-        ("trace.csv", "ways.gif", "ways.gif cannot be written: its name"),
+        ("trace.csv", "ways.gif", "cannot write ways.gif: its ending"),
         ("none.csv", "ways.svg", "cannot read "),
-        ("other.csv", "ways.svg", "is no trace of a node"),
+        ("other.csv", "ways.svg", "is not the trace of a node"),
         ("trace.csv", "ways.svg", "has no message that came back"),
         ("broken.csv", "ways.svg", "broken.csv:2 is not a row of a trace"),
         ("good.csv", "no/ways.svg", "/no/ways.svg: there is no folder "),

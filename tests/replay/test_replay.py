@@ -90,7 +90,7 @@ def test_the_name_says_the_form(tmp_path: Path, name: str, form: str | None, fil
 
 def test_a_form_against_the_name(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
-    with pytest.raises(InputError, match="is to be a bag as sqlite3, but ends like one as mcap"):
+    with pytest.raises(InputError, match="is to be sqlite3, but its ending means mcap"):
         run(loaded, bag(tmp_path, "mcap", points("mcap", 1)), Target(tmp_path / "o.mcap", Form.SQLITE3), "echo")
 
 
@@ -112,7 +112,7 @@ def test_a_bag_that_is_there_is_replaced_only_by_force(tmp_path: Path) -> None:
     (target / "notes.txt").touch()
     with pytest.raises(InputError, match=r"is a folder, but not a bag: it holds notes\.txt"):
         run(loaded, source, Target(target, force=True), "echo")
-    with pytest.raises(InputError, match="is what is to be replayed"):
+    with pytest.raises(InputError, match="is the bag to replay"):
         run(loaded, source, Target(source, force=True), "echo")
     assert len(read(source)) == 2
 
@@ -389,7 +389,7 @@ def test_a_bag_that_is_damaged_within(tmp_path: Path, capsys: Captured) -> None:
     source.write_bytes(content)
     with pytest.raises(InputError, match="1 error; 0 of"):
         run(load(specification(tmp_path, passing("p", "geometry_msgs/Point"))), source, tmp_path / "o.bag", "echo")
-    assert "is not a bag that can be read" in capsys.readouterr().err
+    assert "is not a readable bag" in capsys.readouterr().err
     found = read(tmp_path / "o.bag")
     assert 0 < len(found) < len(items)
     assert found == renamed(items[: len(found)], "/p_out")

@@ -111,7 +111,7 @@ def test_a_copied_definition_is_of_no_template(project: Project, capsys: pytest.
     project.origins()
     (path,) = (project.root.parent / "build").rglob("generator_cache/me_msgs_base*/base_msgs/msg/Angle.msg")
     assert main(["why", str(path)]) == 1
-    assert "is of no template\n      = it is a copy of " in capsys.readouterr().err
+    assert "does not come from a template\n      = it is a copy of " in capsys.readouterr().err
 
 
 def test_a_core_that_is_not_depended_on_has_no_messages_here(project: Project) -> None:
@@ -210,4 +210,4 @@ def test_a_specification_names_cores_for_the_build_and_for_commands(
     spec.write_text(SPECIFICATION.replace("me:msgs:arm", "me:msgs:none"))
     capsys.readouterr()
     assert main(["system", "check", str(spec)]) == 1
-    assert f"{spec}:2:9: error: 'me:msgs:none' is no core with messages" in capsys.readouterr().err
+    assert f"{spec}:2:9: error: 'me:msgs:none' is not a known core with messages" in capsys.readouterr().err

@@ -83,9 +83,9 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, options: list[str]) 
         (["--dataset", "cc5"], "unknown data set 'cc5'\n      = did you mean"),
         (["--requesters", "2,257"], "'257' is not a number of accelerators\n      = legal: 1 to 256"),
         (["--requesters", "x"], "'x' is not a number of accelerators"),
-        (["--requesters", ""], "'' is no number of accelerators"),
+        (["--requesters", ""], "'' is not a number of accelerators"),
         (["--requesters", "0"], "'0' is not a number of accelerators"),
-        (["--policies", ""], "there is no policy ''\n      = legal here: edf_latency"),
+        (["--policies", ""], "unknown policy ''\n      = legal here: edf_latency"),
         (["--output", "{file}/below"], "/below: Not a directory"),
         (["--csv", "{file}/values.csv"], "/values.csv: there is no folder "),
     ],
@@ -135,7 +135,7 @@ def test_choose_tells_the_policy_and_why(spec: Path, capsys: Captured) -> None:
     assert out.startswith("scheduler: fixed_priority\n")
     # 5 bytes of header and 28 of payload in beats of 4; 100,000 cycles are 1 ms.
     assert "| slow      | 100000 |             9 |   100000 |" in out
-    assert "priorities, the highest first: fast, slow, third." in out
+    assert "Put the publishers in the order of its priorities: fast, slow, third." in out
 
 
 def test_choose_sees_that_publishers_stand_in_order(spec: Path, capsys: Captured) -> None:

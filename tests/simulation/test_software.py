@@ -136,7 +136,7 @@ def test_what_a_model_says_of_messages_within_hardware_does_not_count(tmp_path: 
         code = "def soft(m):\n    return m\n"
         found = row(tmp_path, *kinds, code=code, model=model, sent=(("sub", point(1.0)),))
         assert [item.publisher.block for item in found.responses] == publishers
-    with pytest.raises(InputError, match="what 'respond' gave to 'b0_in' does not fit: no value for 'x'"):
+    with pytest.raises(InputError, match="'respond' returned an invalid message for 'b0_in': no value for 'x'"):
         row(tmp_path, "hard", model="def respond(block, m):\n    return [('b0_in', {})]\n", sent=TWO)
 
 
@@ -364,7 +364,7 @@ def test_a_model_must_say_what_goes_to_software(tmp_path: Path) -> None:
         ),
         (
             "def soft(m):\n    return [m]\n",
-            "soft.py:1:1: error: for message 0 to 'b0', 'soft' gave [{'x': 1.0",
+            "soft.py:1:1: error: for message 0 to 'b0', 'soft' returned [{'x': 1.0",
         ),
         (
             "\ndef soft(m):\n    return {'x': 1.0, 'y': 0.0}\n",

@@ -125,8 +125,8 @@ def test_a_board_of_spi(tmp_path: Path) -> None:
     ("text", "message"),
     [
         (BOARD.replace("{port: uart_rxd, site: A2}", "{port: led, site: A2}"), "the board has no pin for 'uart_rxd'"),
-        (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' has a pin already"),
-        (BOARD + "  - {port: Clk, site: A4}\n", "port 'Clk' has a pin already"),
+        (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' already has a pin"),
+        (BOARD + "  - {port: Clk, site: A4}\n", "port 'Clk' already has a pin"),
         (BOARD.replace("trellis", "ise"), "'flow' cannot be 'ise'"),
         (BOARD.split("pins:", maxsplit=1)[0], "the board has no pin for 'clk'"),
         (BOARD.replace("uart\n", "axi_stream\n"), "flow 'trellis' has no processor for streams"),
