@@ -340,7 +340,7 @@ def test_a_message_that_is_none_is_reported(tmp_path: Path) -> None:
         run.carrier.give(0, b"short", POINTS[1])
         run.stop()
     assert [payload for _, payload in run.carrier.published] == [point(2.0)]
-    assert "a message from 'sub' is no geometry_msgs/Point" in str(faults[0])
+    assert "a message from 'sub' is not a valid geometry_msgs/Point" in str(faults[0])
 
 
 # --- the trace -------------------------------------------------------------------------------------------------------
@@ -466,7 +466,7 @@ def test_a_trace_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "picture", "message"),
     [
-        ("trace.csv", "ways.gif", "cannot write ways.gif: its ending"),
+        ("trace.csv", "ways.gif", "ways.gif: its ending does not name a format"),
         ("none.csv", "ways.svg", "cannot read "),
         ("other.csv", "ways.svg", "is not the trace of a node"),
         ("trace.csv", "ways.svg", "has no message that came back"),

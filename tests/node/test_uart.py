@@ -206,7 +206,7 @@ def test_closing_wakes_who_waits(board: Board, transport: Transport) -> None:
 
 def test_a_board_that_goes(board: Board, transport: Transport) -> None:
     board.close()
-    with pytest.raises(TransportError, match=r"/dev/pts/\d+ is gone"):
+    with pytest.raises(TransportError, match=r"/dev/pts/\d+ is lost"):
         transport.receive(60)
 
 
