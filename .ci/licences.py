@@ -31,7 +31,7 @@ RUN_TIME = "run time"
 
 # Packages of Debian and what they are called for.
 PROGRAMS: Mapping[str, str] = {
-    "ccache": "keeps what was compiled, in tests",
+    "ccache": "caches compiled files, in tests",
     "g++": "compiles simulated C++ kernels, Verilator's models, nodes in C++",
     "ghdl": "analyses, simulates and translates VHDL",
     "graphviz": "draws diagrams",

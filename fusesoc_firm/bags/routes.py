@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from fusesoc_firm.frame.codec import CodecError, decode
-from fusesoc_firm.message.bags import BAGS, Bag, Stream, open_bag
+from fusesoc_firm.message.bag_reader import BAGS, Bag, Stream, open_bag
 from fusesoc_firm.message.joint import signature_of_text
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName

@@ -15,9 +15,10 @@ from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 
-from fusesoc_firm.message.bags import Form
+from fusesoc_firm.message.bag_reader import Form
 from fusesoc_firm.message.joint import joint_text
-from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.message.model import Definitions
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_parent
 

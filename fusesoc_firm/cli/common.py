@@ -84,7 +84,7 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
 
     Unless it `needs_sources`, those of its accelerators may be missing.
     """
-    from fusesoc_firm.system.beside import load_beside
+    from fusesoc_firm.system.message_sources import load_beside
 
     loaded = load_beside(
         arguments.spec, arguments.path, arguments.distro, needs_sources=needs_sources, core_folders=core_folders

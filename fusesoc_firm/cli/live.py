@@ -53,8 +53,8 @@ def add_live(commands: Any) -> None:
 
 def _live(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.node.description import describe
+    from fusesoc_firm.node.reopening import at_address, of_simulator
     from fusesoc_firm.node.run import run_node, run_options
-    from fusesoc_firm.node.transports import at_address, of_simulator
     from fusesoc_firm.text.outputs import check_output
 
     loaded = load(arguments)
@@ -71,7 +71,7 @@ def _live(arguments: argparse.Namespace) -> None:
 
 
 def _draw_trace(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.node.steps import are_steps
+    from fusesoc_firm.node.cpp_trace import are_steps
     from fusesoc_firm.node.trace_picture import draw_trace
 
     table: Path = arguments.table
@@ -84,8 +84,8 @@ def _draw_trace(arguments: argparse.Namespace) -> None:
 
 def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
     """The table of ways beside one of steps, which is made."""
+    from fusesoc_firm.node.cpp_trace import write_ways
     from fusesoc_firm.node.description import describe
-    from fusesoc_firm.node.steps import write_ways
 
     if not arguments.system:
         fail(

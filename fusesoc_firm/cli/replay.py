@@ -91,7 +91,7 @@ def _seconds(text: str) -> float:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.message.bags import Form
+    from fusesoc_firm.message.bag_reader import Form
     from fusesoc_firm.node.transport.simulator import Simulator
     from fusesoc_firm.replay.command import Settings, Source, Target, replay
 

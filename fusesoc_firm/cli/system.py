@@ -135,7 +135,7 @@ def _show_system(arguments: argparse.Namespace) -> None:
 
 
 def _new_system(arguments: argparse.Namespace) -> None:
-    from fusesoc_firm.system.beside import known_names, sources_of
+    from fusesoc_firm.system.message_sources import known_names, sources_of
     from fusesoc_firm.system.scaffold.wizard import extend_specification
     from fusesoc_firm.text.prompts import asker
 

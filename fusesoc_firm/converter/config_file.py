@@ -29,8 +29,8 @@ class Project(Section):
     """What holds for all messages."""
 
     name: Text = key("the project's name", is_required=True)
-    platform: Platform | None = key("the target hardware; for information only", form="section", section=Platform)
-    width: int = key("the streams' width in bits", form="integer", choices=WIDTHS, default=8)
+    platform: Platform | None = key("the target hardware", form="section", section=Platform)
+    width: int = key("bits of the streams", form="integer", choices=WIDTHS, default=8)
     prefix: Text | None = key("prefix of the names of all generated units except the interfaces, such as left")
 
 
@@ -38,7 +38,7 @@ class Project(Section):
 class MessageInterfaces(Section):
     """A message and the converters that are wanted of it."""
 
-    type: Text = key("the message's middleware", is_required=True, choices=tuple(MIDDLEWARES))
+    type: Text = key("the middleware that defines the message", is_required=True, choices=tuple(MIDDLEWARES))
     name: Text = key("the message's type, such as sensor_msgs/Image", is_required=True)
     subscribers: tuple[Text, ...] = key("names of converters from frames to the message", form="texts")
     publishers: tuple[Text, ...] = key("names of converters from the message to frames", form="texts")
@@ -48,7 +48,7 @@ class MessageInterfaces(Section):
 class ConfigFile(Section):
     """The whole file."""
 
-    project: Project = key("settings for all messages", form="section", section=Project, is_required=True)
+    project: Project = key("settings of all messages", form="section", section=Project, is_required=True)
     messages: tuple[MessageInterfaces, ...] = key(
         "the messages and their interfaces", form="sections", section=MessageInterfaces, is_required=True
     )

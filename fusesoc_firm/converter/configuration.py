@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 from fusesoc_firm.converter.limits import check_fixed_size
 from fusesoc_firm.converter.ports import field_ports
@@ -20,8 +19,7 @@ from fusesoc_firm.frame.defaults import default_payload
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES, Frame
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.naming import entity_name, prefixed
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 SUBSCRIBER_TEMPLATE = "vhdl/subscriber.vhd"
 PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
@@ -44,7 +42,7 @@ def publisher_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
     return prefixed(prefix, f"{entity_name(frame.message.package, frame.message.name)}_to_axis{suffix}")
 
 
-def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Configuration:
+def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Context:
     """The configuration of `entity`, or else `subscriber_entity`, for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
@@ -67,7 +65,7 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Conf
     }
 
 
-def _states(last_position: int) -> Configuration:
+def _states(last_position: int) -> Context:
     """The values of the position that are no beats: as few highest bits as can tell them are ones.
 
     Below these, bit 2 tells whether the frame has ended, bits 1 and 0 hold a code.
@@ -85,7 +83,7 @@ def _states(last_position: int) -> Configuration:
     }
 
 
-def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Configuration:
+def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Context:
     """The configuration of `entity`, or else `publisher_entity`, for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
@@ -131,7 +129,7 @@ def _check_size(frame: Frame) -> None:
         )
 
 
-def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Configuration:
+def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Context:
     return {
         "entity": entity,
         "message": str(frame.message),
@@ -146,7 +144,7 @@ def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Config
     }
 
 
-def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
+def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
     """The beats that carry the length, and for each legal length the bytes that it has there.
 
     Legal are the payload's own length and, where writers append bytes, a few more. Bit k of `match` is high as long as
@@ -167,7 +165,7 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Configuration]:
     ]
 
 
-def _length_checks(length: int, beat: int, stream: Stream) -> list[Configuration]:
+def _length_checks(length: int, beat: int, stream: Stream) -> list[Context]:
     """The bytes of a length on a beat; any that is there and another one rules the length out."""
     return [
         _byte_check(stream, stream.length_start + index, byte)
@@ -180,7 +178,7 @@ def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
     return [(stream.payload_start + index, frame.prefix[index]) for index in range(frame.checked_prefix)]
 
 
-def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
+def _byte_check(stream: Stream, byte: int, value: int) -> Context:
     """That a byte of the stream has a value; it is there if its lane is kept."""
     lane = stream.lane(byte)
     return {
@@ -192,7 +190,7 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Configuration:
     }
 
 
-def _end(stream: Stream, last_byte: int, number: int | None) -> Configuration:
+def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
     """Where a frame ends, of which bit `number` of `match` tells the length; None if there is but one length."""
     lane = stream.lane(last_byte)
     return {
@@ -203,14 +201,14 @@ def _end(stream: Stream, last_byte: int, number: int | None) -> Configuration:
     }
 
 
-def _field_slices(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Configuration]:
+def _field_slices(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Context]:
     """Every piece of a port that lies in one piece in a store."""
     places, registers = StoreMap(stream, stores), [f"fields{suffix}_r" for suffix in store_names(stores)]
     slices = (piece for port in field_ports(frame) for piece in slices_of(port))
     return [stored for piece in slices for stored in stored_slices(piece, places, registers)]
 
 
-def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Configuration]:
+def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Context]:
     """The parts of a frame behind its id, and the value of each: bits are counted from `start` bytes before the frame.
 
     These are header, constant bytes, fields, and zeros up to `size` bytes.

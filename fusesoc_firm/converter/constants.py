@@ -15,8 +15,8 @@ from typing import Any
 from fusesoc_firm.converter.vhdl import vhdl_type, wrapped
 from fusesoc_firm.frame.model import COUNT_BYTES
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import Constant, MessageName, StringType, nested_message
-from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.message.model import Constant, Definitions, MessageName, StringType, nested_message
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER
 from fusesoc_firm.text.naming import distinct_constants, entity_name, prefixed
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import (
     CONSTANTS_TEMPLATE,
     constants_configuration,
@@ -20,10 +20,9 @@ from fusesoc_firm.converter.sources import ConverterSource, publisher_source, su
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, LoadedRequest, Request
-from fusesoc_firm.text.render import render
+from fusesoc_firm.text.render import Context, render
 
 VHDL = "vhdlSource-93"
 
@@ -72,7 +71,7 @@ def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix:
 
 def constants_configurations(
     messages: Sequence[tuple[MessageName, Definitions]], prefix: str = ""
-) -> Iterator[tuple[str, Configuration]]:
+) -> Iterator[tuple[str, Context]]:
     """The file of each message's package, and what it is rendered from."""
     counts = Counter(name for name, _ in messages)
     for name, definitions in messages:

@@ -17,9 +17,9 @@ from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.frame.select import Paths, select
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
-from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.message.parser import parse_full_name, parse_name
-from fusesoc_firm.message.signature import Definitions, signature
+from fusesoc_firm.message.signature import signature
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from fusesoc_firm.converter.message_ports import LENGTH_BITS, message_side
 from fusesoc_firm.converter.ports import ros_path
@@ -18,8 +17,7 @@ from fusesoc_firm.converter.vhdl import bits
 from fusesoc_firm.frame.length import Align, Bytes, Repeat, Term, sent_length_of
 from fusesoc_firm.frame.model import Data, Frame, Loop, Path
 from fusesoc_firm.text.naming import entity_name
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 LENGTH_TEMPLATE = "vhdl/payload_length.vhd"
 
@@ -63,7 +61,7 @@ def length_ports(frame: Frame) -> tuple[str, ...]:
     return tuple(side.length(part) for part in _counted_parts(sent_length_of(frame).terms))
 
 
-def payload_length_configuration(frame: Frame, suffix: str = "") -> Configuration:
+def payload_length_configuration(frame: Frame, suffix: str = "") -> Context:
     """The configuration of `<pkg>_<type>_length`, of a frame whose length is computed."""
     length = sent_length_of(frame)
     assert length.is_computed, f"the lengths at the ports of {frame.message} do not determine its payload's"

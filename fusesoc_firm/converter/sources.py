@@ -10,7 +10,6 @@ from typing import NamedTuple
 from fusesoc_firm.converter.configuration import (
     PUBLISHER_TEMPLATE,
     SUBSCRIBER_TEMPLATE,
-    Configuration,
     check_width,
     publisher_configuration,
     publisher_entity,
@@ -18,13 +17,14 @@ from fusesoc_firm.converter.configuration import (
     subscriber_entity,
 )
 from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.text.render import Context
 
 
 class ConverterSource(NamedTuple):
     """What a converter's text is rendered from."""
 
     template: str
-    configuration: Configuration
+    configuration: Context
 
 
 def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:

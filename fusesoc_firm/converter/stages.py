@@ -12,10 +12,9 @@ from fusesoc_firm.text.yaml_text import yaml_dump
 
 if TYPE_CHECKING:
     from fusesoc_firm.converter.sources import ConverterSource
-    from fusesoc_firm.message.derived import Interface
     from fusesoc_firm.message.library import MessageLibrary
-    from fusesoc_firm.message.model import MessageName
-    from fusesoc_firm.message.signature import Definitions
+    from fusesoc_firm.message.model import Definitions, MessageName
+    from fusesoc_firm.message.services import Interface
 
 
 def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from fusesoc_firm.converter.program import (
     Block,
@@ -19,8 +18,7 @@ from fusesoc_firm.converter.program import (
     has_bytes,
 )
 from fusesoc_firm.frame.model import COUNT_BYTES, LENGTH_BYTES, Data, Loop
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 _DIGITS_IN_A_ROW = 64
 _NUMBERS_IN_A_ROW = 16
@@ -114,7 +112,7 @@ _ALWAYS_THERE = 2
 SET_NAMES = frozenset(f"step_{name}".lower() for name, _, _ in _SETS)
 
 
-def step_sets(steps: Sequence[Step]) -> list[Configuration]:
+def step_sets(steps: Sequence[Step]) -> list[Context]:
     """The sets as rows of digits, a digit a step."""
     found = []
     for number, (name, about, is_in) in enumerate(_SETS):

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
-from typing import Any
 
 from fusesoc_firm.converter.slices import Slice
 from fusesoc_firm.converter.stream import Store, StoreMap, ranges
 from fusesoc_firm.converter.vhdl import bits, within
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 # A table takes less logic (45 LUTs and 1.3 a window, where comparisons take 40 and 2.3 at 8 bits) if there are more
 # windows, and more beats: the windows among few beats are a small function of the counter.
@@ -38,9 +36,9 @@ def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
     return used if len(parts) == 1 else f"{used} and {is_beat(store.beats[0], store.beats[-1])}"
 
 
-def store_configuration(stores: Sequence[Store]) -> Configuration:
+def store_configuration(stores: Sequence[Store]) -> Context:
     """What the partials need for `stores` as `stores_of` gives them."""
-    tables: list[Configuration] = []
+    tables: list[Context] = []
     enables: list[list[str]] = []
     for _, group in groupby(stores, lambda store: store.lanes):
         parts = list(group)
@@ -75,7 +73,7 @@ def store_data(register: str, store: Store, source: str) -> list[str]:
     return data if len(store.beats) == 1 else [*data, bits(register, store.bits - 1, store.beat_bits)]
 
 
-def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> Iterator[Configuration]:
+def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> Iterator[Context]:
     """The parts of a port's piece that lie in one piece in a store, for the partial `stored_field`."""
     low = piece.low
     for stored in places.pieces(piece.offset, piece.bytes):
@@ -91,7 +89,7 @@ def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> I
         low += 8 * stored.count
 
 
-def _table(windows: Sequence[tuple[int, int]]) -> Configuration:
+def _table(windows: Sequence[tuple[int, int]]) -> Context:
     """The table of the beats behind which a window begins or ends, and the pointer to the next of them."""
     turns = [beat for first, last in windows for beat in (first - 1, last)]
     # A window that begins at once is open from the start.

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby
 from textwrap import shorten
-from typing import Any
 
 from fusesoc_firm.converter.message_ports import (
     MessageSide,
@@ -41,8 +40,7 @@ from fusesoc_firm.converter.steps import terminator_of
 from fusesoc_firm.converter.vhdl import LINE, any_of, binary, bits_of_bool, hexadecimal, within
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, LENGTH_BYTES, Data, Frame, FrameField, Loop
 from fusesoc_firm.text.diagnostics import fail
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 VARIABLE_PUBLISHER_TEMPLATE = "vhdl/variable_publisher.vhd"
 
@@ -54,7 +52,7 @@ _ZEROS = "(others => '0')"
 _TRUE = "'1'"
 
 
-def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> Configuration:
+def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> Context:
     """The configuration of `<pkg>_<type>_to_axis` for a stream of `width` bits."""
     places = Places(publisher_program(frame), width // 8)
     if (places.end + 1) * width > _LARGEST_NATURAL:
@@ -79,7 +77,7 @@ class _Publisher:
     def lanes(self) -> int:
         return self.places.lanes
 
-    def configuration(self) -> Configuration:
+    def configuration(self) -> Context:
         end = self.places.end
         return {
             "message": str(self.frame.message),
@@ -119,7 +117,7 @@ class _Publisher:
         """Bytes of the length in the first word."""
         return min(LENGTH_BYTES, self.lanes - ID_BYTES)
 
-    def _pieces(self) -> Iterator[Configuration]:
+    def _pieces(self) -> Iterator[Context]:
         """The bits of all words behind the header, and the value of each, in order."""
         cursor = 8 * (ID_BYTES + LENGTH_BYTES)
         total = (self.places.end + 1) * self.width
@@ -163,7 +161,7 @@ class _Publisher:
 
     # --- what a place waits for, and how many bytes it has ------------------------------------------------------
 
-    def _supplies(self) -> Iterator[tuple[int, Configuration]]:
+    def _supplies(self) -> Iterator[tuple[int, Context]]:
         """(last place, what the places up to it wait for): an input, and the end of an element if both end here."""
         yield 0, {"signal": "segment_valid(0)", "element": ""}
         for area in self.places.areas:
@@ -195,7 +193,7 @@ class _Publisher:
         ports = self.side.element(segment.scope[-1])
         return ports.valid if ports.segments is None else f"{ports.segment_valid}({segment.number})"
 
-    def _sizes(self) -> Iterator[tuple[int, Configuration]]:
+    def _sizes(self) -> Iterator[tuple[int, Context]]:
         """(last place, bytes of each of the places up to it); a stream and padding know their own."""
         for area in self.places.areas:
             if isinstance(area.step, Stream | Padding):
@@ -207,10 +205,10 @@ class _Publisher:
             if rest or not size:
                 yield area.last, self._size(rest)
 
-    def _size(self, count: int) -> Configuration:
+    def _size(self, count: int) -> Context:
         return {"size": binary(count, self.lanes.bit_length())}
 
-    def _repeats(self) -> Configuration:
+    def _repeats(self) -> Context:
         rows = [row for area in self.places.areas for row in area.rows if row.times > 1]
         return {
             "repeats": [{"place": row.place, "last": row.times - 1} for row in rows],
@@ -225,7 +223,7 @@ class _Publisher:
         areas = self.places.areas_of(Stream)
         return [(area, self.side.stream(area.step.part)) for area in areas if isinstance(area.step, Stream)]
 
-    def _stream_keys(self) -> Configuration:
+    def _stream_keys(self) -> Context:
         extra_bits = max((_shift(port.part) for _, port in self._streams), default=0)
         return {
             "streams": [{"name": port.name, "place": area.first} for area, port in self._streams],
@@ -247,7 +245,7 @@ class _Publisher:
     def _opens(self) -> list[Area]:
         return self.places.areas_of(Open, Guard)
 
-    def _opening_keys(self) -> Configuration:
+    def _opening_keys(self) -> Context:
         data = [(area.first, part) for area in self._opens if isinstance(part := _part(area), Data)]
         jumps = [*map(self._opening_jump, self._opens), *map(self._closing_jump, self._closings)]
         return {
@@ -261,7 +259,7 @@ class _Publisher:
             "targets": _by_place((place, {"target": target}) for place, target in self.places.jumps),
         }
 
-    def _opening_jump(self, area: Area) -> Configuration:
+    def _opening_jump(self, area: Area) -> Context:
         """Past a part without elements; an array of fixed size has some."""
         part = _part(area)
         is_array = isinstance(part, Loop) and part.count is None
@@ -273,7 +271,7 @@ class _Publisher:
             "is_closing": False,
         }
 
-    def _closing_jump(self, closing: tuple[Close, int]) -> Configuration:
+    def _closing_jump(self, closing: tuple[Close, int]) -> Context:
         """Back to the next element."""
         return {
             "place": closing[1],
@@ -289,7 +287,7 @@ class _Publisher:
     def _closings(self) -> Sequence[tuple[Close, int]]:
         return self.places.closings
 
-    def _loop_keys(self) -> Configuration:
+    def _loop_keys(self) -> Context:
         return {
             "closings": [
                 {"name": self.side.element(close.loop).name, "place": place} for close, place in self._closings
@@ -316,10 +314,10 @@ class _Publisher:
             bits[depth] = max(bits.get(depth, 0), _COUNTER_BITS if count is None else count.bit_length())
         return bits
 
-    def _counter(self, depth: int) -> Configuration:
+    def _counter(self, depth: int) -> Context:
         return {"depth": depth, "bits": self._bits_of_depths[depth]}
 
-    def _depth(self, depth: int) -> Configuration:
+    def _depth(self, depth: int) -> Context:
         bits = self._bits_of_depths[depth]
         own = {id(close.loop) for close, _ in self._closings if len(close.scope) == depth}
         opens = [
@@ -341,7 +339,7 @@ class _Publisher:
 
     # --- padding ------------------------------------------------------------------------------------------------
 
-    def _padding_keys(self) -> Configuration:
+    def _padding_keys(self) -> Context:
         steps = ((area.first, area.step) for area in self.places.areas)
         found = [(place, _log2(step.alignment)) for place, step in steps if isinstance(step, Padding)]
         bits = max((own for _, own in found), default=1)
@@ -383,7 +381,7 @@ def _constants(block: Block) -> Iterator[tuple[int, int, str]]:
 # --- by place --------------------------------------------------------------------------------------------------------
 
 
-def _by_place(choices: Iterable[tuple[int, Configuration]]) -> list[Configuration]:
+def _by_place(choices: Iterable[tuple[int, Context]]) -> list[Context]:
     """What holds up to a last place each, in order; neighbours that are alike share one."""
     return [{**value, "last": list(group)[-1][0]} for value, group in groupby(choices, key=lambda choice: choice[1])]
 
@@ -401,7 +399,7 @@ def _any_area(areas: Iterable[Area]) -> str:
 # --- the list of places ----------------------------------------------------------------------------------------------
 
 
-def _listed(places: Places) -> list[Configuration]:
+def _listed(places: Places) -> list[Context]:
     """The places for the list in front of the architecture."""
     return [
         {"first": area.first, "last": area.last if area.last > area.first else None, "text": _about(area)}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 from fusesoc_firm.converter.message_ports import (
     ElementPorts,
@@ -49,8 +48,7 @@ from fusesoc_firm.converter.stream import Stream as Lanes
 from fusesoc_firm.converter.vhdl import hexadecimal, within
 from fusesoc_firm.frame.model import COUNT_BYTES, ID_BYTES, Data, Frame, Loop, Path
 from fusesoc_firm.frame.values import dotted
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 VARIABLE_SUBSCRIBER_TEMPLATE = "vhdl/variable_subscriber.vhd"
 
@@ -66,7 +64,7 @@ class _Window(Lanes):
         return 0
 
 
-def variable_subscriber_configuration(frame: Frame, width: int, entity: str) -> Configuration:
+def variable_subscriber_configuration(frame: Frame, width: int, entity: str) -> Context:
     """The configuration of `axis_to_<pkg>_<type>` for a stream of `width` bits."""
     made = _Subscriber(subscriber_program(frame), message_side(frame), _Window(width))
     return {"entity": entity, **made.configuration()}
@@ -90,7 +88,7 @@ class _Subscriber:
     def frame(self) -> Frame:
         return self.program.frame
 
-    def configuration(self) -> Configuration:
+    def configuration(self) -> Context:
         return {
             "message": str(self.frame.message),
             "middleware": self.frame.ros.title,
@@ -130,7 +128,7 @@ class _Subscriber:
 
     # --- steps --------------------------------------------------------------------------------------------------
 
-    def _tables(self) -> Configuration:
+    def _tables(self) -> Context:
         """The steps as lists and tables by their numbers."""
         sizes = [fixed_size(step) for step in self.steps]
         last_beats = [max(0, -(-size // self.lanes) - 1) for size in sizes]
@@ -144,7 +142,7 @@ class _Subscriber:
             "last_bytes": number_rows(last_bytes),
         }
 
-    def _kinds(self) -> Configuration:
+    def _kinds(self) -> Context:
         """Which kinds of steps there are, and what of those is to be told apart."""
         sizes = {element_size(step) for step in self.steps}
         alignments = {alignment_of(step) for step in self.steps}
@@ -170,12 +168,12 @@ class _Subscriber:
             ],
         }
 
-    def _checks(self) -> Configuration:
+    def _checks(self) -> Context:
         """What must be on the wire."""
         prefix = self.frame.prefix[: self.frame.checked_prefix]
         beats = [prefix[first : first + self.lanes] for first in range(0, len(prefix), self.lanes)]
         has_zeros = any(map(closes_text, self.steps))
-        counts: list[Configuration] = [{"bound": None}] if any(map(is_text, self.steps)) else []
+        counts: list[Context] = [{"bound": None}] if any(map(is_text, self.steps)) else []
         counts += [
             {"bound": {"step": place, "most": most}}
             for place, step in enumerate(self.steps)
@@ -193,7 +191,7 @@ class _Subscriber:
             "is_count_checked": bool(counts) or has_zeros,
         }
 
-    def _opened(self, place: int, step: Step) -> Iterator[Configuration]:
+    def _opened(self, place: int, step: Step) -> Iterator[Context]:
         """The registers of a part that is opened: of its length, and of how many elements are left."""
         if not isinstance(step, Open):
             return
@@ -207,7 +205,7 @@ class _Subscriber:
                 "count": step.part.count if isinstance(step.part, Loop) else None,
             }
 
-    def _loop(self, place: int) -> Configuration:
+    def _loop(self, place: int) -> Context:
         """An element ends with its last bytes; if a part at its end is empty, or an array, in a cycle of its own."""
         step = self.steps[place]
         assert isinstance(step, Close)
@@ -219,7 +217,7 @@ class _Subscriber:
             "is_used": step.loop.path in self._element_paths,
         }
 
-    def _jumps(self, place: int) -> Iterator[Configuration]:
+    def _jumps(self, place: int) -> Iterator[Context]:
         """Where a step leads elsewhere than to the next one: past a part that is empty, and at an element's end."""
         match self.steps[place]:
             case Guard():
@@ -232,7 +230,7 @@ class _Subscriber:
 
     # --- ports --------------------------------------------------------------------------------------------------
 
-    def _part(self, part: FieldPort | StreamPorts | ElementPorts) -> Iterator[Configuration]:
+    def _part(self, part: FieldPort | StreamPorts | ElementPorts) -> Iterator[Context]:
         """The lengths and elements at the message side, and the numbers of their registers."""
         if isinstance(part, StreamPorts):
             yield {"name": part.name, "number": self._number(part.part), "has_length": True, "element": None}
@@ -244,10 +242,10 @@ class _Subscriber:
                 "element": self._element(part) if self._is_closed(part.loop) else None,
             }
 
-    def _element(self, ports: ElementPorts) -> Configuration:
+    def _element(self, ports: ElementPorts) -> Context:
         return {"name": ports.name, "number": self._number(ports.loop), "segments": ports.segments}
 
-    def _streams(self) -> list[Configuration]:
+    def _streams(self) -> list[Context]:
         """Every stream that somebody takes; the bytes of others are dropped."""
         streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, Stream)]
         return [{"name": self.side.stream(part).name, "step": place} for place, part in streams if part.is_used]
@@ -266,7 +264,7 @@ class _Subscriber:
                 found.append((place, step, named))
         return found
 
-    def _field_slices(self, block: Block, named: Sequence[tuple[str, Store]]) -> Iterator[Configuration]:
+    def _field_slices(self, block: Block, named: Sequence[tuple[str, Store]]) -> Iterator[Context]:
         """The bits of ports, and where they are in the stores."""
         places = StoreMap(self.window, [store for _, store in named])
         names = [name for name, _ in named]
@@ -317,12 +315,12 @@ class _Subscriber:
 _JUMPS = ("is_guard", "is_open", "is_last_element", "is_element")
 
 
-def _jump(kind: str, place: int, target: int, number: int | None = None) -> Configuration:
+def _jump(kind: str, place: int, target: int, number: int | None = None) -> Context:
     """A jump of one of these kinds; `number` is that of a loop."""
     return {"step": place, "target": target, "number": number, **{name: name == kind for name in _JUMPS}}
 
 
-def _store(place: int, block: Block, name: str, store: Store, lanes: int) -> Configuration:
+def _store(place: int, block: Block, name: str, store: Store, lanes: int) -> Context:
     """A register, and the beats of a block in which it takes lanes of the window."""
     beats = ranges(store.beats)
     is_always = beats == [(0, -(-block.size // lanes) - 1)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from fusesoc_firm.frame.model import (
@@ -24,6 +23,7 @@ from fusesoc_firm.frame.position import Position
 from fusesoc_firm.message.model import (
     ArrayType,
     DefaultValue,
+    Definitions,
     ElementType,
     Field,
     FieldType,
@@ -35,8 +35,6 @@ from fusesoc_firm.message.model import (
     StringType,
 )
 from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER, WireRules, WireType
-
-Definitions = Mapping[MessageName, MessageDefinition]
 
 
 def frame_of(name: MessageName, definitions: Definitions) -> Frame:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import Fixed, Frame, Pad, all_nodes
-from fusesoc_firm.message.model import ArrayType, MessageDefinition, MessageName, MessageType, SequenceType
+from fusesoc_firm.message.model import ArrayType, Definitions, MessageDefinition, MessageName, MessageType, SequenceType
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Row:
     offset: int | None = None
 
 
-def rows(name: MessageName, definitions: Mapping[MessageName, MessageDefinition], frame: Frame) -> Iterator[Row]:
+def rows(name: MessageName, definitions: Definitions, frame: Frame) -> Iterator[Row]:
     """The rows of a message, outer ones first."""
     is_fixed = frame.is_fixed_size
     title = f"{frame.ros.title}"
@@ -69,7 +69,7 @@ def _leaves(frame: Frame) -> list[_Leaf]:
 
 def _fields(
     definition: MessageDefinition,
-    definitions: Mapping[MessageName, MessageDefinition],
+    definitions: Definitions,
     path: tuple[str, ...],
     leaves: list[_Leaf],
 ) -> Iterator[Row]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     FieldType,
     MessageDefinition,
     MessageName,
@@ -65,9 +66,7 @@ _BOUNDS = {
 }
 
 
-def check_extents(
-    definitions: Mapping[MessageName, MessageDefinition], known: MutableMapping[MessageName, Extent]
-) -> None:
+def check_extents(definitions: Definitions, known: MutableMapping[MessageName, Extent]) -> None:
     """Raise `InputError` for the first message that is too large, at the field that makes it so.
 
     `definitions` have each message behind those that it holds. `known` are messages that were checked before; these

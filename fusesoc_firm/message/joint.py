@@ -6,12 +6,12 @@ The definitions are parted by lines of 80 `=`; all but the first begin with `MSG
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from graphlib import CycleError, TopologicalSorter
 
 from fusesoc_firm.message.bounds import check_extents
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import MessageDefinition, MessageName, nested_message
+from fusesoc_firm.message.model import Definitions, MessageName, nested_message
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.message.printer import to_text
 from fusesoc_firm.message.signature import signature
@@ -21,7 +21,7 @@ _LINE = "=" * 80
 _PARTING = re.compile(rf"^{_LINE}\s*\n\s*MSG:\s*(\S+)\s*?\n", re.MULTILINE)
 
 
-def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> str:
+def joint_text(name: MessageName, definitions: Definitions) -> str:
     """The text of a message and, behind it, of all others of `definitions`."""
     others = [definition for other, definition in definitions.items() if other != name]
     parts = [to_text(definitions[name]), *(f"MSG: {item.name}\n{to_text(item)}" for item in reversed(others))]
@@ -49,7 +49,7 @@ def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | No
         return None
 
 
-def _inner_first(definitions: Mapping[MessageName, MessageDefinition]) -> Iterable[MessageName]:
+def _inner_first(definitions: Definitions) -> Iterable[MessageName]:
     """The names, each behind those that its message holds. Raises `CycleError`."""
     within = {
         name: [nested for field in definition.fields if (nested := nested_message(field.type))]

@@ -16,11 +16,11 @@ from pathlib import Path
 
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.bounds import MOST_FILE_BYTES, MOST_LEVELS, Extent, check_extents
-from fusesoc_firm.message.derived import EVENT_INFO, Interface
 from fusesoc_firm.message.folders import InterfaceFiles, interface_files
 from fusesoc_firm.message.middleware import Middleware, known_suffixes, middlewares
 from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName, nested_message
 from fusesoc_firm.message.printer import to_text
+from fusesoc_firm.message.services import EVENT_INFO, Interface
 from fusesoc_firm.message.unsupported import unsupported_word
 from fusesoc_firm.store.reads import Input, Part
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
@@ -186,7 +186,7 @@ class MessageLibrary:
     def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> dict[MessageName, _Source]:
         """What a bag defines; a path that is none must give another library something."""
         # Imported for bags alone, as rosbags' readers take a while.
-        from fusesoc_firm.message.bags import definitions_in, is_bag
+        from fusesoc_firm.message.bag_reader import definitions_in, is_bag
 
         if not is_bag(path):
             _check_folder(path, source, faults)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from fusesoc_firm.message.dialect import Dialect
-from fusesoc_firm.message.model import InterfaceKind, MessageDefinition, MessageName
+from fusesoc_firm.message.model import Definitions, InterfaceKind, MessageDefinition, MessageName
 from fusesoc_firm.message.wire import WireRules
 from fusesoc_firm.text.diagnostics import Diagnostics
 
@@ -48,7 +48,7 @@ class Signature(Protocol):
     def __call__(
         self,
         name: MessageName,
-        definitions: Mapping[MessageName, MessageDefinition],
+        definitions: Definitions,
         kind: InterfaceKind = InterfaceKind.MESSAGE,
     ) -> str:
         """The signature of a message, or of a service or action; `definitions` hold all within it."""

@@ -6,6 +6,7 @@ frozen, so a definition can be a dictionary key and can be shared.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -142,3 +143,7 @@ class MessageDefinition:
     constants: tuple[Constant, ...]
     source: SourceRef
     kind: InterfaceKind = InterfaceKind.MESSAGE
+
+
+Definitions = Mapping[MessageName, MessageDefinition]
+"""A message and all within it, by their names."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import Constant, DefaultValue, MessageDefinition, MessageName, Scalar
+from fusesoc_firm.message.model import Constant, DefaultValue, Definitions, MessageDefinition, MessageName, Scalar
 
 # What parts a message's text from those of the messages within it, in ROS' bags and connection headers.
 _SEPARATOR = "=" * 80
@@ -27,7 +27,7 @@ def to_text(definition: MessageDefinition, signature: str = "") -> str:
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
 
 
-def closure_text(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> str:
+def closure_text(name: MessageName, definitions: Definitions) -> str:
     """The texts of a message and of all others in `definitions`, as ROS' bags and connection headers join them."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{to_text(definitions[other])}" for other in definitions if other != name]
     return "".join([to_text(definitions[name]), *others])

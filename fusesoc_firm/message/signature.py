@@ -16,9 +16,9 @@ from typing import Any
 
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     FieldType,
     InterfaceKind,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,
@@ -26,8 +26,6 @@ from fusesoc_firm.message.model import (
     StringType,
     nested_message,
 )
-
-Definitions = Mapping[MessageName, MessageDefinition]
 
 # type_description_interfaces/FieldType. `char` is rosidl_adapter's: it makes an IDL's uint8 of it, never a char.
 _TYPE_IDS = {

@@ -1,56 +1,46 @@
 """Corrects what GHDL 2.0 synthesises wrongly, as far as a netlist and its sources show what was meant.
 
 * A rotation by as many places as there are bits, or by more, gives zeros: it is made of two shifts.
-* A comparison with a number that the vector cannot hold is one with that number's lowest bits.
-* `integer - signed` is `signed - integer`.
-* `resize` of a signed number to fewer bits drops the sign, which numeric_std keeps.
+* A comparison of a vector that our functions (`sources.py`) lengthen with a constant is as wide as the vector.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from operator import eq, ge, gt, le, lt, ne
 
-from fusesoc_firm.netlist.model import Instance, Modules
+from fusesoc_firm.netlist.model import Instance, Modules, Net
 from fusesoc_firm.netlist.verilog import constant
 
-_COMPARISONS: Mapping[str, Callable[[int, int], bool]] = {
-    "$eq": eq,
-    "$ne": ne,
-    "$ult": lt,
-    "$ule": le,
-    "$ugt": gt,
-    "$uge": ge,
-    "$slt": lt,
-    "$sle": le,
-    "$sgt": gt,
-    "$sge": ge,
+_SIGNED, _UNSIGNED = {"$sextend"}, {"$uextend"}
+# What a comparison says of numbers, and how a vector can be lengthened before.
+_COMPARISONS: Mapping[str, tuple[Callable[[int, int], bool], set[str]]] = {
+    "$eq": (eq, _SIGNED | _UNSIGNED),
+    "$ne": (ne, _SIGNED | _UNSIGNED),
+    "$ult": (lt, _UNSIGNED),
+    "$ule": (le, _UNSIGNED),
+    "$ugt": (gt, _UNSIGNED),
+    "$uge": (ge, _UNSIGNED),
+    "$slt": (lt, _SIGNED),
+    "$sle": (le, _SIGNED),
+    "$sgt": (gt, _SIGNED),
+    "$sge": (ge, _SIGNED),
 }
 _SHIFTS = {("$lsl", "$lsr"): "$rol", ("$lsr", "$lsl"): "$ror"}
 
 
-def places_of(modules: Modules, kind: str) -> set[str]:
-    """The places in the VHDL, `file:line:column`, of the gates of a kind."""
-    return {gate.location for module in modules.values() for gate in module.instances if gate.kind == kind} - {""}
-
-
-def correct(modules: Modules, swapped: Collection[str], resized: Collection[str]) -> None:
-    """Correct a netlist in place.
-
-    `swapped` are the places of each `integer - signed`, `resized` those of the calls of `resize`.
-    """
+def correct(modules: Modules) -> None:
+    """Correct a netlist in place."""
     for module in modules.values():
         drivers = {net.number: gate for gate in module.instances for net in gate.outputs}
+        made: list[Instance] = []
         for gate in module.instances:
             if gate.kind == "$or":
                 _correct_rotation(gate, drivers)
             elif gate.kind in _COMPARISONS:
-                _correct_comparison(gate, drivers)
-            elif gate.kind == "$sub" and gate.location in swapped:
-                gate.inputs.reverse()
-            elif gate.kind == "$strunc" and gate.location in resized:
-                gate.kind = "$sresize"
+                made += filter(None, [_correct_comparison(gate, drivers)])
+        module.instances += made
 
 
 def doubts(modules: Modules) -> list[str]:
@@ -102,29 +92,28 @@ def _correct_rotation(gate: Instance, drivers: Mapping[int, Instance]) -> None:
             gate.kind, gate.inputs = kind, list(one.inputs)
 
 
-def _correct_comparison(gate: Instance, drivers: Mapping[int, Instance]) -> None:
-    """A number that the other side cannot be decides at once."""
+def _correct_comparison(gate: Instance, drivers: dict[int, Instance]) -> Instance | None:
+    """Of a lengthened vector and a number: a comparison of the vector, with the new constant, or what it always is."""
     for index in (0, 1):
-        number, other = _driver(gate, index, drivers), gate.inputs[1 - index]
-        if number and other and other.width and (value := _number(number)) is not None:
-            is_signed = number.kind == "$const_SB32"
+        number, lengthened = _driver(gate, index, drivers), _driver(gate, 1 - index, drivers)
+        bits = constant(number) if number else None
+        if bits and lengthened and lengthened.kind in _COMPARISONS[gate.kind][1] and not set(bits) - {"0", "1"}:
+            vector = lengthened.input(0)
+            is_signed = lengthened.kind == "$sextend"
+            value = int(bits, 2) - (int(bits[0]) << len(bits) if is_signed else 0)
             low, high = (
-                (-(1 << other.width - 1), (1 << other.width - 1) - 1) if is_signed else (0, (1 << other.width) - 1)
+                (-(1 << vector.width - 1), (1 << vector.width - 1) - 1) if is_signed else (0, (1 << vector.width) - 1)
             )
-            if not low <= value <= high:
-                # Any number that the other side can be is on the same side of this one.
-                compared = (value, 0) if index == 0 else (0, value)
-                gate.parameters = [str(int(_COMPARISONS[gate.kind](*compared)))]
-                gate.kind, gate.inputs = "$const_UB32", []
-                return
-
-
-def _number(gate: Instance) -> int | None:
-    """The number that GHDL made a constant of, which may have more bits than that."""
-    match gate.kind:
-        case "$const_UB32":
-            return gate.numbers[0]
-        case "$const_SB32":
-            return gate.numbers[0] - (gate.numbers[0] >> 31 << 32)
-        case _:
-            return None
+            if low <= value <= high:
+                name = f"{gate.name}_number"
+                net = Net(max(drivers) + 1, vector.width, f"{name}_o")
+                parameter = str(value % (1 << vector.width))
+                drivers[net.number] = Instance(name, "$const_UB32", gate.location, [parameter], outputs=[net])
+                gate.inputs = [net, vector] if index == 0 else [vector, net]
+                return drivers[net.number]
+            # Any number that the vector can be is on the same side of this one.
+            compared = (value, 0) if index == 0 else (0, value)
+            gate.parameters = [str(int(_COMPARISONS[gate.kind][0](*compared)))]
+            gate.kind, gate.inputs = "$const_UB32", []
+            break
+    return None

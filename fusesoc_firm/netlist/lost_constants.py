@@ -1,86 +1,441 @@
 """Constants of which GHDL 2.0 makes zero: those of 64, 96, ... bits of which only the highest 32 have a bit set.
 
-The netlist has a zero for them, as for any other. So it is refused where the VHDL's statement has such a constant, or
-the name of one: as a literal, or as an aggregate of one range of bits. One that is computed is not seen.
+The netlist has a zero for them, as for any other. So where it has a zero of so many bits, GHDL is asked for the value
+of each constant expression in the VHDL: a copy of the sources has functions that look at them (probes), and
+synthesis calls those, as all they need is constant. The same goes for levels other than 0 and 1.
 """
 
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
-from fusesoc_firm.netlist.model import Instance, Modules, NetlistError
+from fusesoc_firm.netlist.model import Modules, NetlistError
 
+LIBRARY = "firm_probes"
 _WORD = 32
-_COMMENT = re.compile(r"--[^\n]*")
-_LITERAL = re.compile(r'x"([0-9a-f_]+)"|"([01_]+)"', re.IGNORECASE)
-_AGGREGATE = re.compile(r"\(\s*(\d+)(?:\s+downto\s+(\d+))?\s*=>\s*'1'\s*,\s*others\s*=>\s*'0'\s*\)", re.IGNORECASE)
-_DECLARATION = re.compile(r"\bconstant\s+(\w+)\s*:([^;]*)", re.IGNORECASE)
-_NAME = re.compile(r"[a-z]\w*", re.IGNORECASE)
-# Where a gate is at one of these words, it belongs to all that they enclose.
-_COMPOUND = re.compile(r"(?:if|elsif|case|when)\b", re.IGNORECASE)
-_SEMICOLON = re.compile(";")
-_END = re.compile(r"\bend\b", re.IGNORECASE)
+_VECTORS = ("std_logic_vector", "unsigned", "signed")
+_PER_VECTOR = """
+  function firm_bits (v : {0}) return std_logic_vector is
+  begin
+    return std_logic_vector(v);
+  end function firm_bits;
+
+  function firm_seen (v : {0}; n : natural) return {0} is
+    constant is_seen : boolean := firm_is_lost(std_logic_vector(v), n);
+  begin
+    return v;
+  end function firm_seen;
+"""
+PACKAGE = f"""library ieee;
+use ieee.std_logic_1164.all;
+use ieee.numeric_std.all;
+
+package probes is
+  function firm_is_lost (v : std_logic_vector; n : natural) return boolean;
+  function firm_bits (v : std_ulogic) return std_logic_vector;
+{
+    "".join(
+        f'''  function firm_bits (v : {name}) return std_logic_vector;
+  function firm_seen (v : {name}; n : natural) return {name};
+'''
+        for name in _VECTORS
+    )
+}end package probes;
+
+package body probes is
+  function level (v : std_ulogic) return std_ulogic is
+  begin
+    case v is
+      when '0' | 'L' => return '0';
+      when '1' | 'H' => return '1';
+      when 'Z' => return 'Z';
+      when others => return 'X';
+    end case;
+  end function level;
+
+  function firm_is_lost (v : std_logic_vector; n : natural) return boolean is
+    constant bits : std_logic_vector(0 to v'length - 1) := v;
+    variable lowest : std_ulogic;
+  begin
+    if v'length <= {_WORD} or v'length mod {_WORD} /= 0 then
+      return false;
+    end if;
+    lowest := level(bits(bits'right));
+    if lowest = '1' then
+      return false;
+    end if;
+    for i in {_WORD} to bits'right loop
+      if level(bits(i)) /= lowest then
+        return false;
+      end if;
+    end loop;
+    for i in 0 to {_WORD - 1} loop
+      if level(bits(i)) /= lowest then
+        report "firm lost " & integer'image(n) & " " & integer'image(v'length) severity warning;
+        return true;
+      end if;
+    end loop;
+    return false;
+  end function firm_is_lost;
+
+  function firm_bits (v : std_ulogic) return std_logic_vector is
+    constant bits : std_logic_vector(0 to 0) := (others => v);
+  begin
+    return bits;
+  end function firm_bits;
+{"".join(map(_PER_VECTOR.format, _VECTORS))}end package body probes;
+"""
+_ARRAY = """
+function firm_bits (v : {0}) return std_logic_vector is
+  constant first : std_logic_vector := firm_bits(v(v'left));
+  variable found : std_logic_vector(0 to v'length * first'length - 1);
+  variable place : natural := 0;
+begin
+  for i in v'range loop
+    found(place to place + first'length - 1) := firm_bits(v(i));
+    place := place + first'length;
+  end loop;
+  return found;
+end function firm_bits;
+"""
+_RECORD = """
+function firm_bits (v : {0}) return std_logic_vector is
+begin
+  return {1};
+end function firm_bits;
+"""
+_USE = f" library ieee, {LIBRARY}; use ieee.std_logic_1164.std_logic_vector; use {LIBRARY}.probes.all; "
+
+_HIDDEN = re.compile(r'--[^\n]*|\b[box]"[^"\n]*"|"[^"\n]*"', re.IGNORECASE)
+_UNIT = re.compile(
+    r"\b(?:(entity)\s+\w+\s+is|(architecture)\s+\w+\s+of\s+\w+\s+is|(package)\s+(?:(body)\s+)?\w+\s+is)\b",
+    re.IGNORECASE,
+)
+_TYPE = re.compile(
+    r"\btype\s+(\w+)\s+is\s+(?:array\b[^;]*;|record\b(.*?)\bend\s+record\b[^;]*;)", re.IGNORECASE | re.DOTALL
+)
+_NAMES = r"\b(\w+(?:\s*,\s*\w+)*)\s*:(?!=)"
+_FIELDS = re.compile(_NAMES)
+_OBJECT = re.compile(rf"\b(constant|signal|variable)\s+{_NAMES}([^;]*?)(?::=([^;]*))?;", re.IGNORECASE)
+_PORT = re.compile(rf"{_NAMES}\s*(?:out|inout|buffer)\s+(\w+(?:\s*\((?:[^()]|\([^()]*\))*\))?)", re.IGNORECASE)
+_DYNAMIC = re.compile(rf"\b(?:signal|variable)\s+{_NAMES}", re.IGNORECASE)
+_INTERFACE = re.compile(r"\b(generic|port|function|procedure)\b[^()]*\(", re.IGNORECASE)
+_COMMA = r"\s*,\s*"
+# What is behind a constant that is used as a whole, or of which an element is used.
+_NO_SLICE = r"(?P<index>)(?!\s*(?:'|\(\s*\d+(?:\s+(?:downto|to)\s+\d+)?\s*\)))"
+_OF_ELEMENT = r"\s*\((?P<index>[^();]*)\)"
+_SCALAR = re.compile(
+    r"\s*(?:integer|natural|positive|boolean|std_u?logic|bit|time|real|string|character)\b", re.IGNORECASE
+)
+_ASSIGNMENT = re.compile(
+    r"(?:;|=>|\b(?:begin|then|else|loop|generate)\b|\w\s*:)\s*(\w+)\s*(?:<=|:=)([^;]*)(?=;)",
+    re.IGNORECASE,
+)
+# What is between two values of a conditional assignment, or after the last one.
+_CONDITION = re.compile(r"\bwhen\b.*?\belse\b|\bwhen\b.*|\bafter\b.*", re.IGNORECASE | re.DOTALL)
+_CALL = re.compile(
+    r"\b(?:shift_left|shift_right|rotate_left|rotate_right|resize|(?:std_logic_vector|unsigned|signed)\b'?)\s*\(",
+    re.IGNORECASE,
+)
+_RANGE = re.compile(r"\b(?:downto|to|range)\b", re.IGNORECASE)
+_NAME = re.compile(r"(?<![\w'])[a-z]\w*", re.IGNORECASE)
+_LITERAL = re.compile(r'(?<!\w)(?:x"([0-9a-f_]+)"|b?"([01_]+)")', re.IGNORECASE)
+_OF_ZEROS = re.compile(r"""(?:'0'|[xb]?"[0_]*"|\b(?:others|downto|to|\d+)\b|[\s(),=>|])*""", re.IGNORECASE)
+_REPORT = re.compile(r"firm lost (\d+) (\d+)")
 
 
-def check(modules: Modules, files: Iterable[str]) -> None:
-    """Raise `NetlistError` for a statement with such a constant that is zero in the netlist."""
-    zeros = list(_zeros(modules))
-    if not zeros:
-        return
-    texts = {name: _COMMENT.sub("", Path(name).read_text(encoding="latin-1")) for name in files}
-    named: dict[int, set[str]] = defaultdict(set)
-    for name, value in (found for text in texts.values() for found in _DECLARATION.findall(text)):
-        for width in _widths(value):
-            named[width].add(name.lower())
-    for place, width in zeros:
-        file, line, column = place.rsplit(":", 2)
-        if file in texts:
-            statement = _statement(texts[file], int(line), int(column))
-            if width in set(_widths(statement)) or named[width] & set(map(str.lower, _NAME.findall(statement))):
-                raise NetlistError(
-                    f"{place}: error: GHDL turns a constant of {width} bits into zero if only its highest {_WORD} bits "
-                    "are not zero; assign it in two slices"
-                )
+@dataclass(frozen=True)
+class _Probe:
+    """Text to put in place of some of a file's; `constant` is where the expression is that it looks at, if it does."""
+
+    start: int
+    end: int
+    text: str
+    constant: tuple[int, int] | None = None
 
 
-def _zeros(modules: Modules) -> Iterator[tuple[str, int]]:
-    """The places of gates that read a zero of as many bits, and these."""
-    for module in modules.values():
-        zeros = {gate.outputs[0].number for gate in module.instances if _is_zero(gate)}
-        for gate in module.instances:
-            for net in gate.inputs:
-                if net and net.number in zeros and gate.location:
-                    yield gate.location, net.width
+class Source:
+    """A file and the probes of its constants."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.text = Path(name).read_bytes().decode("latin-1")
+        # Without comments and the contents of literals, at the same places.
+        self.code = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), self.text)
+        self.units = [
+            (found.start(), found.end(), (found[1] or found[2] or found[4] or found[3]).lower())
+            for found in _UNIT.finditer(self.code)
+        ]
+        found = [*_DYNAMIC.findall(self.code), *self._parameters()]
+        self.dynamic = {name.strip().lower() for names in found for name in names.split(",")}
+        self.constants = [item for item in _OBJECT.finditer(self.code) if item[1].lower() == "constant"]
+        self._begins = [start for start, _, _ in self.units]
+        # How many parentheses are open before each of them, and where they are.
+        self._depths = [0]
+        self._parentheses = []
+        for parenthesis in re.finditer(r"[()]", self.code):
+            self._parentheses.append(parenthesis.start())
+            self._depths.append(self._depths[-1] + (1 if parenthesis[0] == "(" else -1))
+
+    def _parameters(self) -> Iterator[str]:
+        for found in _INTERFACE.finditer(self.code):
+            if found[1].lower() != "generic":
+                yield from _FIELDS.findall(self.code, found.end(), _closed(self.code, found.end()))
+
+    def place(self, position: int) -> str:
+        """`file:line:column` of a position."""
+        before = self.text[:position]
+        return f"{self.name}:{before.count(chr(10)) + 1}:{position - before.rfind(chr(10))}"
+
+    def unit(self, position: int) -> str:
+        """The kind of the unit around a position; none within parentheses, where interfaces are."""
+        index = bisect_right(self._begins, position)
+        is_inside = self._depths[bisect_right(self._parentheses, position)]
+        return self.units[index - 1][2] if index and not is_inside else ""
+
+    def _index(self, position: int) -> int:
+        return bisect_right(self._begins, position)
+
+    def constant(self, position: int) -> re.Match[str] | None:
+        """The declaration of a constant around a position."""
+        return next((found for found in self.constants if found.start() <= position < found.end()), None)
+
+    def types(self, *, of_packages: bool) -> Iterator[tuple[str, int, str]]:
+        """The arrays and records of packages, or the others: name, where it ends, and a function of its bits."""
+        for found in _TYPE.finditer(self.code):
+            kind = self.unit(found.start())
+            if kind and (kind == "package") == of_packages:
+                fields = [name.strip() for names in _FIELDS.findall(found[2] or "") for name in names.split(",")]
+                bits = " & ".join(f"firm_bits(v.{name})" for name in reversed(fields))
+                yield found[1], found.end(), (_RECORD if fields else _ARRAY).format(found[1], bits)
+
+    def literals(self) -> Iterator[tuple[int, int]]:
+        """The places of literals that GHDL loses, and their widths."""
+        code = re.sub(r"--[^\n]*", lambda found: " " * len(found[0]), self.text)
+        for found in _LITERAL.finditer(code):
+            digits = (found[1] or found[2]).replace("_", "")
+            width, value = (4 * len(digits), int(digits, 16)) if found[1] else (len(digits), int(digits, 2))
+            if width > _WORD and width % _WORD == 0 and value and value % (1 << width - _WORD) == 0:
+                yield found.start(), width
+
+    def probes(self, types: Mapping[str, str]) -> Iterator[_Probe]:
+        """The probes of a file; `types` are those of packages, with the functions of their bits."""
+        yield from (_Probe(start, start, _USE) for start, _, kind in self.units if kind != "entity")
+        yield from (_Probe(end, end, text) for _, end, text in self.types(of_packages=False))
+        ends = [*self._begins[1:], len(self.code)]
+        for (_, head, kind), end in zip(self.units, ends, strict=True):
+            if kind in {"architecture", "body"}:
+                words = set(_NAME.findall(self.code[head:end].lower()))
+                yield from (_Probe(head, head, text) for name, text in types.items() if name.lower() in words)
+        declarations = [found for found in _OBJECT.finditer(self.code) if self.unit(found.start())]
+        declared = {
+            (self._index(found.start()), name.strip().lower()): found
+            for found in declarations
+            for name in found[2].split(",")
+        }
+        yield from filter(None, map(self._first_value, declarations))
+        spans = [found.span() for found in declarations]
+        assigned = list(self._assigned(declared, spans))
+        yield from assigned
+        yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in assigned)]))
+
+    def _first_value(self, found: re.Match[str]) -> _Probe | None:
+        is_vector = found[3].strip().lower().startswith(_VECTORS)
+        if not found[4] or (self.unit(found.start()) == "package" and not is_vector):
+            return None
+        return self._value(found, *found.span(4))
+
+    def _assigned(
+        self, declared: Mapping[tuple[int, str], re.Match[str]], spans: Sequence[tuple[int, int]]
+    ) -> Iterator[_Probe]:
+        """Probes of what is assigned: beside the declaration of its target, or of ports where they are assigned."""
+        for found in _ASSIGNMENT.finditer(self.code):
+            if not self.unit(found.start(1)) or _is_within(found.start(1), spans):
+                continue
+            target = declared.get((self._index(found.start(1)), found[1].lower()))
+            for start, end in _values(found[2], found.start(2)):
+                if self._is_constant(start, end):
+                    yield from filter(None, [self._value(target, start, end) if target else self._joined(start, end)])
+
+    def _joined(self, start: int, end: int) -> _Probe | None:
+        """A probe of vectors that are joined; a function is seen by itself."""
+        return self._seen(start, end) if "&" in self.code[start:end] else None
+
+    def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
+        """Probes of what functions make of constants within expressions."""
+        last = 0
+        for found in _CALL.finditer(self.code):
+            start, end = found.start(), _closed(self.code, found.end())
+            is_apart = start >= last and not _is_within(start, spans)
+            if is_apart and not _RANGE.search(self.code, found.end(), end) and self._is_constant(found.end(), end):
+                last = end
+                yield from filter(None, [self._seen(start, end)])
+
+    def _seen(self, start: int, end: int) -> _Probe | None:
+        value = self.text[start:end]
+        if _OF_ZEROS.fullmatch(value) or self.unit(start) == "entity":
+            return None
+        return _Probe(start, end, f"firm_seen({_escaped(value)}, {{0}})", (start, end))
+
+    def _value(self, target: re.Match[str], start: int, end: int) -> _Probe | None:
+        value, type_ = self.text[start:end], self.text[slice(*target.span(3))]
+        if _OF_ZEROS.fullmatch(value) or _SCALAR.match(type_):
+            return None
+        text = (
+            f"\nconstant firm_v{{0}} :{_escaped(type_)} :={_escaped(value)};"
+            "\nconstant firm_n{0} : boolean := firm_is_lost(firm_bits(firm_v{0}), {0});\n"
+        )
+        return _Probe(target.end(), target.end(), text, (start, end))
+
+    def _is_constant(self, start: int, end: int) -> bool:
+        return self.dynamic.isdisjoint(word.lower() for word in _NAME.findall(self.code[start:end]))
 
 
-def _is_zero(gate: Instance) -> bool:
-    if gate.kind != "$const_UB32" or any(gate.numbers):
-        return False
-    return gate.outputs[0].width > _WORD and gate.outputs[0].width % _WORD == 0
+def _is_within(position: int, spans: Sequence[tuple[int, int]]) -> bool:
+    index = bisect_right(spans, (position, float("inf"))) - 1
+    return index >= 0 and position < spans[index][1]
 
 
-def _statement(text: str, line: int, column: int) -> str:
-    """The statement at a place, with what is before it in its line."""
-    rest = text.split("\n", line - 1)[-1]
-    start = column - 1
-    end = (_END if _COMPOUND.match(rest, start) else _SEMICOLON).search(rest, start)
-    return rest[:start].rpartition(";")[2] + rest[start : end.start() if end else None]
+def _escaped(text: str) -> str:
+    return text.replace("{", "{{").replace("}", "}}")
 
 
-def _widths(text: str) -> Iterator[int]:
-    """The widths of constants in a text that GHDL loses."""
-    for digits, bits in _LITERAL.findall(text):
-        value = "".join(f"{int(digit, 16):04b}" for digit in digits.replace("_", "")) or bits.replace("_", "")
-        if _is_lost(len(value), int(value, 2)):
-            yield len(value)
-    for high, low in _AGGREGATE.findall(text):
-        width = int(high) + 1
-        if _is_lost(width, 1 << int(low or high)):
-            yield width
+def _values(text: str, start: int) -> Iterator[tuple[int, int]]:
+    """Where the values of an assignment, perhaps a conditional one, begin and end."""
+    last = 0
+    for found in _CONDITION.finditer(text):
+        yield start + last, start + found.start()
+        last = found.end()
+    if last < len(text):
+        yield start + last, start + len(text)
 
 
-def _is_lost(width: int, value: int) -> bool:
-    return width > _WORD and width % _WORD == 0 and value > 0 and value % (1 << width - _WORD) == 0
+def _closed(code: str, start: int) -> int:
+    """Where a parenthesis ends that begins before `start`."""
+    depth = 1
+    for position in range(start, len(code)):
+        depth += {"(": 1, ")": -1}.get(code[position], 0)
+        if not depth:
+            return position + 1
+    return len(code)
+
+
+def widths(modules: Modules) -> set[int]:
+    """How many bits the constants have of which GHDL may have lost some."""
+    return {
+        gate.outputs[0].width
+        for module in modules.values()
+        for gate in module.instances
+        if (gate.kind == "$const_UB32" and not any(gate.numbers)) or gate.kind in {"$const_X", "$const_Z"}
+        if gate.outputs[0].width > _WORD and gate.outputs[0].width % _WORD == 0
+    }
+
+
+class Copies:
+    """Copies of the sources with probes."""
+
+    def __init__(self, files: Iterable[str], folder: Path) -> None:
+        self.sources = {name: Source(name) for name in files}
+        types = [type_ for source in self.sources.values() for type_ in source.types(of_packages=True)]
+        functions = {name: text for name, _, text in types}
+        self.folder = folder
+        self.probes = {name: list(source.probes(functions)) for name, source in self.sources.items()}
+        # The probes that are in each line of a copy.
+        self._lines: dict[str, dict[int, set[_Probe]]] = {}
+        self._seen: list[tuple[str, int]] = []
+
+    @property
+    def has_probes(self) -> bool:
+        """Whether there is a constant expression to look at."""
+        return any(probe.constant for probes in self.probes.values() for probe in probes)
+
+    def write(self) -> dict[str, str]:
+        """The copies' names by those of the files."""
+        self._seen = []
+        return {name: self._write(source, index) for index, (name, source) in enumerate(self.sources.items())}
+
+    def _write(self, source: Source, index: int) -> str:
+        copy = str(self.folder / f"{index}.vhd")
+        lines: dict[int, set[_Probe]] = defaultdict(set)
+        text, last = "", 0
+        for probe in sorted(self.probes[source.name], key=lambda probe: (probe.start, probe.end)):
+            text += source.text[last : probe.start]
+            line = text.count("\n") + 1
+            if probe.constant:
+                self._seen.append((source.name, probe.constant[0]))
+            text += probe.text.format(len(self._seen) - 1) if probe.constant else probe.text
+            for number in range(line, text.count("\n") + 2) if probe.text != _USE else ():
+                lines[number].add(probe)
+            last = probe.end
+        Path(copy).write_bytes((text + source.text[last:]).encode("latin-1"))
+        self._lines[copy] = lines
+        return copy
+
+    def drop(self, messages: str) -> bool:
+        """Drop the probes that GHDL does not understand; False if there are none."""
+        dropped = False
+        for number, (name, probes) in enumerate(self.probes.items()):
+            copy = str(self.folder / f"{number}.vhd")
+            wrong: set[_Probe] = set()
+            lines = sorted(self._lines[copy])
+            for line in map(int, re.findall(rf"{re.escape(copy)}:(\d+):", messages)):
+                # GHDL may see an error of syntax in a line behind.
+                index = bisect_right(lines, line)
+                wrong |= self._lines[copy][lines[index - 1]] if index else set()
+            dropped = dropped or bool(wrong)
+            self.probes[name] = [probe for probe in probes if probe not in wrong]
+        return dropped
+
+    def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:
+        """The places of constants that GHDL reports, and their widths, if these are among some."""
+        reported = ((*self._seen[int(number)], int(width)) for number, width in _REPORT.findall(messages))
+        literals = ((name, *found) for name in self.sources for found in self._literals(name))
+        for name, position, width in chain(reported, literals):
+            declaration = self.sources[name].constant(position)
+            if width in among and (not declaration or self._is_used(declaration, _NO_SLICE)):
+                yield self.sources[name].place(position), width
+
+    def _literals(self, name: str) -> Iterator[tuple[int, int]]:
+        """Literals that GHDL loses, without those within what a probe looks at, unless it is taken apart."""
+        source = self.sources[name]
+        seen = sorted(probe.constant for probe in self.probes[name] if probe.constant)
+        for position, width in source.literals():
+            declaration = source.constant(position)
+            if not _is_within(position, seen) or (declaration and self._is_used(declaration, _OF_ELEMENT)):
+                yield position, width
+
+    def _is_used(self, declaration: re.Match[str], how: str) -> bool:
+        """Whether a constant is used in a way but in its own declaration."""
+        uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
+        found = (
+            not source.dynamic & set(_NAME.findall((use["index"] or "").lower()))
+            for source in self.sources.values()
+            for use in uses.finditer(source.code)
+        )
+        return sum(found) > len(uses.findall(declaration[0]))
+
+
+def refuse(lost: Sequence[tuple[str, int]]) -> None:
+    """Raise `NetlistError` if constants are lost."""
+    if lost:
+        raise NetlistError(
+            "\n".join(
+                f"{place}: error: GHDL turns a constant of {width} bits into zero if only its highest {_WORD} bits are "
+                "not zero; assign it in two slices, or an array by its elements"
+                for place, width in dict.fromkeys(lost)
+            )
+        )
+
+
+def doubt(widths: Iterable[int], message: str) -> str:
+    """A warning that constants of some widths were not looked at, as GHDL says."""
+    return (
+        f"warning: GHDL turns constants of {', '.join(map(str, sorted(widths)))} bits into zero if only their "
+        f"highest {_WORD} bits are not zero, and cannot tell whether there are any: {message.splitlines()[0]}"
+    )

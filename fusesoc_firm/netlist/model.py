@@ -10,8 +10,8 @@ class NetlistError(Exception):
     """A netlist that is not what the VHDL says; the text is what to tell the user."""
 
 
-class LostRegisterError(NetlistError):
-    """A register that is none any more, as its clock is used as a value."""
+class LostMemoryError(NetlistError):
+    """What GHDL made wrong, or crashed at, as it looked for memories."""
 
 
 @dataclass(frozen=True)

@@ -1,95 +1,228 @@
-"""Which `-` in VHDL is `integer - signed`; GHDL 2.0 makes the gate of `signed - integer` of it.
+"""Copies of VHDL with right functions in place of those that GHDL 2.0 synthesises wrongly and no netlist shows.
 
-Only the operands' types tell, which GHDL knows when it analyses. So it analyses a copy of a file in which a second such
-function is visible: each use of the first one is then ambiguous, and reported. They are replaced by `+`, which has the
-same types and precedence, until none is left, as an ambiguous operand hides the operator around it.
+* `integer - signed` becomes `signed - integer`.
+* `resize` of a signed number to fewer bits drops the sign, which numeric_std keeps.
+* A product with an integer has the whole integer, which numeric_std cuts to the vector's length.
+* A quotient, a remainder or a comparison has that integer cut, which numeric_std takes whole.
+
+Ours are aliases in each architecture and package body: a declaration there hides what a use clause makes visible.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
-from itertools import pairwise
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from fusesoc_firm.netlist.model import NetlistError
+LIBRARY = "firm_numeric"
+_RESIZE = """
+  function resize (arg : signed; new_size : natural) return signed is
+    alias bits : signed(arg'length - 1 downto 0) is arg;
+  begin
+    if new_size = 0 or new_size >= arg'length then
+      return ieee.numeric_std.resize(arg, new_size);
+    elsif new_size = 1 then
+      return bits(bits'left downto bits'left);
+    end if;
+    return bits(bits'left) & bits(new_size - 2 downto 0);
+  end function resize;
 
-_PACKAGE = "firm_second_minus"
-_SECOND_MINUS = f"""library ieee;
-use ieee.numeric_std.all;
-package {_PACKAGE} is
-  function "-" (l : integer; r : signed) return signed;
-end package {_PACKAGE};
+  function resize (arg, size_res : signed) return signed is
+  begin
+    return resize(arg, size_res'length);
+  end function resize;
+
+  function fits (number : integer; length : natural) return boolean is
+  begin
+    return length > 31 or (number >= -(2 ** (length - 1)) and number <= 2 ** (length - 1) - 1);
+  end function fits;
+
+  function fits_unsigned (number : natural; length : natural) return boolean is
+  begin
+    return length > 30 or number < 2 ** length;
+  end function fits_unsigned;
 """
-_USE = f" use work.{_PACKAGE}.all;"
+_SUBTRACTION = """
+  function "-" (l : integer; r : signed) return signed is
+  begin
+    return to_signed(l, r'length) - r;
+  end function "-";
+"""
+# By the type of the vector, that of the integer, and the operator; the vector is on either side.
+_PRODUCT = """
+  function "{0}" (l : {1}; r : {2}) return {1} is
+  begin
+    return l {0} to_{1}(r, l'length);
+  end function "{0}";
+
+  function "{0}" (l : {2}; r : {1}) return {1} is
+  begin
+    return to_{1}(l, r'length) {0} r;
+  end function "{0}";
+"""
+_QUOTIENT = """
+  function "{0}" (l : {1}; r : {2}) return {1} is
+  begin
+    if {3}(r, l'length) then
+      return l {0} to_{1}(r, l'length);
+    end if;
+    return {4};
+  end function "{0}";
+
+  function "{0}" (l : {2}; r : {1}) return {1} is
+  begin
+    if {3}(l, r'length) then
+      return to_{1}(l, r'length) {0} r;
+    end if;
+    return resize(to_{1}(l, 32) {0} resize(r, 32), r'length);
+  end function "{0}";
+"""
+_WIDE = "resize(resize(l, 32) {0} to_{1}(r, 32), l'length)"
+_COMPARISON = """
+  function "{0}" (l : {1}; r : {2}) return boolean is
+  begin
+    if l'length < 32 then
+      return resize(l, 32) {0} to_{1}(r, 32);
+    end if;
+    return ieee.numeric_std."{0}"(l, r);
+  end function "{0}";
+
+  function "{0}" (l : {2}; r : {1}) return boolean is
+  begin
+    if r'length < 32 then
+      return to_{1}(l, 32) {0} resize(r, 32);
+    end if;
+    return ieee.numeric_std."{0}"(l, r);
+  end function "{0}";
+"""
+# A quotient by an integer that does not fit is zero in numeric_std; as a gate, since GHDL computes little of constants.
+_BY_LARGE = {"/": "l and to_{1}(0, l'length)", "mod": _WIDE, "rem": _WIDE}
+_OPERATORS = {_PRODUCT: ["*"], _QUOTIENT: ["/", "mod", "rem"], _COMPARISON: ["=", "/=", "<", "<=", ">", ">="]}
+_NUMBERS = {"signed": ("integer", "fits"), "unsigned": ("natural", "fits_unsigned")}
+_FUNCTIONS = (
+    _RESIZE
+    + _SUBTRACTION
+    + "".join(
+        text.format(operator, vector, *number, _BY_LARGE.get(operator, "").format(operator, vector))
+        for text, operators in _OPERATORS.items()
+        for operator in operators
+        for vector, number in _NUMBERS.items()
+    )
+)
+_SIGNATURE = re.compile(r'^  (function ("\S+"|resize) \((.*?)\) return (\w+)) is$', re.MULTILINE)
+_PACKAGE = f"""library ieee;
+use ieee.numeric_std.all;
+
+package numeric is
+{"".join(f"  {found[1]};{chr(10)}" for found in _SIGNATURE.finditer(_FUNCTIONS))}end package numeric;
+
+package body numeric is{_FUNCTIONS}end package body numeric;
+"""
+_COMMENT = re.compile(r"--[^\n]*")
 _BODY = re.compile(r"\b(?:architecture\s+\w+\s+of\s+\w+|package\s+body\s+\w+)\s+is\b", re.IGNORECASE)
-# In GHDL's index of a library: a file's units, and where one begins.
-_UNITS = '^file .* "{}" ".*" ".*:\n((?:  .*\n)*)'
-_UNIT = re.compile(r"^  (architecture|package body|\w+) .* at \d+\( *(\d+)\)", re.MULTILINE)
-_BODIES = {"architecture", "package body"}
-_SIGNED = re.compile(r"\bsigned\b", re.IGNORECASE)
-_IS_PACKAGE = re.compile(r"^\s*package\b", re.IGNORECASE | re.MULTILINE)
-# A message, with all that belongs to it.
-_AMBIGUOUS = re.compile(r":(\d+):(\d+): possible interpretations are:\n\S*" + _PACKAGE)
-_CALL = '"-"'
+# One that is named by its package is not hidden.
+_FULL_NAME = re.compile(r'\b(?:ieee\s*\.\s*)?numeric_std\s*\.\s*(?=(?:resize|"[^"]+")\s*\()', re.IGNORECASE)
+_TYPES = re.compile(r"\b(?:un)?signed\b", re.IGNORECASE)
 _TAB = 8  # as GHDL counts columns
 
-# Analyses files without an effect on the library, and gives GHDL's messages, or nothing if it has none.
-Analyse = Callable[..., str]
+
+def _aliases() -> Iterator[str]:
+    for _, name, parameters, result in _SIGNATURE.findall(_FUNCTIONS):
+        types = []
+        for names, _, type_ in (item.partition(" : ") for item in parameters.split("; ")):
+            types += [_full(type_)] * len(names.split(","))
+        yield f" alias {name} is {LIBRARY}.numeric.{name} [{', '.join(types)} return {_full(result)}];"
 
 
-def of_signed(files: Collection[str]) -> list[str]:
-    """The files that can use signed numbers."""
-    texts = {name: _text(name) for name in files}
-    found = [name for name, text in texts.items() if _SIGNED.search(text)]
-    # A package gives the type to files that do not name it.
-    return list(texts) if any(_IS_PACKAGE.search(texts[name]) for name in found) else found
+def _full(type_: str) -> str:
+    return f"ieee.numeric_std.{type_}" if type_ in _NUMBERS else type_
 
 
-def subtractions_from_integers(file: str, index: str, analyse: Analyse, folder: Path) -> Iterator[str]:
-    """The places, `file:line:column`, of each `integer - signed` in a file.
-
-    `index` is the text of its library's `.cf`. Copies are made in a folder. Raises `NetlistError` if GHDL's messages
-    leave it open.
-    """
-    package, copy = folder / f"{_PACKAGE}.vhd", folder / "copy.vhd"
-    package.write_text(_SECOND_MINUS, encoding="latin-1")
-    lines = [line.expandtabs(_TAB) for line in _bodies(file, index).split("\n")]
-    while True:
-        copy.write_text("\n".join(lines), encoding="latin-1")
-        messages = analyse(package, copy)
-        places = {(int(line) - 1, int(column) - 1) for line, column in _AMBIGUOUS.findall(messages)}
-        if not places:
-            break
-        for line, column in places:
-            before = lines[line][:column]
-            start = column - len(_CALL) if before.endswith(_CALL) else column
-            yield f"{file}:{line + 1}:{start + 1 - before.count(_USE) * len(_USE)}"
-            lines[line] = lines[line][:start] + lines[line][start:].replace("-", "+", 1)
-    if messages:
-        raise NetlistError(f"{messages}\n{file}: error: GHDL does not report where it subtracts a signed number")
+def _padded(text: str) -> str:
+    """So many columns that tabs behind them keep their widths."""
+    return text + " " * (-len(text) % _TAB)
 
 
-def _bodies(file: str, index: str) -> str:
-    """A file's text with the second function in all bodies, and blanks for the units that other files depend on."""
-    text = _text(file)
-    units = re.search(_UNITS.format(re.escape(file)), index, re.MULTILINE)
-    if not units:
-        raise NetlistError(f"{file}: error: it is not in GHDL's index of the library")
-    starts = [(int(place), kind) for kind, place in _UNIT.findall(units[1])]
-    found = ""
-    for (start, kind), (end, _) in pairwise([(0, ""), *starts, (len(text), "")]):
-        unit = text[start:end]
-        found += _BODY.sub(lambda is_: is_[0] + _USE, unit, count=1) if kind in _BODIES else re.sub(r"[^\n]", " ", unit)
-    return found
+_CONTEXT = _padded(f"library ieee, {LIBRARY};")
+_ALIASES = _padded("".join(_aliases()))
+# A line with what was added, and one with a caret.
+_ADDED = re.compile(rf"^(.*{re.escape(_ALIASES)}.*)\n( *\^)$", re.MULTILINE)
 
 
-def is_resize(place: str) -> bool:
-    """Whether a function of the name `resize` is called at `file:line:column`."""
-    name, line, column = place.rsplit(":", 2)
-    text = _text(name).split("\n")[int(line) - 1].expandtabs(_TAB)
-    return bool(re.match(r"resize\b", text[int(column) - 1 :], re.IGNORECASE))
+@dataclass
+class Copies:
+    """Copies of files in a folder, and where their texts are longer than those of the files."""
+
+    folder: Path
+    files: list[str] = field(default_factory=list)
+    _added: list[Mapping[int, Sequence[tuple[int, int]]]] = field(default_factory=list)
+
+    def write_package(self) -> Path:
+        """The file of the package with our functions, for `LIBRARY`."""
+        self.folder.mkdir()
+        package = self.folder / "numeric.vhd"
+        package.write_text(_PACKAGE, encoding="latin-1")
+        return package
+
+    def copy(self, files: Iterable[str]) -> list[str]:
+        """The copies of files, and the files themselves where a copy would be the same."""
+        return [self._copy(file) for file in files]
+
+    def _copy(self, file: str) -> str:
+        text = Path(file).read_bytes().decode("latin-1")
+        changed, added = _changed(text)
+        if changed == text:
+            return file
+        copy = self.folder / f"{len(self.files)}.vhd"
+        self.files.append(file)
+        self._added.append(added)
+        copy.write_bytes(changed.encode("latin-1"))
+        return str(copy)
+
+    def original(self, text: str) -> str:
+        """A text of GHDL with the files' names, and their columns, in place of the copies'."""
+        place = re.compile(rf"{re.escape(str(self.folder))}/(\d+)\.vhd(?::(\d+):(\d+))?")
+        text = _ADDED.sub(lambda line: _without_added(*line.groups()), place.sub(self._place, text))
+        return text.replace(f"{self.folder}/", "")
+
+    def _place(self, found: re.Match[str]) -> str:
+        file = self.files[int(found[1])]
+        if not found[2]:
+            return file
+        line, column = int(found[2]), int(found[3])
+        # A place in what was added is where it was added.
+        before = [(start, length) for start, length in self._added[int(found[1])].get(line, ()) if start < column]
+        for start, length in reversed(before):
+            column = max(start, column - length)
+        return f"{file}:{line}:{column}"
 
 
-def _text(name: str) -> str:
-    return Path(name).read_bytes().decode("latin-1")
+def _without_added(line: str, mark: str) -> str:
+    """A line that GHDL shows, and the one below, which points to a column."""
+    shorter = line.replace(_CONTEXT, "").replace(_ALIASES, "")
+    return f"{shorter}\n{mark[len(line) - len(shorter) :]}"
+
+
+def use_numbers(files: Iterable[str]) -> bool:
+    """Whether any of these files names a type whose functions are wrong."""
+    return any(_TYPES.search(Path(file).read_bytes().decode("latin-1")) for file in files)
+
+
+def _changed(text: str) -> tuple[str, Mapping[int, Sequence[tuple[int, int]]]]:
+    """A text with our functions, and for each longer line the columns of what was added and its lengths."""
+    code = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
+    added: dict[int, list[tuple[int, int]]] = defaultdict(list)
+    parts: list[str] = []
+    last = 0
+    found = [(place.start(), place.end(), " " * len(place[0])) for place in _FULL_NAME.finditer(code)]
+    for body in _BODY.finditer(code):
+        found += [(body.start(), body.start(), _CONTEXT), (body.end(), body.end(), _ALIASES)]
+    for start, end, new in sorted(found):
+        parts += [text[last:start], new]
+        last = end
+        if start == end:
+            line = "".join(parts[:-1]).rpartition("\n")[2].expandtabs(_TAB)
+            added[text.count("\n", 0, start) + 1].append((len(line) + 1, len(new)))
+    return "".join([*parts, text[last:]]), added

@@ -14,18 +14,17 @@ import shutil
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.netlist import dump, lost_constants, verilog
-from fusesoc_firm.netlist.corrections import correct, doubts, places_of
-from fusesoc_firm.netlist.model import LostRegisterError, Module, Modules, NetlistError
-from fusesoc_firm.netlist.sources import is_resize, of_signed, subtractions_from_integers
+from fusesoc_firm.netlist.corrections import correct, doubts
+from fusesoc_firm.netlist.model import LostMemoryError, Module, Modules, NetlistError
+from fusesoc_firm.netlist.sources import LIBRARY, Copies, use_numbers
 from fusesoc_firm.tools.launcher import starts_everything
 from fusesoc_firm.tools.programs import explanation, missing
 
@@ -47,14 +46,32 @@ _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 # What GHDL says of logic that is not there afterwards; the words are those of its sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
 
+_CRASH = "GHDL Bug occurred"
+# Where GHDL 2.0 crashes, and what it was given.
+_CRASHES = {
+    "netlists-builders.adb:929": "\nIs there an integer whose range has one number, such as `range 0 to N - 1` with "
+    "N = 1? It has no bits, which GHDL does not expect.",
+    **dict.fromkeys(
+        ("netlists.adb:774", "STORAGE_ERROR"),
+        "\nGHDL 2.0 does so where a table of it grows while some bits of a signal are assigned. That depends on how "
+        "many assignments there are before it: one more or less, or another order of processes, avoids it.",
+    ),
+}
+_OF_MEMORIES = "netlists-memories.adb"
+
+# GHDL 2.0 reads and writes where a table was before it grew: an assignment to some bits of a signal may be lost. If the
+# C library overwrites memory that is given back, it crashes instead of making a wrong netlist.
+_MEMORY = {"MALLOC_PERTURB_": "165"}
+
 _GULP = 1 << 20
 _PAUSE = 0.005
 
 # GHDL's option for that; it loses registers of which it wanted to make memories.
 _NO_MEMORIES = "-dm"
 _WITHOUT_MEMORIES = (
-    "; GHDL loses a register that is written by a dynamic index and read by a constant one. So all memories of this "
-    "netlist are registers; read that one by dynamic indices alone, or write it by constant ones, to get memories."
+    "; GHDL loses a register that is written by a dynamic index and read by a constant one, and crashes at some "
+    "memories. So all memories of this netlist are registers; read such a register by dynamic indices alone, or write "
+    "it by constant ones, to get memories."
 )
 
 
@@ -113,17 +130,19 @@ def translate(translation: Translation, folder: Path) -> str:
     output.unlink(missing_ok=True)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    ghdl = _Ghdl(translation, folder)
+    ghdl = _Ghdl(translation, folder, Copies(folder / "copies"))
+    if is_copied := use_numbers(chain.from_iterable(translation.libraries.values())):
+        ghdl.run("-a", f"--work={LIBRARY}", str(ghdl.copies.write_package()))
     for library, files in translation.libraries.items():
         if files:
-            ghdl.run("-i", f"--work={library}", *files)
+            ghdl.run("-i", f"--work={library}", *(ghdl.copies.copy(files) if is_copied else files))
     ghdl.run("-m", f"--work={translation.library}", translation.unit)
     try:
         netlist, warnings = _netlist(ghdl)
-    except LostRegisterError as error:
+    except LostMemoryError as error:
         if _NO_MEMORIES in translation.options:
             raise
-        ghdl = _Ghdl(replace(translation, options=[*translation.options, _NO_MEMORIES]), folder)
+        ghdl = replace(ghdl, translation=replace(translation, options=[*translation.options, _NO_MEMORIES]))
         netlist, warnings = _netlist(ghdl)
         warnings = f"{error.args[0].replace('error', 'warning', 1)}{_WITHOUT_MEMORIES}\n{warnings}"
     part = output.with_name(f"{output.name}.part")
@@ -144,11 +163,10 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     components = _components(modules, ghdl.translation.verilog)
     # The dump has all but these.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
-    lost_constants.check(modules, chain.from_iterable(ghdl.translation.libraries.values()))
-    resized = {place for place in places_of(modules, "$strunc") if is_resize(place)}
-    correct(modules, ghdl.swapped(places_of(modules, "$sub")), resized)
+    doubt = ghdl.check_constants(lost_constants.widths(modules))
+    correct(modules)
     return _HEADER + verilog.write(modules, generics) + _FOOTER, "\n".join(
-        filter(None, [_other_warnings(warnings), *doubts(modules)])
+        filter(None, [_other_warnings(warnings), doubt, *doubts(modules)])
     )
 
 
@@ -158,13 +176,19 @@ class _Ghdl:
 
     translation: Translation
     folder: Path
+    copies: Copies
 
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
         """What it prints on its two streams."""
         options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
         with (
             tempfile.TemporaryFile() as errors,
-            subprocess.Popen(["ghdl", command, *options, *arguments], stdout=subprocess.PIPE, stderr=errors) as process,
+            subprocess.Popen(
+                ["ghdl", command, *options, *arguments],
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                env={**os.environ, **_MEMORY},
+            ) as process,
         ):
             assert process.stdout
             printed = _gulps(process.stdout.fileno()).decode("latin-1")
@@ -172,28 +196,48 @@ class _Ghdl:
             errors.seek(0)
             said = errors.read().decode("latin-1")
         if process.returncode:
-            raise NetlistError(_errors(printed + said))
-        return printed, said
+            error = _errors(self.copies.original(printed + said))
+            raise LostMemoryError(error) if _OF_MEMORIES in error else NetlistError(error)
+        return self.copies.original(printed), self.copies.original(said)
 
-    def swapped(self, places: Iterable[str]) -> set[str]:
-        """Among places of subtractions, those of `integer - signed`."""
-        files = {place.rsplit(":", 2)[0] for place in places}
-        found: set[str] = set()
-        for library, names in self.translation.libraries.items():
-            analyse = partial(self.messages, "-s", f"--work={library}")
-            for file in sorted(files & set(of_signed(names))):
-                (index,) = self.folder.glob(f"{library}-obj*.cf")
-                text = index.read_text(encoding="latin-1")
-                found.update(subtractions_from_integers(file, text, analyse, self.folder))
-        return found
+    def check_constants(self, widths: set[int]) -> str:
+        """A warning if GHDL cannot be asked for constants.
 
-    def messages(self, command: str, *arguments: str | Path) -> str:
-        """The errors that it reports; none if it succeeds."""
-        try:
-            self.run(command, *map(str, arguments))
-        except NetlistError as error:
-            return str(error)
-        return ""
+        Raises `NetlistError` if it makes zero of one of these widths, in bits.
+        """
+        if not widths:
+            return ""
+        folder = self.folder / "probes"
+        folder.mkdir(exist_ok=True)
+        copies = lost_constants.Copies(chain.from_iterable(self.translation.libraries.values()), folder)
+        messages = doubt = ""
+        if copies.has_probes:
+            ghdl = replace(self, folder=folder)
+            package = folder / "probes.vhd"
+            package.write_text(lost_constants.PACKAGE, encoding="latin-1")
+            ghdl.run("-a", f"--work={lost_constants.LIBRARY}", str(package))
+            try:
+                messages = ghdl.probed(copies)
+            except NetlistError as error:
+                doubt = lost_constants.doubt(widths, str(error))
+        lost_constants.refuse(list(copies.lost(messages, widths)))
+        return doubt
+
+    def probed(self, copies: lost_constants.Copies) -> str:
+        """What GHDL says of copies, without the probes that it does not understand. Raises `NetlistError`."""
+        while True:
+            written = copies.write()
+            try:
+                for library, files in self.translation.libraries.items():
+                    for index in self.folder.glob(f"{library}-obj*.cf"):
+                        index.unlink()
+                    if files:
+                        self.run("-i", f"--work={library}", *(written[file] for file in files))
+                self.run("-m", f"--work={self.translation.library}", self.translation.unit)
+                return self.synthesise("none")[1]
+            except NetlistError as error:
+                if not copies.drop(str(error)):
+                    raise
 
     def synthesise(self, language: str) -> tuple[str, str]:
         """The netlist, and what GHDL says about it."""
@@ -252,6 +296,12 @@ def _module(name: str, verilog: Sequence[str]) -> str | None:
 
 def _errors(text: str) -> str:
     """What GHDL says of an end without success, without its notes and warnings; all if there is nothing else."""
+    if _CRASH in text:
+        what = re.search(r"^raised (.*)", text, re.MULTILINE)
+        return (
+            f"error: GHDL crashed and does not say at which line of the VHDL: {what[1] if what else 'nothing is known'}"
+            f"{next((hint for place, hint in _CRASHES.items() if place in text), '')}"
+        )
     found = "\n".join(line for item in _messages(text) if not re.search(r":(note|warning):", item[0]) for line in item)
     return (found or text).rstrip()
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Final
 
-from fusesoc_firm.netlist.model import Instance, LostRegisterError, Module, Modules, Net, NetlistError, Port
+from fusesoc_firm.netlist.model import Instance, LostMemoryError, Module, Modules, Net, NetlistError, Port
 from fusesoc_firm.text.naming import VERILOG_KEYWORDS
 
 _WORD = 32
@@ -267,7 +267,7 @@ class _Writer:
             return literal(self.constants[net.number])
         gate = self.driver.get(net.number)
         if gate and gate.kind in _EDGES:
-            raise LostRegisterError(str(gate.error("the edge of a clock is used as a value")))
+            raise LostMemoryError(str(gate.error("the edge of a clock is used as a value")))
         return self.names[net.number]
 
     def part(self, net: Net, low: int, width: int) -> str:
@@ -353,12 +353,6 @@ class _Writer:
 
     def _truncation(self, gate: Instance) -> Iterator[str]:
         yield from self._assign(gate, self.part(gate.input(0), 0, gate.outputs[0].width))
-
-    def _signed_truncation(self, gate: Instance) -> Iterator[str]:
-        """The sign and the lowest bits, as numeric_std resizes."""
-        net, width = gate.input(0), gate.outputs[0].width
-        sign = self.part(net, net.width - 1, 1)
-        yield from self._assign(gate, f"{{{sign}, {self.part(net, 0, width - 1)}}}" if width > 1 else sign)
 
     def _extension(self, gate: Instance) -> Iterator[str]:
         net, width = gate.input(0), gate.outputs[0].width
@@ -451,7 +445,6 @@ class _Writer:
         "$ror": _rotation,
         **dict.fromkeys(("$concat2", "$concat3", "$concat4", "$concatn"), _concatenation),
         **dict.fromkeys(("$utrunc", "$strunc"), _truncation),
-        "$sresize": _signed_truncation,  # of corrections.py
         **dict.fromkeys(("$uextend", "$sextend"), _extension),
         "$extract": _extraction,
         "$memidx": _scaled_index,

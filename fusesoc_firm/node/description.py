@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.printer import closure_text
 from fusesoc_firm.message.signature import signature
-from fusesoc_firm.simulation.software import sent_elsewhere, taken_elsewhere, way_to
+from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere, way_to
 from fusesoc_firm.system.derived.model import Converter, Topic
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import fail

@@ -27,14 +27,14 @@ class Place:
 
 
 def _cpp(loaded: LoadedSystem, ros: Middleware | None, _: Place) -> Mapping[str, str]:
-    from fusesoc_firm.node.package import cpp_package
+    from fusesoc_firm.node.cpp_package import cpp_package
 
     return cpp_package(loaded, ros)
 
 
 def _python(loaded: LoadedSystem, ros: Middleware | None, place: Place) -> Mapping[str, str]:
-    from fusesoc_firm.node.source import python_node
-    from fusesoc_firm.system.beside import sources_of
+    from fusesoc_firm.node.python_node import python_node
+    from fusesoc_firm.system.message_sources import sources_of
 
     # The node runs where FuseSoC may not be.
     own = place.core_folders(loaded.specification.message_cores)

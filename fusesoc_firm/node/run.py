@@ -13,7 +13,7 @@ from types import FrameType
 
 from fusesoc_firm.node.carrier import CarrierError, RosCarrier, RosOptions
 from fusesoc_firm.node.description import NodeDescription
-from fusesoc_firm.node.engine import Node, NodeSettings, OpenTransport
+from fusesoc_firm.node.node import Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.options import ROS_ARGUMENTS
 from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.software import node_software

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from fusesoc_firm.node.description import NodeDescription
 from fusesoc_firm.node.options import add_node_options, remappings
+from fusesoc_firm.node.reopening import at_address
 from fusesoc_firm.node.run import run_node, run_options
-from fusesoc_firm.node.transports import at_address
-from fusesoc_firm.system.beside import load_beside
+from fusesoc_firm.system.message_sources import load_beside
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.interrupts import accept_interrupts
 

@@ -11,7 +11,7 @@ from fusesoc_firm.frame.codec import CodecError, decode
 from fusesoc_firm.frame.defaults import encode_used
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.simulation.functions import Functions, Message, importable_sources
-from fusesoc_firm.simulation.software import sent_elsewhere, taken_elsewhere
+from fusesoc_firm.simulation.software_run import sent_elsewhere, taken_elsewhere
 from fusesoc_firm.system.derived.model import End
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import InputError, fail

@@ -43,7 +43,7 @@ def _load_converters(request: Request) -> LoadedRequest:
 
 
 def _load_system(request: Request) -> LoadedRequest:
-    from fusesoc_firm.node import package
+    from fusesoc_firm.node import cpp_package
     from fusesoc_firm.simulation import simulation_core
     from fusesoc_firm.system import system_core
 
@@ -51,7 +51,7 @@ def _load_system(request: Request) -> LoadedRequest:
         for warning in loaded.warnings:
             print(warning, file=sys.stderr)
         core = system_core.system_core(loaded)
-        return replace(core, files={**core.files, **package.generated_files(loaded)})
+        return replace(core, files={**core.files, **cpp_package.generated_files(loaded)})
 
     loaded = system_core.load_requested(request)
     make: Callable[[Request, system_core.LoadedSystem], GeneratedCore]
@@ -60,7 +60,7 @@ def _load_system(request: Request) -> LoadedRequest:
     elif _is_simulation(request):
         inputs, make = simulation_core.inputs(request, loaded), simulation_core.simulation_core
     else:
-        inputs, make = [*system_core.inputs(request, loaded), *package.headers()], make_system
+        inputs, make = [*system_core.inputs(request, loaded), *cpp_package.headers()], make_system
     return LoadedRequest(request, inputs, lambda: make(request, loaded), loaded.definitions)
 
 
@@ -71,7 +71,7 @@ def _simulator_programs(request: Request) -> Sequence[str]:
 def _compiler(request: Request) -> Mapping[str, str]:
     if not _is_simulation(request):
         return {}
-    from fusesoc_firm.simulation.kernel import toolchain
+    from fusesoc_firm.simulation.kernel_library import toolchain
 
     return toolchain()
 
@@ -86,9 +86,9 @@ _MESSAGES = Parameter(
     "messages", "list", "cores with message definitions, such as robot:msgs:arm; the core depends on them"
 )
 
-_DISTRO = Parameter("distro", "str", "the ROS distribution that provides the standard messages")
+_DISTRO = Parameter("distro", "str", "the ROS distribution of standard messages")
 
-_LOCKED = Parameter("locked", "str", "a lock file, relative to the core; differences from it are errors")
+_LOCKED = Parameter("locked", "str", "a lock file, relative to the core; any difference from it is an error")
 
 GENERATORS: Mapping[str, Generator] = {
     "firm": Generator(
@@ -99,21 +99,19 @@ GENERATORS: Mapping[str, Generator] = {
                 "the type of a message, service or action, such as geometry_msgs/Quaternion",
                 is_required=True,
             ),
+            Parameter("ros", "int", "the version of ROS", is_required=True, choices=(1, 2)),
             Parameter(
-                "ros", "int", "the ROS version, which determines the serialisation", is_required=True, choices=(1, 2)
+                "direction", "str", "converters to generate", "both", choices=("subscriber", "publisher", "both")
             ),
-            Parameter(
-                "direction", "str", "the converters' directions", "both", choices=("subscriber", "publisher", "both")
-            ),
-            Parameter("width", "int", "the stream's width in bits", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
+            Parameter("width", "int", "bits of the stream", 8, choices=(8, 16, 32, 64, 128, 256, 512)),
             Parameter(
                 "name",
                 "str",
-                "prefix of the names of all generated units, such as left; a second core of a message needs one",
+                "prefix of the names of all generated units, such as left; required for a second core of a message",
                 rule=(PREFIX_RULE, is_prefix),
             ),
-            Parameter("include", "list", "fields that get ports, such as pose.position; all unless given"),
-            Parameter("exclude", "list", "fields that get no ports; a publisher sends their defaults"),
+            Parameter("include", "list", "fields with ports, such as pose.position; default all fields"),
+            Parameter("exclude", "list", "fields without ports; a publisher sends their defaults"),
             Parameter(
                 "config",
                 "str",
@@ -131,11 +129,11 @@ GENERATORS: Mapping[str, Generator] = {
         (
             Parameter("spec", "str", "the system's YAML specification, relative to the core", is_required=True),
             Parameter("product", "str", "the product to generate", "system", choices=("system", "simulation", "live")),
-            Parameter("board", "str", "the board: a name that fusesoc_firm knows, or a YAML file relative to the core"),
+            Parameter("board", "str", "the board: the name of a supported one, or a YAML file relative to the core"),
             Parameter("stimuli", "str", "messages to send in the simulation: a YAML file or a bag"),
-            Parameter("model", "str", "a Python file with the function that computes the system's responses"),
+            Parameter("model", "str", "a Python file with a function that computes the system's answers"),
             Parameter(
-                "environment", "list", "VHDL files of the environment at the pins; the last has its entity's name"
+                "environment", "list", "VHDL files of the environment at the pins; the last has the name of its entity"
             ),
             Parameter(
                 "simulator",
@@ -146,13 +144,9 @@ GENERATORS: Mapping[str, Generator] = {
             ),
             Parameter("seed", "int", "the seed of the simulation's random stalls", 1, bounds=(1, _LARGEST_SEED)),
             Parameter(
-                "stall_percent",
-                "int",
-                "percentage of cycles in which the simulation stalls a stream",
-                25,
-                bounds=(0, 99),
+                "stall_percent", "int", "probability of a stall of a stream in a cycle, in percent", 25, bounds=(0, 99)
             ),
-            Parameter("files", "list", "further files that the model and functions in software read"),
+            Parameter("files", "list", "further files that the model or functions in software read"),
             _PATHS,
             _MESSAGES,
             _DISTRO,

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fusesoc_firm.converter.converter_core import order_of_request
-from fusesoc_firm.message.model import MessageName, nested_message
-from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.message.model import Definitions, MessageName, nested_message
 from fusesoc_firm.plugin.answer import read_request
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.calls import read_call

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from fusesoc_firm.bags.routes import Route, renamed, routes_of
 from fusesoc_firm.bags.writer import BagWriter, RecordedTopic, check_writable, form_of, write_bag
-from fusesoc_firm.message.bags import Bag, Form, Recorded, Stream, open_bag
+from fusesoc_firm.message.bag_reader import Bag, Form, Recorded, Stream, open_bag
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.signature import signature
@@ -22,7 +22,7 @@ from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.transport.transport import TransportError
 from fusesoc_firm.replay.run import Sent, StuckError, SystemRun, published
 from fusesoc_firm.simulation.functions import Functions, importable_sources
-from fusesoc_firm.simulation.software import stimulated
+from fusesoc_firm.simulation.software_run import stimulated
 from fusesoc_firm.system.derived.model import Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest

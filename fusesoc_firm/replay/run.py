@@ -18,7 +18,7 @@ from fusesoc_firm.node.bursts import BurstError, BurstJoiner
 from fusesoc_firm.node.transport.simulator import MOST_CYCLES, ErrorPulse, Simulator, Taken
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.simulation.functions import Functions, Message
-from fusesoc_firm.simulation.software import sent_elsewhere
+from fusesoc_firm.simulation.software_run import sent_elsewhere
 from fusesoc_firm.system.derived.model import Converter, DerivedSystem, End, Topic
 from fusesoc_firm.text.diagnostics import InputError
 

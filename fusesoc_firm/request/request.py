@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.message.model import Definitions
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import SourceRef, fail
 from fusesoc_firm.text.yaml_text import yaml_dump

@@ -13,15 +13,15 @@ from fusesoc_firm.converter.converter_core import VHDL
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 from fusesoc_firm.request.request import GeneratedCore, GeneratedFile, Request
 from fusesoc_firm.simulation.environment import environment_files
-from fusesoc_firm.simulation.frames import expected_text, stimulus_text
-from fusesoc_firm.simulation.kernel import kernel_files
+from fusesoc_firm.simulation.host_files import expected_text, stimulus_text
+from fusesoc_firm.simulation.kernel_library import kernel_files
 from fusesoc_firm.simulation.reference import Response, responses
-from fusesoc_firm.simulation.software import answered, stimulated, traffic
+from fusesoc_firm.simulation.software_run import answered, stimulated, traffic
 from fusesoc_firm.simulation.stimuli import read_stimuli
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system import system_core
 from fusesoc_firm.system.derived.model import DerivedSystem
-from fusesoc_firm.system.hardware.configuration import TEST_BENCH_TEMPLATE, Configuration, test_bench_configuration
+from fusesoc_firm.system.hardware.configuration import TEST_BENCH_TEMPLATE, test_bench_configuration
 from fusesoc_firm.system.hardware.verilog_bench import (
     ENVIRONMENT_TEMPLATE,
     VERILOG_BENCH_TEMPLATE,
@@ -30,7 +30,7 @@ from fusesoc_firm.system.hardware.verilog_bench import (
 )
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import SourceRef, fail
-from fusesoc_firm.text.render import render
+from fusesoc_firm.text.render import Context, render
 from fusesoc_firm.tools.simulators import SIMULATORS, fitting
 
 # A test bench is nothing that synthesis, or a translation to Verilog, should see.
@@ -128,13 +128,13 @@ def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None
             fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
 
 
-def _vhdl_bench(configuration: Configuration) -> dict[str, GeneratedFile]:
+def _vhdl_bench(configuration: Context) -> dict[str, GeneratedFile]:
     text = render(TEST_BENCH_TEMPLATE, configuration)
     return {f"{configuration['bench']}.vhd": GeneratedFile(text, VHDL, tags=_BENCH_TAGS)}
 
 
 def _verilog_bench(
-    configuration: Configuration, system: DerivedSystem, frames: int = 0, beats: int = 0
+    configuration: Context, system: DerivedSystem, frames: int = 0, beats: int = 0
 ) -> dict[str, GeneratedFile]:
     """The bench, and the entity that holds system and environment if there is one."""
     has_environment = configuration["environment"] is not None
@@ -168,7 +168,7 @@ def _stimuli_files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
     # A call that the store answers does without what the import of rosbags' readers costs.
-    from fusesoc_firm.message.bags import bag_files
+    from fusesoc_firm.message.bag_reader import bag_files
 
     return bag_files(path)
 

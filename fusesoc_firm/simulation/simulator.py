@@ -27,7 +27,7 @@ import yaml
 from fusesoc_firm.request.core_reader import CoreFile, read_core
 from fusesoc_firm.request.request import CoreFolders, no_core_folders
 from fusesoc_firm.store.layout import default_root
-from fusesoc_firm.system.beside import core_of, load_beside
+from fusesoc_firm.system.message_sources import core_of, load_beside
 from fusesoc_firm.system.scaffold.core_file import CoreOptions, new_core
 from fusesoc_firm.text.diagnostics import InputError, fail
 from fusesoc_firm.text.file_lock import locked

@@ -48,7 +48,7 @@ def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
     else:
         # A call that the store answers does without what the import of rosbags' readers costs.
         from fusesoc_firm.bags.routes import read_bag
-        from fusesoc_firm.message.bags import BAGS
+        from fusesoc_firm.message.bag_reader import BAGS
 
         hint = f"stimuli are YAML (.yaml, .yml) or a bag; {BAGS}"
         stimuli = [Stimulus(*recorded) for recorded in read_bag(path, subscribers, hint)]

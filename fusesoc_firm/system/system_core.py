@@ -9,15 +9,14 @@ from fractions import Fraction
 from functools import cached_property, partial
 from pathlib import Path, PurePosixPath
 
-from fusesoc_firm.converter.configuration import Configuration, publisher_entity, subscriber_entity
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
 from fusesoc_firm.converter.constants import CONSTANTS_TEMPLATE
 from fusesoc_firm.converter.converter_core import VHDL, constants_configurations, library_sources
 from fusesoc_firm.converter.payload_length import LENGTH_TEMPLATE, length_entity, payload_length_configuration
 from fusesoc_firm.converter.sources import publisher_source, subscriber_source
 from fusesoc_firm.message.library import Libraries, MessageLibrary, libraries
 from fusesoc_firm.message.middleware import MIDDLEWARES, Middleware
-from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.message.signature import Definitions
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.request.request import CoreFolders, GeneratedCore, GeneratedFile, Request, no_core_folders
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.system.boards.block_design import (
@@ -39,15 +38,15 @@ from fusesoc_firm.system.boards.board import (
     read_board,
 )
 from fusesoc_firm.system.boards.timing_constraints import clocks_configuration
-from fusesoc_firm.system.derived.analysis import derive, source_files
-from fusesoc_firm.system.derived.kernel import function_name
+from fusesoc_firm.system.derived.cpp_function import function_name
+from fusesoc_firm.system.derived.derivation import derive, source_files
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.system.hardware.hls import WRAPPER_TEMPLATE, wrapper_configuration
 from fusesoc_firm.system.written.specification import Accelerator, Specification, is_core, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, SourceRef
 from fusesoc_firm.text.naming import identifier
-from fusesoc_firm.text.render import render
+from fusesoc_firm.text.render import Context, render
 
 # FuseSoC's types of what accelerators are written in, and the endings of what is not compiled by itself.
 _FILE_TYPES = {
@@ -195,7 +194,7 @@ class Artifact:
     path: str
     part: Part
     template: str
-    configuration: Configuration
+    configuration: Context
 
     @cached_property
     def text(self) -> str:

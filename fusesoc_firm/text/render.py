@@ -29,10 +29,14 @@ from dataclasses import dataclass, field
 from functools import cache
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 from chevron.tokenizer import ChevronError, tokenize
 
 from fusesoc_firm.text.quoting import QUOTES, Quote
+
+Context = dict[str, Any]
+"""What a template is rendered for: plain data."""
 
 TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 

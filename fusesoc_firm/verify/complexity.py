@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     FieldType,
-    MessageDefinition,
     MessageName,
     MessageType,
     SequenceType,
     StringType,
 )
-
-Definitions = Mapping[MessageName, MessageDefinition]
 
 
 class Level(IntEnum):

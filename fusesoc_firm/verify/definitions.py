@@ -10,6 +10,7 @@ from typing import Any
 from fusesoc_firm.message import ROS2
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     ElementType,
     Field,
     FieldType,
@@ -22,7 +23,6 @@ from fusesoc_firm.message.model import (
 )
 from fusesoc_firm.text.diagnostics import SourceRef
 
-Definitions = Mapping[MessageName, MessageDefinition]
 _SEPARATOR = "=" * 80
 # Stands for a wstring; a message, as there may be arrays of it.
 _WIDE = MessageName("firm_wide_msgs", "Wide")
@@ -39,7 +39,7 @@ def plain_text(definition: MessageDefinition) -> str:
     return "".join(f"{field.type} {field.name}\n" for field in definition.fields)
 
 
-def joint_text(name: MessageName, definitions: Mapping[MessageName, MessageDefinition]) -> str:
+def joint_text(name: MessageName, definitions: Definitions) -> str:
     """A message and all below it in one text, parted as ROS's own tools do."""
     others = [f"{_SEPARATOR}\nMSG: {other}\n{plain_text(definitions[other])}" for other in definitions if other != name]
     return "\n".join([plain_text(definitions[name]), *others])

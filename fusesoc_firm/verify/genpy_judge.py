@@ -8,13 +8,13 @@ import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
 from fusesoc_firm.frame.codec import MessageValue
-from fusesoc_firm.message.model import MessageDefinition, MessageName
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.verify.definitions import NoJudgementError, plain_text
 
 TITLE = "genpy"
@@ -32,9 +32,7 @@ def version() -> str:
     return server.version if server else ""
 
 
-def serialise(
-    name: MessageName, definitions: Mapping[MessageName, MessageDefinition], values: Sequence[MessageValue]
-) -> list[bytes]:
+def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
     """The payload of each value. Raises `NoJudgementError` if genpy refuses the message."""
     server = _server()
     assert server is not None, "ask is_installed() first"

@@ -6,16 +6,15 @@ mcap-ros2-support, where it is installed, must read the same values out of its b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from fusesoc_firm.frame.codec import MessageValue
 from fusesoc_firm.message import ROS2
-from fusesoc_firm.message.model import MessageDefinition, MessageName
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.verify import genpy_judge, mcap_judge, rosbags_judge
 from fusesoc_firm.verify.definitions import NoJudgementError, with_wide_arrays, with_wide_units
 
-Definitions = Mapping[MessageName, MessageDefinition]
 Serialise = Callable[[MessageName, Definitions, Sequence[MessageValue]], list[bytes]]
 
 

@@ -12,6 +12,7 @@ from typing import Any
 from fusesoc_firm.frame.codec import MessageValue
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     FieldType,
     MessageDefinition,
     MessageName,
@@ -37,7 +38,7 @@ def version() -> str:
 
 def check(
     name: MessageName,
-    definitions: Mapping[MessageName, MessageDefinition],
+    definitions: Definitions,
     values: Sequence[MessageValue],
     payloads: Sequence[bytes],
 ) -> None:
@@ -59,7 +60,7 @@ def check(
             raise NoJudgementError(f"{TITLE} reads a different value")
 
 
-def _renamed(definitions: Mapping[MessageName, MessageDefinition]) -> dict[MessageName, MessageDefinition]:
+def _renamed(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
     """The same under names that it accepts: those of actions' messages hold a `_`, which only ROS itself may use."""
     names = {name: MessageName("renamed", f"M{number}") for number, name in enumerate(definitions)}
     return {
@@ -85,15 +86,13 @@ def _renamed_type(type_: FieldType, names: Mapping[MessageName, MessageName]) ->
     return type_
 
 
-def _is_same_message(
-    found: Any, definition: MessageDefinition, definitions: Mapping[MessageName, MessageDefinition], value: MessageValue
-) -> bool:
+def _is_same_message(found: Any, definition: MessageDefinition, definitions: Definitions, value: MessageValue) -> bool:
     return all(
         _is_same(getattr(found, field.name), field.type, definitions, value[field.name]) for field in definition.fields
     )
 
 
-def _is_same(found: Any, type_: FieldType, definitions: Mapping[MessageName, MessageDefinition], value: Any) -> bool:
+def _is_same(found: Any, type_: FieldType, definitions: Definitions, value: Any) -> bool:
     match type_:
         case MessageType(name):
             return _is_same_message(found, definitions[name], definitions, value)

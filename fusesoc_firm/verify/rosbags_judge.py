@@ -17,8 +17,8 @@ from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.middleware import Middleware, middlewares
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     FieldType,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,
@@ -38,9 +38,7 @@ def version() -> str:
     return metadata.version(TITLE)
 
 
-def serialise(
-    name: MessageName, definitions: Mapping[MessageName, MessageDefinition], values: Sequence[MessageValue]
-) -> list[bytes]:
+def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
     """The payload of each value; the padding of CDR is zero. Raises `NoJudgementError` if rosbags cannot read it."""
     ros = definitions[name].ros
     texts = {other: plain_text(definition) for other, definition in definitions.items()}
@@ -81,9 +79,7 @@ def _long(name: MessageName) -> str:
     return f"{name.package}/msg/{name.name}"
 
 
-def _message(
-    store: Typestore, name: MessageName, definitions: Mapping[MessageName, MessageDefinition], value: MessageValue
-) -> object:
+def _message(store: Typestore, name: MessageName, definitions: Definitions, value: MessageValue) -> object:
     arguments = {
         normalize_fieldname(field.name): _argument(
             store, field.type, definitions, definitions[name].ros, value[field.name]
@@ -96,7 +92,7 @@ def _message(
 def _argument(
     store: Typestore,
     type_: FieldType,
-    definitions: Mapping[MessageName, MessageDefinition],
+    definitions: Definitions,
     ros: Middleware,
     value: Any,
 ) -> Any:

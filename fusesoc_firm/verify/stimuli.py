@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import chain, cycle, islice
 from typing import Any
@@ -13,8 +13,8 @@ from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import (
     ArrayType,
+    Definitions,
     FieldType,
-    MessageDefinition,
     MessageName,
     MessageType,
     PrimitiveType,
@@ -52,7 +52,7 @@ class Stimuli:
     ranges, NaN or infinite, and its texts hold characters of up to four bytes.
     """
 
-    definitions: Mapping[MessageName, MessageDefinition]
+    definitions: Definitions
     ros: Middleware
     chance: random.Random
     longest: int = 4

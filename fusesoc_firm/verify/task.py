@@ -15,7 +15,7 @@ from fusesoc_firm.frame.codec import CodecError, MessageValue, encode, pack_fram
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.middleware import Middleware
-from fusesoc_firm.message.model import MessageDefinition, MessageName
+from fusesoc_firm.message.model import Definitions, MessageName
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.verify.definitions import NoJudgementError
 from fusesoc_firm.verify.judge import judge
@@ -42,7 +42,7 @@ class Task:
     """A message with all definitions below it, and how it is verified; it needs no file, so any machine can do it."""
 
     name: MessageName
-    definitions: Mapping[MessageName, MessageDefinition]
+    definitions: Definitions
     width: int
     stimuli: int
     seed: int

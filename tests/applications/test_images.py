@@ -11,7 +11,7 @@ import pytest
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics
 from tests.applications.images import (

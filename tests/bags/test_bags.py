@@ -19,7 +19,7 @@ from fusesoc_firm.bags.routes import routes_of
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS1, ROS2
-from fusesoc_firm.message.bags import open_bag
+from fusesoc_firm.message.bag_reader import open_bag
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.model import MessageName

@@ -25,11 +25,11 @@ SECONDS, SPEED_UP = 10.0, 1.7
 
 _COLUMNS = ("converters", "by", "processors", "wall, s", "processor, s", "speed-up", "bar", "result")
 _NOTE = f"""
-    Subscriber and publisher of {CONVERTERS // len(WIDTHS)} messages of ROS 2 at {len(WIDTHS)} widths, set up for a tool
-    in a new build root, the start of Python included. Of `firm build` the fastest of {RUNS} runs, since what else the
-    machine does can only add; runs on one processor and on two take turns. `fusesoc run` is started once for each core,
-    one after another. All leave the same bytes. What FuseSoC itself does for the generated cores of a single core it
-    does one after another, so that layout gains less from a second processor.
+    The cores contain a subscriber and a publisher for {CONVERTERS // len(WIDTHS)} messages of ROS 2 at {len(WIDTHS)}
+    widths. They are set up for a tool in a new build root; times include the start of Python. The time of `firm
+    build` is that of the fastest of {RUNS} runs, since other load only adds to it; runs on one and two processors
+    alternate. `fusesoc run` is started for one core after another. All runs produce the same bytes. FuseSoC itself
+    processes the generated cores of one core sequentially, so a single core gains less from a second processor.
     """
 
 

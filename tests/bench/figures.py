@@ -54,7 +54,7 @@ PAGES = (
         ("manager", "timing", "use"),
     ),
     Page("applications", "Figures of whole systems", "area and cycles", ("images", "links", "applications")),
-    Page("builds", "Figures of builds", "times", ("systems", "builds", "simulators", "store")),
+    Page("builds", "Figures of builds", "build and simulation times", ("systems", "builds", "simulators", "store")),
     Page("nodes", "Figures of replays and live nodes", "latencies and throughput", ("replay", "live")),
 )
 _HEADINGS = {
@@ -75,29 +75,31 @@ _HEADINGS = {
     "live": "Live nodes",
 }
 _METHODS = {
-    "area": f"""LUT and FF after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the cells LUT1
-        to LUT6, and inverters but for those of resets, which a slice has; FF are FDRE, FDSE, FDCE and FDPE. A design
-        with a latch fails. The dissertation's are Vivado's on an UltraScale+, LUT/FF.""",
-    "manager": "Measured as in 'Area'.",
-    "timing": f"""The clock's frequency that all paths keep after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
-        (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. Another seed gives figures
-        some percent away.""",
+    "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the
+        cells LUT1 to LUT6, and inverters except those of resets, which a slice contains. FF are FDRE, FDSE, FDCE and
+        FDPE. A design with a latch fails. The dissertation's values are LUT/FF by Vivado for an UltraScale+.""",
+    "manager": "Measured as in [Area](converters.md#area).",
+    "timing": f"""The clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
+        (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. With another seed, the
+        figures differ by some percent.""",
     "use": "Counted in the cycle-exact models of the schedulers.",
-    "cycles": "Counted in a simulation of the netlist that `ghdl --synth` makes, by Verilator.",
-    "fuzz": """Frames at a subscriber's stream, good and broken ones by turns of chance, in a simulation of the netlist.
-        Every good one must be delivered as it is, no other, and each broken one must give one frame_error.""",
-    "images": """Accelerators of specs/image_pipeline and specs/sobel, alone: cycles as above, LUT/FF as in 'Area'.""",
-    "links": "Measured as in 'Area'.",
-    "applications": f"""The whole of each of the [demo systems](../reference/applications.md), its streams as ports,
-        measured as in 'Area', for ECP5 with `{yosys.ECP5.synthesis}` and for iCE40 UltraPlus with
-        `{yosys.ICE40.synthesis}`. The targets `synth_*` do the same with the Yosys that is installed.""",
-    "systems": "Time that a user waits for a large system.",
-    "builds": "Time that a user waits for many cores.",
-    "simulators": """The system of specs/quat2euler, converters, Manager and accelerator, beside the simulated host: the
-        same frames and stalls in every simulator, and the same bytes back.""",
-    "store": "What is generated on a second run of FuseSoC, and what that costs.",
-    "replay": """Bags through `firm replay`: written with rosbags, and what is recorded is read with rosbags.""",
-    "live": "[`firm live`](../how-to/run-live.md) in a running ROS.",
+    "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
+    "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
+        netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
+        not be delivered.""",
+    "images": """The accelerators of specs/image_pipeline and specs/sobel are measured alone, LUT/FF as in
+        [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
+    "links": "Measured as in [Area](converters.md#area).",
+    "applications": f"""Each of the [demo systems](../reference/applications.md) is measured as a whole, with its
+        streams as ports, as in [Area](converters.md#area). For ECP5, Yosys runs `{yosys.ECP5.synthesis}`, and for iCE40
+        UltraPlus `{yosys.ICE40.synthesis}`. The targets `synth_*` run the same commands with the installed Yosys.""",
+    "systems": "Time to check and generate a large system.",
+    "builds": "Time to generate many cores.",
+    "simulators": """The system of specs/quat2euler, with converters, Manager and accelerator, is connected to the
+        simulated host. Frames and stalls are the same in every simulator, and so are the received bytes.""",
+    "store": "The number of cores that a second run of FuseSoC generates, and its time.",
+    "replay": "`firm replay` replays bags that rosbags has written. The recorded bags are read with rosbags.",
+    "live": "[`firm live`](../how-to/run-live.md) with a running ROS.",
 }
 _INTRODUCTION = """# {title}
 
@@ -105,7 +107,7 @@ For readers who compare designs, versions or tools.
 After it you can look up {subject}.
 
 Written by `make bench BENCH='{parts}'`.
-[Figures](index.md) explains the words of the tables.
+[Figures](index.md) explains the terms in the tables.
 """
 
 

@@ -37,8 +37,9 @@ WIDTHS = (8, 64)
 _LENGTH_BYTES = 4
 _COLUMNS = ("subscriber", "ROS", "bits", "broken", "good", "delivered", "frame_error", "cycles", "result")
 _NOTE = f"""
-    Cut, lengthened, with lengths, counts and other bytes that lie, of another message, and all in company;
-    'frame_error' counts its cycles. Every stream waits in {STALL_PERCENT} % of the cycles. Seed """
+    Broken frames are truncated or too long, have wrong lengths, counts or other bytes, belong to another message, or
+    combine these faults. 'frame_error' counts its cycles. Every stream stalls in {STALL_PERCENT} % of the cycles. The
+    seed is """
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,11 @@ FULL_HD = (1080, 1920)
 _HERE = Path(__file__).parent
 _COLUMNS = ("accelerator", "bits", "cycles", "first to last", "pixels a cycle", "LUT/FF", "block RAM", "bar", "result")
 _NOTE = """
-    A noise image and nobody who waits; the result is the model's, byte for byte. 'cycles' are those of the whole
-    message, from its first segment to its end; 'first to last' those from the first beat of data to the last, both
-    included, at the side of the accelerator where they are more, and 'pixels a cycle' the image's by these. The
-    integral's sums have 32 bits, so a stream of 64 bits carries two a cycle at the very most.
+    The input is a noise image, without stalls; the result equals the model's byte for byte. 'cycles' counts the
+    whole message, from its first segment to its end. 'first to last' counts from the first to the last beat of
+    data, both included, at the slower side of the accelerator. 'pixels a cycle' is the number of pixels divided by
+    'first to last'. The sums of the integral image have 32 bits, so a stream of 64 bits carries at most two pixels
+    in a cycle.
     """
 
 

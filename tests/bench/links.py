@@ -23,8 +23,10 @@ _CROSSINGS: dict[str, tuple[str, dict[str, Generic]]] = {
     },
 }
 _NOTES = {
-    LINKS_TITLE: "With the FIFOs of their defaults, which are in block RAM; at 100 MHz and 1 Mbaud.",
-    CROSSINGS_TITLE: "A message of fixed size has no fields in the crossing, since they hold until they are answered.",
+    LINKS_TITLE: """The FIFOs have their default depths and are in block RAM; the clock is 100 MHz, and the UART has 1
+        Mbaud.""",
+    CROSSINGS_TITLE: """The crossing of a message of fixed size has no registers for fields, since the fields are stable
+        until the answer.""",
 }
 
 

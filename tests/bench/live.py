@@ -23,11 +23,11 @@ RATE, SECONDS = 100, 60.0
 _NODES = {1: ("firm live, ROS 1", "rospy's echo"), 2: ("firm live, ROS 2", "rclpy's echo")}
 _COLUMNS = ("node", "sent", "lost", "out of order", "median, ms", "99 %, ms", "to echo", "bar", "result")
 _NOTE = f"""
-    geometry_msgs/Quaternion from a peer of rospy or rclpy, at {RATE} Hz for {SECONDS:g} s, and geometry_msgs/Point
-    back: the time from the call that publishes to the callback. quat2euler at 8 bits is simulated by Verilator. All
-    queues hold 1,000 messages. The echo is a node of a few lines that answers in its callback; the same peer sends to
-    both, in turns. 'to echo' is the quotient of the medians, 'out of order' counts wrong values, too. The bar: nothing
-    lost, nothing out of order.
+    A peer of rospy or rclpy publishes geometry_msgs/Quaternion at {RATE} Hz for {SECONDS:g} s and receives
+    geometry_msgs/Point. Times are from the call that publishes to the callback. Verilator simulates quat2euler at 8
+    bits. All queues hold 1,000 messages. The echo is a node of a few lines that answers in its callback; the same
+    peer sends to both alternately. 'to echo' is the quotient of the medians. 'out of order' includes wrong values.
+    The bar allows no lost message and none out of order.
     """
 _WAYS = [("/QuaternionToEuler_sub", "/QuaternionToEuler_pub"), ("/echo_sub", "/echo_pub")]
 # Angles are right to this, in rad.

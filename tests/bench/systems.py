@@ -30,10 +30,10 @@ RUNS = 5
 
 _COLUMNS = ("what", "wall, s", "processor, s", "bar, s", "result")
 _NOTE = f"""
-    Medians of {RUNS} runs, each a process of its own, the start of Python included. The system is a random one
-    (tests/random_systems.py) of messages that rosbags ships, with skeletons as accelerators. 'cold' is with an empty
-    store, 'from the store' the same call again. The bar is held against the processor's time: one thread that waits for
-    nobody takes as long by the wall clock where the machine has nothing else to do.
+    Times are medians of {RUNS} runs, each in a new process, including the start of Python. The system is a random
+    one (tests/random_systems.py) with messages that rosbags ships and skeletons as accelerators. 'cold' starts with
+    an empty store; 'from the store' repeats the call. The bar applies to the processor time, which equals the
+    wall-clock time of one thread on an idle machine.
     """
 
 

@@ -9,7 +9,7 @@ from fusesoc_firm.scheduling.policies import POLICIES
 from tests.bench.schedulers import LONGEST_TIME, SHORTEST_TIME, TIME_BITS
 from tests.bench.tables import MET, MISSED, Table, Tell
 
-TITLE = "Cycles with a beat where everybody always has a task, in percent"
+TITLE = "Cycles with a beat while every requester always has a task, in percent"
 REQUESTERS = (8, 32, 256)
 TASK_BEATS = (1, 2, 3, 4, 5, 8, 16)
 LEAST_USED = 99.5
@@ -21,9 +21,10 @@ _CYCLES = 3000
 
 _COLUMNS = ("design", *map(str, TASK_BEATS), f"shortest with {LEAST_USED} %", "bar", "result")
 _NOTE = f"""
-    The columns are the beats of each task, by which nobody pauses and no sink stalls; the worst of {_SETS} sets of
-    periods from {SHORTEST_TIME} to {LONGEST_TIME} cycles, over {_CYCLES} cycles, beginning {_SKIPPED_CYCLES} after
-    reset. The shortest task is that from which on all reach {LEAST_USED} %.
+    The columns are the numbers of beats of a task. There are no pauses and no stalls of the sink. The value is the
+    worst of {_SETS} sets of periods from {SHORTEST_TIME} to {LONGEST_TIME} cycles, over {_CYCLES} cycles, which
+    begin {_SKIPPED_CYCLES} cycles after reset. The shortest task is the one from which all longer ones reach
+    {LEAST_USED} %.
     """
 
 

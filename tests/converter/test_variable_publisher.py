@@ -10,7 +10,6 @@ from fusesoc_firm.converter.message_ports import message_ports
 from fusesoc_firm.converter.stream import WIDTHS
 from fusesoc_firm.converter.variable_publisher import (
     VARIABLE_PUBLISHER_TEMPLATE,
-    Configuration,
     variable_publisher_configuration,
 )
 from fusesoc_firm.frame.model import Frame
@@ -18,22 +17,22 @@ from fusesoc_firm.frame.select import select
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.text.diagnostics import InputError
-from fusesoc_firm.text.render import TEMPLATES, render
+from fusesoc_firm.text.render import TEMPLATES, Context, render
 from tests.frame.test_layout import layout
 
 HEADER = "uint32 seq\ntime stamp\nstring frame_id\n"
 IMAGE = "Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data\n"
 
 
-def configured(frame: Frame, width: int = 8) -> Configuration:
+def configured(frame: Frame, width: int = 8) -> Context:
     return variable_publisher_configuration(frame, width, "p_m_to_axis")
 
 
-def places(configuration: Configuration) -> list[tuple[int, int | None, str]]:
+def places(configuration: Context) -> list[tuple[int, int | None, str]]:
     return [(area["first"], area["last"], area["text"]) for area in configuration["areas"]]
 
 
-def words(configuration: Configuration) -> list[tuple[int, int, str]]:
+def words(configuration: Context) -> list[tuple[int, int, str]]:
     """The highest and the lowest bit of each piece of the words, and its value, as they stand in the text."""
     text = render(VARIABLE_PUBLISHER_TEMPLATE, configuration)
     found = re.findall(r"^  all_words\((\d+) downto (\d+)\) *<= (.*);$", text, re.MULTILINE)

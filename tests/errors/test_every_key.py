@@ -115,7 +115,7 @@ def checker(
             known.update(make(paths, None, store))
         return known
 
-    monkeypatch.setattr("fusesoc_firm.system.beside.libraries", shared)
+    monkeypatch.setattr("fusesoc_firm.system.message_sources.libraries", shared)
     own = [path for path in (folder / "msg", folder / "franka_msgs") if path.is_dir()]
     return Checker(folder / spec.name, own, capsys)
 

@@ -143,7 +143,8 @@ def core_files(*cores: str, fileset: str = "rtl") -> list[Path]:
     files = []
     for core in cores:
         description = CORES / f"{core}.core"
-        files += [description.parent / name for name in core_description(description)["filesets"][fileset]["files"]]
+        names = core_description(description)["filesets"][fileset].get("files", [])
+        files += [description.parent / name for name in names]
     return files
 
 

@@ -71,6 +71,7 @@ import sys
 from pathlib import Path
 from fusesoc_firm.converter.stages import STAGES
 from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.verify.complexity import statistics
 
@@ -78,7 +79,7 @@ for ros in (ROS1, ROS2):
     library = MessageLibrary(ros, [Path(sys.argv[1])])
     for word in sys.argv[2:]:
         name = parse_name(word)
-        if not (ros == 1 and "bounded" in word):
+        if not (ros is ROS1 and "bounded" in word):
             definitions = library.closure(name)
             assert statistics(name, definitions).depth == 60
             print(*(len(text(name, definitions, 8)) for stage, text in STAGES.items() if stage != "config"))

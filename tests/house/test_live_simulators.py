@@ -17,7 +17,7 @@ from fusesoc_firm.node.bursts import BurstJoiner
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.node.transport.transport import Burst
 from fusesoc_firm.simulation.simulator import BuiltSimulator, CoreSources, build_simulator
-from fusesoc_firm.system.beside import core_of
+from fusesoc_firm.system.message_sources import core_of
 from fusesoc_firm.text.diagnostics import InputError
 from fusesoc_firm.tools.simulators import fitting
 from tests.house.test_main_job import ROOT, run

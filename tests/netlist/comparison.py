@@ -19,16 +19,24 @@ from tests.netlist.simulators import RESETS, ToolError
 INPUTS = 50
 
 
+DIFFERENCE = "differ"
+# No netlist: GHDL crashes, or reports an error; or the translation says what GHDL would make wrong.
+CRASH, REFUSAL = "crash GHDL", "are refused"
+# A simulator or Yosys does not take its input.
+FAILURE = "fail in a simulator"
+
+
 @dataclass(frozen=True)
 class Difference:
-    """A design whose netlist is wrong, and how it was seen: `judge` is the simulator of the netlist, or "netlist"."""
+    """A design whose netlist is wrong, or that has none, and who says so: a judge, or `translation`, or `tool`."""
 
     design: Design
     judge: str
+    kind: str
     message: str
 
     def __str__(self) -> str:
-        return f"{self.judge}, seed {self.design.seed}: {self.message}\n\n{self.design.text}"
+        return f"{self.judge}, seed {self.design.seed}, {self.kind}: {self.message}\n\n{self.design.text}"
 
 
 def designs(seed: int, first: int, number: int) -> list[Design]:
@@ -46,12 +54,19 @@ def differences(batch: Sequence[Design], judges: Sequence[str]) -> list[Differen
     except (ToolError, NetlistError) as error:
         refused = _named(str(error), batch)
         if refused or len(batch) == 1:
-            found = [Difference(item, type(error).__name__, str(error)) for item in refused or batch]
+            who, kind = _refusal(error)
+            found = [Difference(item, who, kind, str(error)) for item in refused or batch]
             return [*found, *differences([item for item in batch if item not in refused and refused], judges)]
         half = len(batch) // 2
         return [*differences(batch[:half], judges), *differences(batch[half:], judges)]
     finally:
         shutil.rmtree(folder)
+
+
+def _refusal(error: Exception) -> tuple[str, str]:
+    if isinstance(error, ToolError):
+        return "tool", FAILURE
+    return "translation", CRASH if "GHDL crashed" in str(error) else REFUSAL
 
 
 def _named(message: str, batch: Sequence[Design]) -> list[Design]:
@@ -84,6 +99,7 @@ def _compared(batch: Sequence[Design], judges: Sequence[str], folder: Path) -> I
                     yield Difference(
                         item,
                         judge,
+                        DIFFERENCE,
                         f"with input {line // 2}, {when}: {right} in GHDL, {got} in {judge}",
                     )
                     break

@@ -38,6 +38,7 @@ def _clocked(body: str, declarations: str = "") -> str:
 
 _WORDS = "type words is array (0 to 3) of std_logic_vector(7 downto 0);"
 _PLACE, _OTHER = "to_integer(unsigned(x(17 downto 16)))", "to_integer(unsigned(x(19 downto 18)))"
+_INTEGER = "to_integer(unsigned(x(46 downto 16)))"
 _RESULT = 'signal r : std_logic_vector(7 downto 0) := X"A5";'
 
 FAULTS = [
@@ -52,9 +53,30 @@ FAULTS = [
     _design("negative", 80, "signed(x(79 downto 0)) - (-3)"),
     _design("subtracted", 16, "100 - s"),
     _design("subtracted_within", 16, '5 - shift_left("-"(100, s) - (3 - (7 - s)), 1)'),
+    _design(
+        # Its value is all that a slice takes, so that GHDL's netlist has the slice's place for the subtraction.
+        "subtracted_for_a_function",
+        16,
+        "whole(5 - s)",
+        "function whole(p : signed(15 downto 0)) return signed is begin return p(15 downto 0); end;",
+    ),
+    _design("subtracted_by_full_name", 16, 'ieee.numeric_std."-"(5, s)'),
     _design("rotated", 16, "rotate_left(u, to_integer(unsigned(x(22 downto 16))))"),
     _design("rotated_right", 7, "rotate_right(u(6 downto 0), to_integer(unsigned(x(22 downto 16))))"),
     _design("narrowed", 5, "resize(s, 5)"),
+    _design("narrowed_to_a_bit", 1, "ieee.numeric_std.resize(s, 1)"),
+    _design(
+        "narrowed_in_a_variable",
+        5,
+        "r",
+        "signal r : signed(4 downto 0);",
+        "process (s) variable v : signed(4 downto 0); begin v := resize(s, 5); r <= v(4 downto 0); end process;",
+    ),
+    _design("product_with_a_number_that_is_cut", 48, f"unsigned'(unsigned(s(7 downto 0) * 1000) & u * {_INTEGER})"),
+    _design(
+        "divided_by_a_number_that_does_not_fit", 24, f"signed'(s / ({_INTEGER} mod 70000 + 1) & s(7 downto 0) mod 1000)"
+    ),
+    _design("divided_number_that_does_not_fit", 8, f'({_INTEGER} mod 1000) / (u(7 downto 0) or X"04")'),
     _design(
         "compared",
         8,
@@ -72,6 +94,27 @@ FAULTS = [
                     "-70000 > s",
                     "signed(x(63 downto 0)) < -1",
                     "signed(x(79 downto 16)) > -70000",
+                ]
+            )
+        ),
+    ),
+    _design(
+        "compared_with_an_integer",
+        8,
+        "c",
+        "signal c : std_logic_vector(7 downto 0);",
+        "\n  ".join(
+            f"c({bit}) <= '1' when {condition} else '0';"
+            for bit, condition in enumerate(
+                [
+                    f"s < {_INTEGER}",
+                    f"{_INTEGER} <= s",
+                    f"u(4 downto 0) = {_INTEGER}",
+                    f"u /= {_INTEGER}",
+                    "s(5 downto 0) >= to_integer(signed(x(40 downto 10)))",
+                    "s > to_integer(signed(x(41 downto 10)))",
+                    f"unsigned(x(79 downto 16)) > {_INTEGER}",
+                    f"signed(x(79 downto 16)) > {_INTEGER}",
                 ]
             )
         ),
@@ -162,6 +205,107 @@ LOST = [
         _clocked("if rst = '1' then r <= (63 downto 62 => '1', others => '0'); else r <= x(63 downto 0); end if;"),
     ),
 ]
+
+_TABLE = "type words is array (0 to 7) of std_logic_vector(7 downto 0);"
+_OF_TABLE = '(0 => X"01", 3 => X"80", others => X"00")'
+# Those whose values GHDL computes.
+COMPUTED = [
+    _design("shifted_constant", 64, "unsigned(x(63 downto 0)) xor shift_left(to_unsigned(1, 64), 40)"),
+    _design(
+        "named_and_computed",
+        64,
+        "unsigned(x(63 downto 0)) xor K",
+        "constant SHIFT : natural := 40; constant K : unsigned(63 downto 0) := shift_left(to_unsigned(1, 64), SHIFT);",
+    ),
+    _design("joined", 64, "r", "signal r : unsigned(63 downto 0);", 'r <= unsigned\'(X"00000001" & X"00000000");'),
+    _design(
+        "table",
+        8,
+        f"T({_PLACE})",
+        f"{_TABLE} constant T : words := {_OF_TABLE};",
+    ),
+    _design(
+        "reset_of_an_array",
+        8,
+        f"r({_PLACE})",
+        f"{_TABLE} signal r : words;",
+        _clocked(f"if rst = '1' then r <= {_OF_TABLE}; else r({_OTHER}) <= x(27 downto 20); end if;"),
+    ),
+    _design(
+        "reset_of_a_record",
+        64,
+        "r.high & r.low",
+        "type pair is record low, high : std_logic_vector(31 downto 0); end record; signal r : pair;",
+        _clocked(
+            'if rst = \'1\' then r <= (low => X"00000000", high => X"00000001"); else\n'
+            "r <= (low => x(31 downto 0), high => x(63 downto 32)); end if;"
+        ),
+    ),
+    _design(
+        "choice",
+        1,
+        "r",
+        "signal r : std_logic_vector(0 downto 0);",
+        'process (x) begin case x(63 downto 0) is when X"0000000100000000" => r <= "1";\n'
+        'when others => r <= "0"; end case; end process;',
+    ),
+    _design(
+        "without_low_levels",
+        64,
+        "r",
+        "signal r : std_logic_vector(63 downto 0);",
+        _clocked("if rst = '1' then r <= (40 => '1', others => '-'); else r <= x(63 downto 0); end if;"),
+    ),
+]
+
+_LONG_TABLE = (
+    "type longs is array (0 to 3) of std_logic_vector(63 downto 0);\n"
+    'constant T : longs := (0 => X"0000000000000001", 1 => X"8000000000000000", others => X"0000000000000001");\n'
+    "signal r : std_logic_vector(63 downto 0);"
+)
+# One of a table's constants.
+COMPUTED.append(
+    _design(
+        "element", 64, "r", _LONG_TABLE, _clocked("if rst = '1' then r <= (others => '0'); else r <= T(1); end if;")
+    )
+)
+# Those that would be lost as a whole or alone, beside a zero of as many bits.
+KEPT = [
+    _design(
+        "sliced",
+        64,
+        "r",
+        'constant K : unsigned(63 downto 0) := X"8000000000000000"; signal r : unsigned(63 downto 0);',
+        _clocked(
+            "if rst = '1' then r <= (others => '0'); else\n"
+            "r <= unsigned'(unsigned(x(63 downto 32)) xor K(63 downto 32)) & K(31 downto 0); end if;"
+        ),
+    ),
+    _design(
+        "indexed",
+        64,
+        "r",
+        _LONG_TABLE,
+        _clocked(f"if rst = '1' then r <= (others => '0'); else r <= T({_PLACE}); end if;"),
+    ),
+]
+
+# An integer without bits.
+CRASH = _design(
+    "crash", 8, "to_unsigned(j, 8)", "signal j : integer range 0 to 0 := 0;", "j <= to_integer(u(7 downto 0)) mod 1;"
+)
+
+
+def growing(more: int) -> Design:
+    """Assignments to bits of signals, so many that a table of GHDL grows in the midst of one or between two."""
+    signals = [f"a{number}" for number in range(10)]
+    declarations = "".join(f"signal {name} : std_logic_vector(127 downto 0);\n" for name in [*signals, "b", "c"])
+    first = "".join(f"b({bit}) <= x({bit});\n" for bit in range(more))
+    bits = "".join(f"{{0}}({bit}) <= not x({bit});\n" for bit in range(1, 127, 2))
+    each = "".join(f"process (x) begin {name} <= x;\n{bits.format(name)}end process;\n" for name in signals)
+    others = f"process (x) begin b <= x;\n{first}end process;\n"
+    return _design(f"growing{more}", 128, " xor ".join([*signals, "b"]), declarations, others + each)
+
 
 # A register whose reset value GHDL's netlist has wrong.
 MIXED = _design(

@@ -12,7 +12,7 @@ from queue import Empty, SimpleQueue
 from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.node.carrier import CarrierError, Published, Taken
 from fusesoc_firm.node.description import NodeDescription
-from fusesoc_firm.node.engine import HardwareListener, Node, NodeSettings, OpenTransport
+from fusesoc_firm.node.node import HardwareListener, Node, NodeSettings, OpenTransport
 from fusesoc_firm.node.software import NodeSoftware
 from fusesoc_firm.node.trace import Trace
 from fusesoc_firm.node.transport.transport import Burst, TransportError

@@ -17,14 +17,14 @@ from fusesoc_firm.frame.codec import pack_frame
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.node.bursts import split_frame
 from fusesoc_firm.node.carrier import CarrierError, ros_arguments
+from fusesoc_firm.node.cpp_trace import are_steps, write_ways
 from fusesoc_firm.node.description import describe
-from fusesoc_firm.node.engine import HardwareListener, NodeSettings
+from fusesoc_firm.node.node import HardwareListener, NodeSettings
 from fusesoc_firm.node.options import add_node_options, remappings
+from fusesoc_firm.node.python_node import python_node
 from fusesoc_firm.node.queues import Overflow
 from fusesoc_firm.node.run import run_options
 from fusesoc_firm.node.software import node_software
-from fusesoc_firm.node.source import python_node
-from fusesoc_firm.node.steps import are_steps, write_ways
 from fusesoc_firm.node.trace import CYCLES, WALL_TIMES, Trace
 from fusesoc_firm.node.trace_picture import draw_trace
 from fusesoc_firm.node.transport.transport import Burst, TransportError

@@ -11,7 +11,7 @@ import pytest
 
 from fusesoc_firm.message.library import libraries
 from fusesoc_firm.message.middleware import middleware_of
-from fusesoc_firm.node.package import cpp_package, generated_files, headers
+from fusesoc_firm.node.cpp_package import cpp_package, generated_files, headers
 from fusesoc_firm.plugin.generators import GENERATORS
 from fusesoc_firm.request.request import Request
 from fusesoc_firm.system.system_core import LoadedSystem, load_system

@@ -9,7 +9,7 @@ import pytest
 from rosbags.rosbag1 import Writer as Rosbag1Writer
 
 from fusesoc_firm.cli import main
-from fusesoc_firm.message.bags import Form
+from fusesoc_firm.message.bag_reader import Form
 from fusesoc_firm.node.transport.simulator import Simulator
 from fusesoc_firm.replay.command import Settings, Source, Target, replay
 from fusesoc_firm.system.system_core import LoadedSystem

@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from fusesoc_firm.message.bags import Form
+from fusesoc_firm.message.bag_reader import Form
 from fusesoc_firm.replay.command import Target
 from tests.replay.replays import Item, load, passing, payload, read, run, specification, write
 

@@ -23,8 +23,8 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message.library import MessageLibrary, libraries
 from fusesoc_firm.message.middleware import middleware_of
 from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.node.cpp_trace import write_ways
 from fusesoc_firm.node.description import describe
-from fusesoc_firm.node.steps import write_ways
 from fusesoc_firm.simulation.simulator import build_simulator
 from fusesoc_firm.system.system_core import load_system
 from tests.applications.images import filtered, image, load_model

@@ -10,7 +10,7 @@ from fusesoc_firm.frame.layout import frame_of
 from fusesoc_firm.message import ROS1
 from fusesoc_firm.message.library import MessageLibrary
 from fusesoc_firm.message.parser import parse_name
-from fusesoc_firm.simulation.frames import expected_text, stimulus_text
+from fusesoc_firm.simulation.host_files import expected_text, stimulus_text
 from fusesoc_firm.simulation.reference import responses
 from fusesoc_firm.simulation.stimuli import read_stimuli
 from fusesoc_firm.system.derived.model import Converter

@@ -11,7 +11,7 @@ import pytest
 
 from fusesoc_firm.frame.codec import encode
 from fusesoc_firm.simulation.reference import responses
-from fusesoc_firm.simulation.software import Traffic, answered, stimulated, traffic
+from fusesoc_firm.simulation.software_run import Traffic, answered, stimulated, traffic
 from fusesoc_firm.simulation.stimuli import Stimulus
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.text.diagnostics import InputError

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fusesoc_firm.message import ROS1, ROS2
 from fusesoc_firm.message.library import MessageLibrary
-from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.written.specification import Specification, read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError

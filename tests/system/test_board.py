@@ -18,7 +18,7 @@ from fusesoc_firm.system.boards.board import (
     on_board,
     read_board,
 )
-from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.written.specification import read_specification
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError

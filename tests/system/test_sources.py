@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fusesoc_firm.system.derived.analysis import derive
+from fusesoc_firm.system.derived.derivation import derive
 from fusesoc_firm.system.hardware.configuration import SYSTEM_TEMPLATE, system_configuration
 from fusesoc_firm.text.render import render
 from tests.system.systems import LIBRARIES, accelerator, converter, instance, read, specification

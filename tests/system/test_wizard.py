@@ -124,7 +124,7 @@ def test_every_key_is_explained_once(tmp_path: Path) -> None:
     text = run(tmp_path / "robot.yaml", turner())
     assert text.count("# the system's name; the top level is <name>_system") == 1
     assert text.count("middleware: ROS") == 4
-    assert text.count("# whose message it is") == 1
+    assert text.count("# the middleware that defines the message") == 1
 
 
 def test_every_key_of_the_grammar_is_asked_for(tmp_path: Path) -> None:
@@ -207,7 +207,7 @@ def test_answers_read_well(tmp_path: Path) -> None:
         "clock: 100 MHz # frequency",
         "width: 16 # bits",
         "sources: [rtl/turn.vhd, rtl/two.vhd, rtl/three.vhd] # its source files",
-        'include: [x, "no"] # only these fields',
+        'include: [x, "no"] # fields to include',
         "include: y\n",
         '- name: "on"\n',
         '- name: "a, b"\n',

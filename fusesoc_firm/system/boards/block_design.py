@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
-from typing import Any
 
 from fusesoc_firm.system.boards.board import Board, board_entity
 from fusesoc_firm.system.boards.processor import PROCESSORS, Processor
 from fusesoc_firm.system.boards.timing_constraints import period
-from fusesoc_firm.system.derived.kernel import function_name, kernel_entity
+from fusesoc_firm.system.derived.cpp_function import function_name, kernel_entity
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.hardware.configuration import pin_groups
 from fusesoc_firm.system.hardware.names import Names
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 BLOCK_DESIGN_TEMPLATE = "board/block_design.tcl"
 PACKAGE_TEMPLATE = "hls/package.tcl"
@@ -37,7 +35,7 @@ _CLOCK_PINS = (
 )
 
 
-def block_design_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Configuration:
+def block_design_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Context:
     """The configuration of the block design; `clock` is the frequency of clk in Hz."""
     processor = PROCESSORS[str(board.processor)]
     preset = f'apply_board_preset "{1 if board.board_part else 0}"'
@@ -157,7 +155,7 @@ def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, li
     )
 
 
-def _pins(system: DerivedSystem) -> list[Configuration]:
+def _pins(system: DerivedSystem) -> list[Context]:
     """The pins of accelerators as ports of the design."""
     return [
         {"name": port["name"], "direction": "I" if port["direction"] == "in" else "O", "bits": port["bits"]}
@@ -168,7 +166,7 @@ def _pins(system: DerivedSystem) -> list[Configuration]:
 
 def package_configuration(
     type_: AcceleratorType, sources: Sequence[str], system: DerivedSystem, board: Board, clock: Fraction
-) -> Configuration:
+) -> Context:
     """The configuration of the script by which Vitis HLS makes an IP of a C++ function, from `sources` beside it."""
     clocks = {item.name: item.frequency for item in system.clocks}
     fastest = max(clocks.get(block.clock, clock) for block in system.accelerators if block.type is type_)
@@ -180,9 +178,9 @@ def package_configuration(
     }
 
 
-def _properties(properties: Iterable[tuple[str, object]]) -> list[Configuration]:
+def _properties(properties: Iterable[tuple[str, object]]) -> list[Context]:
     return [{"name": name, "value": str(value)} for name, value in properties]
 
 
-def _pairs(pairs: Iterable[tuple[str, str]]) -> list[Configuration]:
+def _pairs(pairs: Iterable[tuple[str, str]]) -> list[Context]:
     return [{"source": source, "sink": sink} for source, sink in pairs]

@@ -6,17 +6,15 @@ docs/how-to/use-several-clocks.md lists them.
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
 
 from fusesoc_firm.system.boards.board import Board
 from fusesoc_firm.system.boards.processor import PROCESSORS
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.hardware.names import reset_label, seen_reset
+from fusesoc_firm.text.render import Context
 
-Configuration = dict[str, Any]
 
-
-def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Configuration:
+def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Context:
     """The configuration; `clock` is the frequency of clk in Hz. A processor has names of its own for its clocks."""
     clocks = [("clk", clock), *((item.port, item.frequency) for item in system.clocks)]
     if board.processor:

@@ -9,7 +9,7 @@ from fusesoc_firm.converter.constants import constants_package
 from fusesoc_firm.converter.payload_length import length_entity
 from fusesoc_firm.frame.model import Frame
 from fusesoc_firm.message.model import MessageName
-from fusesoc_firm.system.derived.kernel import kernel_entity
+from fusesoc_firm.system.derived.cpp_function import kernel_entity
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem
 from fusesoc_firm.system.written.specification import Block
 from fusesoc_firm.text.diagnostics import Diagnostics

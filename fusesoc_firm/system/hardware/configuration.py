@@ -7,8 +7,6 @@ blocks to them, and `wires` one with another.
 
 from __future__ import annotations
 
-from typing import Any
-
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.system.derived.model import DerivedSystem
 from fusesoc_firm.system.derived.sides import SidePort
@@ -24,8 +22,7 @@ from fusesoc_firm.system.hardware.maps import port_map
 from fusesoc_firm.system.hardware.names import RELEASED, Names, blocks, reset_label, seen_reset
 from fusesoc_firm.system.hardware.scheduler import scheduler_configuration
 from fusesoc_firm.system.hardware.wires import connections
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 # Of the simulated host's clock, in ps.
 _HOST_PERIOD = 10_000
@@ -34,7 +31,7 @@ SYSTEM_TEMPLATE = "vhdl/system.vhd"
 TEST_BENCH_TEMPLATE = "vhdl/test_bench.vhd"
 
 
-def system_configuration(system: DerivedSystem) -> Configuration:
+def system_configuration(system: DerivedSystem) -> Context:
     """The configuration of the top level."""
     names = Names(system)
     return {
@@ -66,7 +63,7 @@ def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
 
 def test_bench_configuration(
     system: DerivedSystem, seed: int, stall_percent: int, environment: str | None, *, is_live: bool
-) -> Configuration:
+) -> Context:
     """The configuration of the test bench: the simulated host beside the system, and at its pins the `environment`.
 
     That is an entity with `clk`, `rst_n` and the pins, each in the other direction. If it `is_live`, the host is at the
@@ -104,7 +101,7 @@ def test_bench_configuration(
     }
 
 
-def _clocks(system: DerivedSystem) -> list[Configuration]:
+def _clocks(system: DerivedSystem) -> list[Context]:
     """Every further clock as a port of the top level."""
     return [
         {
@@ -116,7 +113,7 @@ def _clocks(system: DerivedSystem) -> list[Configuration]:
     ]
 
 
-def _resets(system: DerivedSystem) -> Configuration | None:
+def _resets(system: DerivedSystem) -> Context | None:
     """The resets of further clocks: each domain sees it, one after the other, and clk's; then all let go."""
     if not system.clocks:
         return None
@@ -131,7 +128,7 @@ def _resets(system: DerivedSystem) -> Configuration | None:
     return {"signals": signals, "instances": instances}
 
 
-def _reset(clock: str, release: str, reset: str) -> Configuration:
+def _reset(clock: str, release: str, reset: str) -> Context:
     return {"label": reset_label(reset), "clock": clock, "release": release, "reset": reset}
 
 
@@ -145,7 +142,7 @@ def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
     }
 
 
-def pin_groups(names: Names, system: DerivedSystem) -> list[Configuration]:
+def pin_groups(names: Names, system: DerivedSystem) -> list[Context]:
     """The pins of each block that has some, as ports of the top level."""
     return [
         {
@@ -165,7 +162,7 @@ def pin_groups(names: Names, system: DerivedSystem) -> list[Configuration]:
     ]
 
 
-def dimensions(system: DerivedSystem) -> Configuration:
+def dimensions(system: DerivedSystem) -> Context:
     """The sizes of the top level's ports and signals."""
     publishers = len(system.publishers)
     return {
@@ -182,7 +179,7 @@ def dimensions(system: DerivedSystem) -> Configuration:
     }
 
 
-def _signals(names: Names, block: str, ports: list[tuple[str, SidePort]]) -> Configuration:
+def _signals(names: Names, block: str, ports: list[tuple[str, SidePort]]) -> Context:
     return {
         "block": block,
         "declarations": [

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import PurePosixPath
-from typing import Any
 
 from fusesoc_firm.converter.vhdl import vhdl_type
-from fusesoc_firm.system.derived.kernel import (
+from fusesoc_firm.system.derived.cpp_function import (
     AP_PORTS,
     WORD_BITS,
     Argument,
@@ -18,15 +17,14 @@ from fusesoc_firm.system.derived.kernel import (
 )
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.sides import accelerator_ports
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context
 
 WRAPPER_TEMPLATE = "vhdl/hls_wrapper.vhd"
 KERNEL_TEMPLATE = "vhdl/hls_kernel.vhd"
 SHIM_TEMPLATE = "hls/kernel.cpp"
 
 
-def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
+def wrapper_configuration(accelerator: AcceleratorType) -> Context:
     """The configuration of the wrapper that gives the kernel the message sides of an accelerator."""
     inputs, outputs = arguments(accelerator)
     return {
@@ -50,13 +48,13 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Configuration:
     }
 
 
-def _kernel_port(argument: Argument) -> Configuration:
+def _kernel_port(argument: Argument) -> Context:
     """A port of the kernel, which has a vector for a single bit."""
     is_bit = argument.field.width is None
     return {"port": argument.port, "signal": argument.signal, "bits": argument.bits, "is_bit": is_bit}
 
 
-def kernel_configuration(accelerator: AcceleratorType) -> Configuration:
+def kernel_configuration(accelerator: AcceleratorType) -> Context:
     """The configuration of the kernel that simulation calls the C++ function through, and of the shim between them."""
     inputs, outputs = arguments(accelerator)
     column = max(len(name) for name in [*AP_PORTS, *(f"{argument.port}_ap_vld" for argument in [*inputs, *outputs])])
@@ -73,7 +71,7 @@ def kernel_configuration(accelerator: AcceleratorType) -> Configuration:
     }
 
 
-def _argument(argument: Argument, column: int) -> Configuration:
+def _argument(argument: Argument, column: int) -> Context:
     return {
         "name": argument.port,
         "padded": argument.port.ljust(column),

@@ -6,7 +6,8 @@ Where something is at the system's pins, an entity holds both: so all VHDL becom
 from __future__ import annotations
 
 from fusesoc_firm.system.derived.model import DerivedSystem
-from fusesoc_firm.system.hardware.configuration import Configuration, top_level_pins
+from fusesoc_firm.system.hardware.configuration import top_level_pins
+from fusesoc_firm.text.render import Context
 
 VERILOG_BENCH_TEMPLATE = "verilog/test_bench.v"
 ENVIRONMENT_TEMPLATE = "vhdl/in_environment.vhd"
@@ -21,8 +22,8 @@ def translated_unit(system: DerivedSystem, *, has_environment: bool) -> str:
 
 
 def verilog_bench_configuration(
-    bench: Configuration, system: DerivedSystem, frames: int = 0, beats: int = 0, *, has_environment: bool
-) -> Configuration:
+    bench: Context, system: DerivedSystem, frames: int = 0, beats: int = 0, *, has_environment: bool
+) -> Context:
     """The configuration of the test bench; that of the one in VHDL, `bench`, is part of it.
 
     It has room for `frames` in each file, and for `beats` that wait for the ends of their frames.
@@ -36,7 +37,7 @@ def verilog_bench_configuration(
     }
 
 
-def _open_pins(system: DerivedSystem) -> list[Configuration]:
+def _open_pins(system: DerivedSystem) -> list[Context]:
     """The pins where nothing is at them: inputs are low."""
     names = top_level_pins(system)
     return [

@@ -13,11 +13,10 @@ from fusesoc_firm.frame.select import used_part, with_names_in_use
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.derived.python_function import function_name, parameter_names
 from fusesoc_firm.text.quoting import python_string
+from fusesoc_firm.text.render import Context
 
-Configuration = dict[str, Any]
 
-
-def python_skeleton(type_: AcceleratorType) -> Configuration:
+def python_skeleton(type_: AcceleratorType) -> Context:
     """The configuration of the function's first version."""
     parameters = parameter_names(type_)
     count = len(type_.outputs)
@@ -34,7 +33,7 @@ def python_skeleton(type_: AcceleratorType) -> Configuration:
     }
 
 
-def _described(name: str, frame: Frame) -> Configuration:
+def _described(name: str, frame: Frame) -> Context:
     """A message and its used fields with their types."""
     fields = dict(_fields(frame.nodes, "", 0))
     return {
@@ -70,7 +69,7 @@ def _size(path: Path) -> str:
     return "" if path[-1].count is None else f"[{path[-1].count}]"
 
 
-def _values(frame: Frame) -> list[Configuration]:
+def _values(frame: Frame) -> list[Context]:
     """The default of each field that is used."""
     message = decode(frame, encode_used(with_names_in_use(frame, ()), {}))
     return [{"field": name, "value": _literal(value)} for name, value in used_part(message, frame).items()]

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from fusesoc_firm.converter.message_ports import message_side
 from fusesoc_firm.converter.program import has_bytes
 from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.length import sent_length_of
 from fusesoc_firm.frame.model import Loop, Node
-from fusesoc_firm.system.derived.kernel import arguments, function_name, prototype
+from fusesoc_firm.system.derived.cpp_function import arguments, function_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType, DerivedSystem, MessageSide
 from fusesoc_firm.system.derived.sides import PAYLOAD_LENGTH, SidePort, accelerator_ports
 from fusesoc_firm.system.scaffold.python_skeleton import python_skeleton
 from fusesoc_firm.system.written.specification import SOFTWARE, Pin
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
-from fusesoc_firm.text.render import render
-
-Configuration = dict[str, Any]
+from fusesoc_firm.text.render import Context, render
 
 _FUNCTION_TEMPLATE = "hls/skeleton.cpp"
 _SOFTWARE_TEMPLATE = "python/skeleton.py"
@@ -90,7 +87,7 @@ def _purpose(type_: AcceleratorType) -> str:
     return f"{taken} in, {given} out"
 
 
-def _function(type_: AcceleratorType) -> Configuration:
+def _function(type_: AcceleratorType) -> Context:
     inputs, outputs = arguments(type_)
     return {
         "function": function_name(type_),
@@ -100,7 +97,7 @@ def _function(type_: AcceleratorType) -> Configuration:
     }
 
 
-def _entity(type_: AcceleratorType, language: _Language) -> Configuration:
+def _entity(type_: AcceleratorType, language: _Language) -> Context:
     ports = accelerator_ports(type_)
     of_side = {
         side.prefix: [port for prefix, port in ports if prefix == side.prefix]
@@ -125,7 +122,7 @@ def _entity(type_: AcceleratorType, language: _Language) -> Configuration:
 
 def _declarations(
     type_: AcceleratorType, of_side: dict[str, list[SidePort]], pins: Sequence[Pin], language: _Language
-) -> list[Configuration]:
+) -> list[Context]:
     """The ports of each side, and the pins, as the entity or module declares them."""
     groups = [
         (
@@ -158,7 +155,7 @@ def _declarations(
     ]
 
 
-def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Configuration:
+def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Context:
     """What an output does: its handshake with the message, the length of a message of zeros, zeros for the rest."""
     counts = _counts(side, number)
     by_name = {f"{side.prefix}{port.name}": port for port in ports}
@@ -181,18 +178,18 @@ def _given(number: int, side: MessageSide, ports: Sequence[SidePort]) -> Configu
     }
 
 
-def _length(port: str, side: MessageSide) -> Configuration:
+def _length(port: str, side: MessageSide) -> Context:
     """The length of a message of zeros."""
     value = sent_length_of(side.frame).minimum
     return {"port": port, "value": value, "digits": f"{value:08x}"}
 
 
-def _counts(side: MessageSide, number: int) -> list[Configuration]:
+def _counts(side: MessageSide, number: int) -> list[Context]:
     """The arrays of fixed size that output `number` sends; their elements are counted, as the last one is marked."""
     if side.frame.is_fixed_size:
         return []
     ports = message_side(side.frame)
-    found: list[Configuration] = []
+    found: list[Context] = []
     for loop in _fixed_loops(side.frame.nodes):
         element = ports.element(loop)
         found.append(

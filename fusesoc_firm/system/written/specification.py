@@ -58,8 +58,11 @@ def source_fault(text: str) -> tuple[str, str] | None:
 
 
 _FIELDS: dict[str, Any] = {"form": "texts", "rule": partial(text_fault, longest=LONGEST_PATH)}
-_INCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "only these fields, such as pose.position, each with all below it"}
-_EXCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "none of these fields"}
+_INCLUDE: dict[str, Any] = {
+    **_FIELDS,
+    "meaning": "fields to include, such as pose.position, each with all fields below it",
+}
+_EXCLUDE: dict[str, Any] = {**_FIELDS, "meaning": "fields to exclude"}
 _MIDDLEWARE = {"is_required": True, "choices": tuple(MIDDLEWARES)}
 
 
@@ -79,19 +82,23 @@ class Project(Section):
     # The dissertation's listings 6.1, 6.6 and 5.1 spell it in three ways.
     fpga_part: Text | None = key("the FPGA's part number", name="fpgaPart", aliases=("fpgaPartpart", "FPGA"))
     width: int = key("bits of the streams between host and converters", form="integer", choices=WIDTHS, default=8)
-    scheduler: Text = key("who may send to the host next", choices=(*POLICIES, AUTO_SCHEDULER), default=Text(DEFAULT))
+    scheduler: Text = key(
+        "the policy that selects the publisher that sends next",
+        choices=(*POLICIES, AUTO_SCHEDULER),
+        default=Text(DEFAULT),
+    )
     shortest_run: int = key(
-        "beats that a publisher sends at least before a preemptive scheduler interrupts it",
+        "minimum number of beats before a preemptive scheduler interrupts a publisher",
         name="shortestRun",
         form="integer",
         default=16,
     )
     interconnect: Text = key(
-        "how frames get between the host and the system: as streams, for a DMA engine, or over a link of bytes",
+        "connection between host and system: streams for a DMA engine, or a serial link",
         choices=(AXI_STREAM, *LINKS),
         default=Text(AXI_STREAM),
     )
-    clock: Text | None = key("frequency of clk, such as 100 MHz, for times that are not in cycles and for clocks")
+    clock: Text | None = key("frequency of clk, such as 100 MHz; required for times with a unit and for clocks")
     clocks: tuple[ClockDomain, ...] = key("further clocks, for accelerators", form="sections", section=ClockDomain)
 
 
@@ -99,7 +106,7 @@ class Project(Section):
 class InterfaceType(Section):
     """A message that an accelerator takes."""
 
-    middleware: Text = key("whose message it is", **_MIDDLEWARE)
+    middleware: Text = key("the middleware that defines the message", **_MIDDLEWARE)
     message: Text = key("the message's type, such as geometry_msgs/Quaternion", is_required=True)
     include: tuple[Text, ...] = key(**_INCLUDE)
     exclude: tuple[Text, ...] = key(**_EXCLUDE)
@@ -109,15 +116,15 @@ class InterfaceType(Section):
 class OutputType(InterfaceType):
     """A message that an accelerator gives."""
 
-    length: Text | None = key("where the length of a payload of variable size comes from", choices=LENGTHS)
+    length: Text | None = key("source of the length of a payload of variable size", choices=LENGTHS)
 
 
 @dataclass(frozen=True)
 class Interface(Section):
     """All messages of an accelerator."""
 
-    input: tuple[InterfaceType, ...] = key("messages it takes", form="sections", section=InterfaceType)
-    output: tuple[OutputType, ...] = key("messages it gives", form="sections", section=OutputType)
+    input: tuple[InterfaceType, ...] = key("input messages", form="sections", section=InterfaceType)
+    output: tuple[OutputType, ...] = key("output messages", form="sections", section=OutputType)
 
 
 @dataclass(frozen=True)
@@ -125,16 +132,16 @@ class Pin(Section):
     """A port of an accelerator that is none of a message: it leads out of the system."""
 
     name: Text = key("the port's name; at the top level it is <block>_<name>", is_required=True)
-    direction: Text = key("which way it leads, as the accelerator sees it", is_required=True, choices=DIRECTIONS)
-    bits: int | None = key("bits of a std_logic_vector; without it the port is a std_logic", form="integer")
+    direction: Text = key("direction of the port at the accelerator", is_required=True, choices=DIRECTIONS)
+    bits: int | None = key("bits of a std_logic_vector; default a std_logic", form="integer")
 
 
 @dataclass(frozen=True)
 class Accelerator(Section):
     """A type of accelerator; blocks are its instances."""
 
-    name: Text = key("the type's name; in VHDL that of the entity, in Verilog of the module", is_required=True)
-    type: Text = key("what it is written in", is_required=True, choices=ACCELERATOR_TYPES)
+    name: Text = key("the type's name, which is also that of the VHDL entity or Verilog module", is_required=True)
+    type: Text = key("the accelerator's language, or ROS-SW for software", is_required=True, choices=ACCELERATOR_TYPES)
     sources: tuple[Text, ...] = key(
         "its source files, relative to the specification",
         form="texts",
@@ -143,8 +150,8 @@ class Accelerator(Section):
         rule=source_fault,
     )
     interface: Interface = key("its messages", form="section", section=Interface, is_required=True)
-    width: int | None = key("bits of its streams; those of the project unless given", form="integer", choices=WIDTHS)
-    pins: tuple[Pin, ...] = key("its ports that lead out of the system", form="sections", section=Pin)
+    width: int | None = key("bits of its streams; default the project's width", form="integer", choices=WIDTHS)
+    pins: tuple[Pin, ...] = key("ports that become ports of the system", form="sections", section=Pin)
 
     @property
     def is_software(self) -> bool:
@@ -156,7 +163,7 @@ class Accelerator(Section):
 class Outgoing(Section):
     """A connection from the block it stands in."""
 
-    name: Text = key("the block that the message goes to", is_required=True)
+    name: Text = key("the block that receives the message", is_required=True)
     include: tuple[Text, ...] = key(**_INCLUDE)
     exclude: tuple[Text, ...] = key(**_EXCLUDE)
 
@@ -166,39 +173,42 @@ class Block(Section):
     """An instance: of an accelerator (it has a type) or a converter (it has middleware, mode and message)."""
 
     name: Text = key("the block's name", is_required=True)
-    type: Text | None = key("the accelerator it is an instance of; empty for a converter")
-    clock: Text | None = key(
-        "which of the project's clocks an accelerator runs at; clk unless given", only_of=ACCELERATOR
+    type: Text | None = key("the type of an accelerator; not for a converter")
+    clock: Text | None = key("clock of an accelerator, from the project's clocks; default clk", only_of=ACCELERATOR)
+    middleware: Text | None = key(
+        "the middleware of a converter's message", choices=tuple(MIDDLEWARES), only_of=CONVERTER
     )
-    middleware: Text | None = key("whose message a converter speaks", choices=tuple(MIDDLEWARES), only_of=CONVERTER)
-    mode: Text | None = key("which way a converter works", choices=MODES, only_of=CONVERTER)
+    mode: Text | None = key("direction of a converter", choices=MODES, only_of=CONVERTER)
     message: Text | None = key("a converter's message", only_of=CONVERTER)
     topic: Text | None = key(
-        "the topic of a converter's messages, such as /arm/left or left; the block's name unless given",
+        "the topic of a converter's messages, such as /arm/left or left; default the block's name",
         only_of=CONVERTER,
     )
     include: tuple[Text, ...] = key(**_INCLUDE, only_of=CONVERTER)
     exclude: tuple[Text, ...] = key(**_EXCLUDE, only_of=CONVERTER)
     buffer: int | None = key(
-        "bytes of the longest payload of a publisher that stores frames whole", form="integer", only_of=PUBLISHER
+        "bytes of the longest payload, for a publisher that stores frames", form="integer", only_of=PUBLISHER
     )
     period: Text | None = key(
-        "time between two messages of a publisher: cycles, 10 ms, or a rate such as 100 Hz", only_of=PUBLISHER
+        "time between two messages of a publisher, in cycles or such as 10 ms, or a rate such as 100 Hz",
+        only_of=PUBLISHER,
     )
     wcet: Text | None = key(
-        "longest time that a publisher's frame takes to be sent; known where the size is", only_of=PUBLISHER
+        "longest transfer time of a publisher's frame; optional if the size has a bound", only_of=PUBLISHER
     )
     deadline: Text | None = key(
-        "time from a publisher's request to the end of its frame; its period unless given", only_of=PUBLISHER
+        "time from a publisher's request to the end of its frame; default its period", only_of=PUBLISHER
     )
-    outgoing: tuple[Outgoing, ...] = key("the blocks its message goes to", form="sections", section=Outgoing)
+    outgoing: tuple[Outgoing, ...] = key(
+        "connections to the blocks that receive its message", form="sections", section=Outgoing
+    )
 
 
 @dataclass(frozen=True)
 class Specification(Section):
     """The whole file."""
 
-    project: Project = key("what holds for the whole system", form="section", section=Project, is_required=True)
+    project: Project = key("settings of the whole system", form="section", section=Project, is_required=True)
     paths: tuple[Text, ...] = key(
         "folders, bags and cores with message definitions, relative to the file, searched before all others",
         form="texts",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from fusesoc_firm.node.engine import HardwareListener, OpenTransport
+from fusesoc_firm.node.node import HardwareListener, OpenTransport
 from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
 from fusesoc_firm.simulation.simulator import BuiltSimulator

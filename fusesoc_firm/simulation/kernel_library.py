@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 from fusesoc_firm.request.request import GeneratedFile
-from fusesoc_firm.system.derived.kernel import kernel_entity, library_name, prototype
+from fusesoc_firm.system.derived.cpp_function import kernel_entity, library_name, prototype
 from fusesoc_firm.system.derived.model import AcceleratorType
 from fusesoc_firm.system.hardware.hls import KERNEL_TEMPLATE, SHIM_TEMPLATE, kernel_configuration
 from fusesoc_firm.text.diagnostics import fail

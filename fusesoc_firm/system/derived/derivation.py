@@ -19,8 +19,8 @@ from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.derived.clocks import clocks_of
 from fusesoc_firm.system.derived.connections import Wiring, places
+from fusesoc_firm.system.derived.cpp_function import check_kernel
 from fusesoc_firm.system.derived.entities import check_entities
-from fusesoc_firm.system.derived.kernel import check_kernel
 from fusesoc_firm.system.derived.length import output_length, publisher_buffers, with_lengths
 from fusesoc_firm.system.derived.link import link_of
 from fusesoc_firm.system.derived.model import (
@@ -34,9 +34,9 @@ from fusesoc_firm.system.derived.model import (
     PayloadLength,
     Topic,
 )
+from fusesoc_firm.system.derived.partition import MOST_CONVERTERS, Parting, Parts, message_names
 from fusesoc_firm.system.derived.pins import check_pins
 from fusesoc_firm.system.derived.python_function import check_function
-from fusesoc_firm.system.derived.software import MOST_CONVERTERS, Parting, Parts, message_names
 from fusesoc_firm.system.derived.timing import clock_frequency, scheduling_of
 from fusesoc_firm.system.derived.topics import TopicUse, check_topic_name, check_topics
 from fusesoc_firm.system.written.sources import declares_width
