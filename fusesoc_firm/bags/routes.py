@@ -117,7 +117,7 @@ class _Routing:
                 return f"it is of {self.bag.form.ros.title}, but '{item.block}' speaks {item.frame.ros.title}"
             ours, theirs = self.signatures.get((item.frame.ros, wanted)), self._signatures(stream, wanted)
             if ours and theirs and ours not in theirs:
-                return f"it is another {wanted} than that of '{item.block}': {theirs[0]}, not {ours}"
+                return f"its {wanted} differs from that of '{item.block}': {theirs[0]}, not {ours}"
         return ""
 
     def _signatures(self, stream: Stream, message: MessageName) -> list[str]:

@@ -145,7 +145,7 @@ def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, 
         flags = {**top.get_flags(target), "target": target}
         cores = fusesoc.cm.get_depends(top.name, {**flags, "is_toplevel": True})
     except DependencyError as error:
-        fail(f"{top.name} depends on what FuseSoC does not know here: {error.value}")
+        fail(f"{top.name} has an unknown dependency: {error.value}")
     except RuntimeError as error:
         fail(str(error))
     return [(core, {**flags, "is_toplevel": core.name == top.name}) for core in cores]
@@ -160,7 +160,7 @@ def _found(core: str) -> tuple[Any, Any]:
     try:
         return fusesoc, fusesoc.get_core(core)
     except (DependencyError, SyntaxError):
-        fail(f"'{core}' is no core that FuseSoC knows here", hint="fusesoc core list")
+        fail(f"unknown core '{core}'", hint="fusesoc core list")
 
 
 def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:

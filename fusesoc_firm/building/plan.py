@@ -60,7 +60,7 @@ class Plan:
                 if core.provider and core.cache_status() != "downloaded":
                     lock = FolderLock(Path(f"{core.files_root}.lock"))
                     if owner := lock.acquire():
-                        fail(f"{core.name} is being downloaded by {owner}", hint="start again when it is there")
+                        fail(f"{core.name} is being downloaded by {owner}", hint="start again after the download")
                     try:
                         core.setup()
                     finally:
@@ -109,8 +109,8 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
         return str(fusesoc.get_core(families[0] if families else core).name)
     except (DependencyError, SyntaxError):
         fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
-        listed = f"with {' and '.join(targets)} there are: {', '.join(sorted(fitting))}" if fitting else ""
-        faults.error(f"'{core}' is no core that FuseSoC knows here", hint=listed or "fusesoc core list")
+        listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if fitting else ""
+        faults.error(f"unknown core '{core}'", hint=listed or "fusesoc core list")
         return None
 
 

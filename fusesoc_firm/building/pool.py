@@ -75,7 +75,7 @@ class Pool:
     def _take(self, build: Build, lock: FolderLock, told: set[Build]) -> bool:
         owner = lock.acquire()
         if owner and build not in told:
-            self.tell(f"{build}: waiting for {owner}, which works in {build.work_root}")
+            self.tell(f"{build}: waiting for {owner}, which is building in {build.work_root}")
             told.add(build)
         return owner is None
 
@@ -103,7 +103,7 @@ def _finish(item: _Running) -> Outcome:
         return Outcome(item.build, True, seconds)
     lines = last_lines(item.build.log, SHOWN_LINES)
     if status is None:
-        lines = [f"another machine took {item.build.work_root}, as it had not seen this build for a while"]
+        lines = [f"another machine took over {item.build.work_root} because it had not seen this build for a while"]
     elif status < 0:
         lines.append(f"ended by {signal.Signals(-status).name}")
     return Outcome(item.build, False, seconds, tuple(lines))

@@ -23,11 +23,11 @@ def add_build(commands: Any) -> None:
     build = command(
         commands,
         "build",
-        "run FuseSoC for many cores and targets, as many at once as the machine has cores",
+        "run FuseSoC for many cores and targets in parallel, one build per processor core",
         "firm build robot:sys:quat2euler robot:sys:obstacle --target sim lint",
         _build,
     )
-    build.add_argument("cores", metavar="CORE", nargs="+", help="a core's name as FuseSoC has it")
+    build.add_argument("cores", metavar="CORE", nargs="+", help="a core's name in FuseSoC")
     build.add_argument(
         "--target",
         dest="targets",
@@ -35,18 +35,20 @@ def add_build(commands: Any) -> None:
         nargs="+",
         action="extend",
         required=True,
-        help="targets, of which every core must have each",
+        help="targets; every core must have all of them",
     )
     stages = build.add_mutually_exclusive_group()
-    stages.add_argument("--setup", action="store_true", help="only generate and set up what the tools are started on")
+    stages.add_argument("--setup", action="store_true", help="only generate the cores and set up the tools' inputs")
     stages.add_argument("--build-only", action="store_true", help="build, but run nothing: no simulation, no board")
-    build.add_argument("--jobs", type=positive, metavar="N", help="builds at once (default: one a core)")
-    build.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
-    build.add_argument("--build-root", type=Path, metavar="DIR", help="where to build (default: FuseSoC's)")
-    build.add_argument("--clean", action="store_true", help="empty the place of each build first")
     build.add_argument(
-        "--locked", action="store_true", help="refuse what differs from a core's lock file, and say what does"
+        "--jobs", type=positive, metavar="N", help="number of parallel builds (default: one per processor core)"
     )
+    build.add_argument(
+        "--cluster", metavar="ADDRESS", help="use the Dask cluster of this scheduler instead of this machine"
+    )
+    build.add_argument("--build-root", type=Path, metavar="DIR", help="folder for the builds (default: FuseSoC's)")
+    build.add_argument("--clean", action="store_true", help="empty each build's folder first")
+    build.add_argument("--locked", action="store_true", help="report differences from a core's lock file as errors")
 
 
 def _build(arguments: argparse.Namespace) -> None:
@@ -84,7 +86,7 @@ def _report(outcomes: Sequence[Outcome], seconds: float) -> None:
 
     failed = [outcome for outcome in outcomes if not outcome.is_good]
     for outcome in failed:
-        print(f"{outcome.build} failed; {shown(outcome.build.log)} ends with")
+        print(f"{outcome.build} failed; the last lines of {shown(outcome.build.log)}")
         print(*(f"    {line}" for line in outcome.last_lines), sep="\n")
     rows = [("core", "target", "result", "seconds", "log")]
     rows += [

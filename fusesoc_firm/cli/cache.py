@@ -14,16 +14,16 @@ _UNIT = 1024
 
 def add_cache(commands: Any) -> None:
     """Declare the command and its actions."""
-    cache = command(commands, "cache", "look at the store of what was generated", "firm cache show")
+    cache = command(commands, "cache", "show, clean or verify the store of generated cores", "firm cache show")
     actions = cache.add_subparsers(title="actions", metavar="ACTION", required=True)
     show = command(
-        actions, "show", "print where the store is and what it holds", "firm cache show --entries", _show_cache
+        actions, "show", "print the store's folder and its contents", "firm cache show --entries", _show_cache
     )
-    show.add_argument("--entries", action="store_true", help="every entry, too, the one that was used last first")
+    show.add_argument("--entries", action="store_true", help="also list all entries, the most recently used first")
     clean = command(
         actions,
         "clean",
-        "remove what is stored, that of former versions too; runs at the same time are not disturbed",
+        "remove stored cores, including those of earlier versions; concurrent runs are not disturbed",
         "firm cache clean --to 200M",
         _clean_cache,
     )
@@ -31,12 +31,12 @@ def add_cache(commands: Any) -> None:
         "--to",
         type=_size,
         metavar="SIZE",
-        help="only what was not used for longest, until so much is left, such as 200M",
+        help="remove the least recently used entries until the store has this size, such as 200M",
     )
     command(
         actions,
         "verify",
-        "check every entry against its digest, and remove those that are damaged",
+        "check every entry against its digest, and remove damaged entries",
         "firm cache verify",
         _verify_cache,
     )
@@ -46,7 +46,7 @@ def _size(text: str) -> int:
     from fusesoc_firm.store.store import parse_size
 
     if (size := parse_size(text)) is None:
-        raise argparse.ArgumentTypeError(f"'{text}' is no size: bytes, or such as 500M or 2G")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a size; legal: a number of bytes, such as 4096, 500M or 2G")
     return size
 
 
@@ -60,7 +60,7 @@ def _show_cache(arguments: argparse.Namespace) -> None:
     print(f"entries  {len(entries)}")
     print(f"size     {_shown(store.size())} of {_shown(store.limit)}")
     if not store.is_writable():
-        print("rights   read only: nothing is kept of what you generate")
+        print("rights   read only: what you generate is not cached")
     for file in entries if arguments.entries else ():
         used = time.strftime("%Y-%m-%d %H:%M", time.localtime(file.used))
         entry = read_entry(str(store.root), file.name)
@@ -90,8 +90,8 @@ def _verify_cache(_: argparse.Namespace) -> None:
     if damaged:
         files = "\n".join(map(str, damaged))
         entries = "1 entry was" if len(damaged) == 1 else f"{len(damaged)} entries were"
-        fail(f"{entries} damaged, and removed:\n{files}")
-    print(f"{store.root}: every entry is whole")
+        fail(f"{entries} damaged and removed:\n{files}")
+    print(f"{store.root}: all entries are intact")
 
 
 def _shown(size: float) -> str:

@@ -46,7 +46,7 @@ def natural(text: str) -> int:
 
 def _at_least(least: int, text: str) -> int:
     if not re.fullmatch(r"[+-]?\d+", text):
-        raise argparse.ArgumentTypeError(f"'{text}' is no whole number")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number")
     if int(text) < least:
         raise argparse.ArgumentTypeError(f"{text} is less than {least}")
     return int(text)
@@ -68,7 +68,7 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
         metavar="PLACE",
         help="a folder or bag with message definitions; may be given more than once",
     )
-    parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
+    parser.add_argument("--distro", metavar="NAME", help="the ROS distribution that provides the standard messages")
 
 
 def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
@@ -109,6 +109,6 @@ def add_picture(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         metavar="F.svg",
-        help="where to write it, also as F.png, F.pdf or F.dot (default: print it)",
+        help="the file to write, also F.png, F.pdf or F.dot (default: print the picture)",
     )
-    parser.add_argument("--format", choices=("svg", "dot"), help="of what is printed (default: svg)")
+    parser.add_argument("--format", choices=("svg", "dot"), help="format of the printed picture (default: svg)")

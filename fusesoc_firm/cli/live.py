@@ -18,14 +18,14 @@ def add_live(commands: Any) -> None:
     live = command(
         commands,
         "live",
-        "be a node of a running ROS, whose messages go through a system, simulated or on a board",
+        "run a ROS node that connects topics to a system, simulated or on a board",
         "firm live robot.yaml --ros 1 --trace ways.csv sub:=/imu/orientation",
         _live,
     )
     live.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
     live.add_argument("--ros", type=int, choices=(1, 2), help="only topics of this version (default: all)")
     live.add_argument(
-        "--transport", metavar="ADDRESS", help="the way to the hardware (default: build a simulator, and start it)"
+        "--transport", metavar="ADDRESS", help="the transport to the hardware (default: build and start a simulator)"
     )
     add_node_options(live)
     add_simulator_options(live)
@@ -33,15 +33,21 @@ def add_live(commands: Any) -> None:
     trace = command(
         commands,
         "trace",
-        "draw the ways of messages that a node wrote with --trace",
+        "draw the trace of messages that a node wrote with --trace",
         "firm trace ways.csv -o ways.svg",
         _draw_trace,
     )
-    trace.add_argument("table", metavar="F.csv", type=Path, help="what the node wrote")
+    trace.add_argument("table", metavar="F.csv", type=Path, help="the trace that the node wrote")
     trace.add_argument(
         "--system", type=Path, metavar="SPEC", help="the system's specification, for the table of a node in C++"
     )
-    trace.add_argument("-o", "--output", type=Path, metavar="F.svg", help="where (default: beside it; also .png, .pdf)")
+    trace.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="F.svg",
+        help="the picture to write, also .png or .pdf (default: beside the trace)",
+    )
     add_sources(trace)
 
 
@@ -82,7 +88,10 @@ def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
     from fusesoc_firm.node.description import describe
 
     if not arguments.system:
-        fail(f"{steps} is of a node in C++, whose table has no names", hint="--system SPEC says what its ids mean")
+        fail(
+            f"{steps} is the table of a node in C++, which has no names",
+            hint="give the specification with --system SPEC",
+        )
     arguments.spec = arguments.system
     table = steps.with_name(f"{steps.stem}-ways.csv")
     write_ways(steps, table, describe(load(arguments, needs_sources=False)))

@@ -13,7 +13,9 @@ from fusesoc_firm.converter.stages import STAGES, stages_text
 
 def add_message(commands: Any) -> None:
     """Declare the command and its actions."""
-    message = command(commands, "message", "look at message definitions", "firm message show geometry_msgs/Pose")
+    message = command(
+        commands, "message", "list, show and verify message definitions", "firm message show geometry_msgs/Pose"
+    )
     actions = message.add_subparsers(title="actions", metavar="ACTION", required=True)
     listing = command(
         actions,
@@ -22,21 +24,21 @@ def add_message(commands: Any) -> None:
         "firm message list 'sensor_msgs/*'",
         _list_messages,
     )
-    listing.add_argument("pattern", nargs="?", default="*", help="only names like this one, with * and ?")
+    listing.add_argument("pattern", nargs="?", default="*", help="only names that match this pattern of * and ?")
     show = command(
         actions,
         "show",
-        "print a message, or those of a service or action, in any stage of the way to hardware",
+        "print a message, or those of a service or action, in any stage from definition to hardware",
         "firm message show geometry_msgs/Quaternion --ros 1 --stage vhdl",
         _show_message,
     )
-    show.add_argument("type", metavar="TYPE", help="its type, such as geometry_msgs/Quaternion")
+    show.add_argument("type", metavar="TYPE", help="the message's type, such as geometry_msgs/Quaternion")
     show.add_argument("--stage", choices=STAGES, default="tree", help="what to print (default: tree)")
-    show.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
+    show.add_argument("--width", type=int, default=8, metavar="BITS", help="the stream's width in bits (default: 8)")
     verify = command(
         actions,
         "verify",
-        "check converters of messages in simulation, against other serialisers",
+        "compare converters in simulation with independent serialisers",
         "firm message verify 'geometry_msgs/*' --ros 1 --report geometry.json",
         _verify_messages,
     )
@@ -46,13 +48,24 @@ def add_message(commands: Any) -> None:
 
 
 def _add_verification(verify: argparse.ArgumentParser) -> None:
-    verify.add_argument("types", metavar="TYPE", nargs="*", help="a type, or several with * and ? (default: all known)")
-    verify.add_argument("--stimuli", type=positive, default=3, metavar="N", help="values of each message (default: 3)")
-    verify.add_argument("--width", type=int, default=8, metavar="BITS", help="bits of the stream (default: 8)")
-    verify.add_argument("--seed", type=int, default=1, metavar="N", help="all randomness follows from it (default: 1)")
-    verify.add_argument("--jobs", type=positive, metavar="N", help="messages at once (default: one a core)")
-    verify.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
-    verify.add_argument("--report", type=Path, metavar="F.json", help="write a report, and F.html beside it")
+    verify.add_argument(
+        "types", metavar="TYPE", nargs="*", help="a type, or a pattern of * and ? (default: all known types)"
+    )
+    verify.add_argument(
+        "--stimuli", type=positive, default=3, metavar="N", help="number of values for each message (default: 3)"
+    )
+    verify.add_argument("--width", type=int, default=8, metavar="BITS", help="the stream's width in bits (default: 8)")
+    verify.add_argument("--seed", type=int, default=1, metavar="N", help="seed of all random values (default: 1)")
+    verify.add_argument(
+        "--jobs",
+        type=positive,
+        metavar="N",
+        help="number of messages verified in parallel (default: one per processor core)",
+    )
+    verify.add_argument(
+        "--cluster", metavar="ADDRESS", help="use the Dask cluster of this scheduler instead of this machine"
+    )
+    verify.add_argument("--report", type=Path, metavar="F.json", help="write a report, and the same as F.html")
     verify.add_argument("--keep", type=Path, metavar="DIR", help="keep the work folder of each message that fails")
 
 

@@ -13,31 +13,31 @@ def add_project(commands: Any) -> None:
     graph = command(
         commands,
         "graph",
-        "draw what a core depends on: cores, what is generated for them, and of which files",
+        "draw a core's dependencies: cores, generated cores and the files that they are generated from",
         "firm graph robot:sys:quat2euler --target sim -o quat2euler.svg",
         _draw_cores,
     )
-    graph.add_argument("core", metavar="CORE", help="its name as FuseSoC has it")
-    graph.add_argument("--target", default="default", metavar="NAME", help="the target meant (default: default)")
+    graph.add_argument("core", metavar="CORE", help="the core's name in FuseSoC")
+    graph.add_argument("--target", default="default", metavar="NAME", help="the core's target (default: default)")
     add_picture(graph)
     affected = command(
         commands,
         "affected",
-        "list the cores that an edit touches, each with the reason",
+        "list the cores that an edit affects, each with the reason",
         "firm affected --since main",
         _list_affected,
     )
-    affected.add_argument("--since", default="HEAD", metavar="REV", help="the revision before it (default: HEAD)")
+    affected.add_argument("--since", default="HEAD", metavar="REV", help="the revision before the edit (default: HEAD)")
     lock = command(
         commands,
         "lock",
-        "write which message definitions, cores and tools a core uses, into a file beside it",
+        "record the message definitions, cores and tools that a core uses in a lock file beside it",
         "firm lock robot:sys:quat2euler",
         _lock,
     )
-    lock.add_argument("core", metavar="CORE", help="its name as FuseSoC has it")
+    lock.add_argument("core", metavar="CORE", help="the core's name in FuseSoC")
     lock.add_argument(
-        "--locked", action="store_true", help="write nothing; refuse what differs from the file, and say what does"
+        "--locked", action="store_true", help="write nothing; report differences from the lock file as errors"
     )
 
 

@@ -18,41 +18,57 @@ def add_replay(commands: Any) -> None:
     replay = command(
         commands,
         "replay",
-        "let a recorded bag go through a simulated system, and record what it answers",
+        "replay a recorded bag through a simulated system, and record the responses",
         "firm replay robot.yaml --in drive.bag --out answers.bag --tool verilator",
         _replay,
     )
     replay.add_argument("spec", metavar="SPEC", type=Path, help="the system's YAML specification")
     replay.add_argument(
-        "--in", dest="source", metavar="BAG", type=Path, required=True, help="of ROS 1 or ROS 2 (sqlite3, MCAP)"
+        "--in",
+        dest="source",
+        metavar="BAG",
+        type=Path,
+        required=True,
+        help="the bag to replay, of ROS 1 or ROS 2 (sqlite3, MCAP)",
     )
     replay.add_argument(
-        "--out", dest="target", metavar="BAG", type=Path, required=True, help="a folder, or F.bag, F.mcap, F.db3"
+        "--out",
+        dest="target",
+        metavar="BAG",
+        type=Path,
+        required=True,
+        help="the bag to write: a folder, or F.bag, F.mcap, F.db3",
     )
     replay.add_argument(
-        "--format", choices=("ros1", "sqlite3", "mcap"), help="of --out (default: as it ends, or as that of --in)"
+        "--format",
+        choices=("ros1", "sqlite3", "mcap"),
+        help="format of --out (default: by its ending, else that of --in)",
     )
-    replay.add_argument("--force", action="store_true", help="replace the bag that is at --out")
+    replay.add_argument("--force", action="store_true", help="replace an existing bag at --out")
     replay.add_argument(
         "--map",
         type=_mapping,
         action="append",
         default=[],
         metavar="TOPIC=BLOCK",
-        help="the topic of a subscriber or publisher, in place of the specification's; may be repeated",
+        help="the topic of a subscriber or publisher, instead of the specification's; may be repeated",
     )
-    replay.add_argument("--limit", type=positive, metavar="N", help="only so many messages")
-    replay.add_argument("--start", type=_seconds, default=0, metavar="S", help="begin so many seconds into the bag")
-    replay.add_argument("--duration", type=_seconds, metavar="S", help="only the messages of so many seconds")
+    replay.add_argument("--limit", type=positive, metavar="N", help="replay at most N messages")
     replay.add_argument(
-        "--latency", action="store_true", help="stamps with the time that the hardware takes, by the system's clock"
+        "--start", type=_seconds, default=0, metavar="S", help="begin S seconds after the start of the bag"
+    )
+    replay.add_argument("--duration", type=_seconds, metavar="S", help="replay only the messages of S seconds")
+    replay.add_argument(
+        "--latency",
+        action="store_true",
+        help="add the hardware's latency, by the system's clock, to the recorded time stamps",
     )
     replay.add_argument(
         "--quiet",
         type=positive,
         default=_QUIET,
         metavar="CYCLES",
-        help="without a beat, after which the system is at rest (default: %(default)s)",
+        help="cycles without a beat after which the system is idle (default: %(default)s)",
     )
     add_simulator_options(replay)
 
@@ -70,7 +86,7 @@ def _seconds(text: str) -> float:
     except ValueError:
         value = -1
     if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of seconds")
     return value
 
 

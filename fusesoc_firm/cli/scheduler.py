@@ -17,21 +17,26 @@ def add_scheduler(commands: Any) -> None:
     bench = command(
         actions,
         "bench",
-        "evaluate the schedulers by cycle-exact models, as the dissertation's section 4.3 does",
+        "evaluate the schedulers with cycle-exact models, as in the dissertation's section 4.3",
         "firm scheduler bench --dataset all --output evaluation",
         _bench_schedulers,
     )
-    lists = "names with commas between (default: %(default)s)"
+    lists = "names separated by commas (default: %(default)s)"
     bench.add_argument("--dataset", default="large", metavar="NAMES", help=f"large, cc1 to cc4, or all; {lists}")
     bench.add_argument("--policies", default="all", metavar="NAMES", help=f"schedulers; {lists}")
     bench.add_argument("--requesters", metavar="N,N", help="numbers of accelerators (default: 2,4,8,16,32,64,128,256)")
-    bench.add_argument("--sets", type=positive, metavar="N", help="sets of each data set (default: its own)")
-    bench.add_argument("--cycles", type=positive, metavar="N", help="cycles of each simulation (default: its own)")
     bench.add_argument(
-        "--seed", type=natural, default=1, metavar="N", help="all randomness follows from it (default: 1)"
+        "--sets", type=positive, metavar="N", help="number of sets in each data set (default: the data set's own)"
     )
     bench.add_argument(
-        "--distribution", choices=("normal", "uniform"), default="normal", help="how times spread (default: normal)"
+        "--cycles", type=positive, metavar="N", help="cycles of each simulation (default: the data set's own)"
+    )
+    bench.add_argument("--seed", type=natural, default=1, metavar="N", help="seed of all random values (default: 1)")
+    bench.add_argument(
+        "--distribution",
+        choices=("normal", "uniform"),
+        default="normal",
+        help="distribution of the times (default: normal)",
     )
     bench.add_argument(
         "--shortest-run",
@@ -45,14 +50,18 @@ def add_scheduler(commands: Any) -> None:
         type=natural,
         default=0,
         metavar="BEATS",
-        help="beats more that a resumed run takes; 1 with the Manager's bursts (default: 0, as in section 4.3)",
+        help="additional beats of a resumed run; 1 with the Manager's bursts (default: 0, as in section 4.3)",
     )
-    bench.add_argument("--jobs", type=positive, metavar="N", help="simulations at once (default: one a core)")
-    bench.add_argument("--cluster", metavar="ADDRESS", help="do it on the Dask cluster of this scheduler instead")
     bench.add_argument(
-        "--output", type=Path, metavar="DIR", help="write a report, every table and figure into a folder"
+        "--jobs", type=positive, metavar="N", help="number of parallel simulations (default: one per processor core)"
     )
-    bench.add_argument("--csv", type=Path, metavar="F.csv", help="write all metrics of all simulations into one table")
+    bench.add_argument(
+        "--cluster", metavar="ADDRESS", help="use the Dask cluster of this scheduler instead of this machine"
+    )
+    bench.add_argument(
+        "--output", type=Path, metavar="DIR", help="write a report with all tables and figures into this folder"
+    )
+    bench.add_argument("--csv", type=Path, metavar="F.csv", help="write all metrics of all simulations to this table")
     choose = command(
         actions,
         "choose",
@@ -65,7 +74,7 @@ def add_scheduler(commands: Any) -> None:
         "--criterion",
         choices=("luts", "lateness", "finish"),
         default="luts",
-        help="fewest LUTs with all deadlines held, smallest worst lateness, or fewest LUTs with nobody starving "
+        help="fewest LUTs with all deadlines met, smallest worst lateness, or fewest LUTs without starvation "
         "(default: luts)",
     )
     choose.add_argument("--format", choices=("text", "yaml", "json"), default="text", help="default: text")

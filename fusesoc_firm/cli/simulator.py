@@ -28,17 +28,21 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of commands that simulate a system live; `built_simulator` reads them, with `spec`."""
     tools, default = [*fitting(is_live=True)], default_simulator(is_live=True)
     parser.add_argument("--tool", choices=tools, default=default, help="default: %(default)s")
-    parser.add_argument("--build-root", type=Path, metavar="DIR", help="where to build (default: in the user's cache)")
-    parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="of all randomness (default: %(default)s)")
+    parser.add_argument(
+        "--build-root", type=Path, metavar="DIR", help="folder for the build (default: in the user's cache)"
+    )
+    parser.add_argument(
+        "--seed", type=_seed, default=1, metavar="N", help="seed of all random values (default: %(default)s)"
+    )
     parser.add_argument(
         "--stall-percent",
         type=_percent,
         default=0,
         metavar="N",
-        help="cycles in which the host stalls a stream, 0 to 99 (default: %(default)s)",
+        help="percentage of cycles in which the host stalls a stream, 0 to 99 (default: %(default)s)",
     )
     add_sources(parser)
-    core = parser.add_argument_group("where no core beside the specification names it")
+    core = parser.add_argument_group("if no core beside the specification names them")
     core.add_argument(
         "--depend", metavar="VLNV", action="append", default=[], help="a core that accelerators need; may be repeated"
     )
@@ -48,7 +52,7 @@ def add_simulator_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         action="append",
         default=[],
-        help="VHDL of what is at the pins; may be repeated",
+        help="VHDL of the environment at the pins; may be repeated",
     )
 
 
@@ -75,5 +79,5 @@ def _percent(text: str) -> int:
 
 def _within(least: int, greatest: int, text: str) -> int:
     if not text.isdecimal() or not least <= int(text) <= greatest:
-        raise argparse.ArgumentTypeError(f"{text} is no whole number from {least} to {greatest}")
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number from {least} to {greatest}")
     return int(text)

@@ -14,17 +14,22 @@ from fusesoc_firm.node.languages import LANGUAGES, Place
 
 def add_system(commands: Any) -> None:
     """Declare the command and its actions."""
-    system = command(commands, "system", "look at system specifications", "firm system check robot.yaml")
+    system = command(
+        commands,
+        "system",
+        "write and check system specifications, and what belongs to them",
+        "firm system check robot.yaml",
+    )
     actions = system.add_subparsers(title="actions", metavar="ACTION", required=True)
     new = command(
         actions,
         "new",
-        "ask for a specification and write it, or extend one that is there",
+        "write a specification from answers to questions, or extend an existing one",
         "firm system new robot.yaml",
         _new_system,
     )
     check = command(
-        actions, "check", "report all faults of a specification", "firm system check robot.yaml", _check_system
+        actions, "check", "report all faults in a specification", "firm system check robot.yaml", _check_system
     )
     show = command(
         actions, "show", "print the system derived from a specification", "firm system show robot.yaml", _show_system
@@ -47,14 +52,14 @@ def add_system(commands: Any) -> None:
     report = command(
         actions,
         "report",
-        "count the lines that are written and those that are generated of them",
+        "count the written lines and the lines generated from them",
         "firm system report robot.yaml",
         _report_system,
     )
     core = command(
         actions,
         "core",
-        "write the FuseSoC core of a system; of one that is there, only the targets are written anew",
+        "write the FuseSoC core of a system, or rewrite the targets of an existing core",
         "firm system core robot.yaml --depend robot:acc:firm_cordic",
         _write_core,
     )
@@ -62,7 +67,7 @@ def add_system(commands: Any) -> None:
     node = command(
         actions,
         "node",
-        "write the software node of a system: a package of ROS that joins its topics and its hardware",
+        "write the software node of a system: a ROS package that connects its topics to its hardware",
         "firm system node robot.yaml -o src/robot_node",
         _write_node,
     )
@@ -73,40 +78,53 @@ def add_system(commands: Any) -> None:
     command(
         actions,
         "schema",
-        "print the grammar of specifications as a JSON Schema, for editors",
+        "print the JSON Schema of specifications, for editors",
         "firm system schema > specification.schema.json",
         _print_schema,
     )
 
 
 def _add_core_options(core: argparse.ArgumentParser) -> None:
-    core.add_argument("-o", "--output", type=Path, metavar="F.core", help="where (default: beside the specification)")
-    new = core.add_argument_group("of a core that is not there yet; paths are relative to it")
-    new.add_argument("--name", metavar="VLNV", default="", help="default: robot:sys:<the system's name>:0.1.0")
-    new.add_argument("--description", metavar="TEXT", default="", help="what the system does")
+    core.add_argument(
+        "-o", "--output", type=Path, metavar="F.core", help="the core file to write (default: beside the specification)"
+    )
+    new = core.add_argument_group("for a new core; paths are relative to it")
+    new.add_argument(
+        "--name", metavar="VLNV", default="", help="the core's name (default: robot:sys:<the system's name>:0.1.0)"
+    )
+    new.add_argument("--description", metavar="TEXT", default="", help="a description of the system")
     new.add_argument(
         "--depend", metavar="VLNV", action="append", default=[], help="a core that accelerators need; may be repeated"
     )
-    new.add_argument("--stimuli", metavar="F", default="stimuli.yaml", help="messages to send (default: %(default)s)")
-    new.add_argument("--model", metavar="F", default="model.py", help="what must come back (default: %(default)s)")
     new.add_argument(
-        "--environment", metavar="F", action="append", default=[], help="VHDL of what is at the pins; may be repeated"
+        "--stimuli", metavar="F", default="stimuli.yaml", help="stimuli: the messages to send (default: %(default)s)"
+    )
+    new.add_argument(
+        "--model",
+        metavar="F",
+        default="model.py",
+        help="the model that computes the expected responses (default: %(default)s)",
+    )
+    new.add_argument(
+        "--environment",
+        metavar="F",
+        action="append",
+        default=[],
+        help="VHDL of the environment at the pins; may be repeated",
     )
 
 
 def _add_node_options(node: argparse.ArgumentParser) -> None:
     node.add_argument("-o", "--output", type=Path, metavar="DIR", help="the package's folder (default: <system>_node)")
-    node.add_argument(
-        "--language", choices=sorted(LANGUAGES), default="cpp", help="what it is written in (default: cpp)"
-    )
-    node.add_argument("--ros", type=int, choices=(1, 2), help="fail unless the system speaks this version of ROS")
+    node.add_argument("--language", choices=sorted(LANGUAGES), default="cpp", help="the node's language (default: cpp)")
+    node.add_argument("--ros", type=int, choices=(1, 2), help="fail unless the system uses this version of ROS")
 
 
 def _check_system(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.system.views.show import counts
 
     system = load(arguments).system
-    print(f"{arguments.spec}: {system.name} is right: {counts(system)}")
+    print(f"{arguments.spec}: {system.name} is valid: {counts(system)}")
 
 
 def _show_system(arguments: argparse.Namespace) -> None:

@@ -14,12 +14,12 @@ def add_tool(commands: Any) -> None:
     tool = command(
         commands,
         "tool",
-        "start a program for Edalize and note it in manifest.json, or say which package brings it",
+        "start a program for Edalize and record it in manifest.json, or name the package that provides it",
         "firm tool nextpnr-ecp5 --version",
         _run_tool,
     )
-    tool.add_argument("program", metavar="PROGRAM", help="such as nextpnr-ecp5")
-    tool.add_argument("arguments", metavar="ARGUMENT", nargs=argparse.REMAINDER, help="what it is started with")
+    tool.add_argument("program", metavar="PROGRAM", help="the program, such as nextpnr-ecp5")
+    tool.add_argument("arguments", metavar="ARGUMENT", nargs=argparse.REMAINDER, help="arguments of the program")
 
 
 def _run_tool(arguments: argparse.Namespace) -> None:

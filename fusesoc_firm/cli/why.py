@@ -19,11 +19,11 @@ def add_why(commands: Any) -> None:
     why = command(
         commands,
         "why",
-        "tell which line of a template, of the specification and of a message made a generated line",
+        "show the lines of template, specification and message definition that produced a generated line",
         "firm why build/robot_sys_quat2euler_0.2.0/sim/src/robot_sys_quat2euler-system_0.2.0/quat2euler_system.vhd:80",
         _tell_why,
     )
-    why.add_argument("place", metavar="FILE[:LINE]", help="a generated file of a build; without LINE, every line of it")
+    why.add_argument("place", metavar="FILE[:LINE]", help="a generated file of a build; without LINE, all its lines")
 
 
 def _tell_why(arguments: argparse.Namespace) -> None:
@@ -31,7 +31,7 @@ def _tell_why(arguments: argparse.Namespace) -> None:
 
     path, number = _split(arguments.place)
     if not path.is_file():
-        fail(f"there is no file {path}", hint="after its name stands a line, or nothing: FILE:LINE")
+        fail(f"there is no file {path}", hint="write FILE or FILE:LINE")
     found = why(path)
     if number is None:
         for count, reason in enumerate(found, start=1):
@@ -39,7 +39,7 @@ def _tell_why(arguments: argparse.Namespace) -> None:
             print(f"{count}: {', '.join([_template(reason.line), *places])}")
         return
     if not 1 <= number <= len(found):
-        fail(f"{path} has no line {number}, its last one is {len(found)}")
+        fail(f"{path} has no line {number}; its last line is {len(found)}")
     reason = found[number - 1]
     print(reason.line.text)
     print(f"  template       {_template(reason.line)}")

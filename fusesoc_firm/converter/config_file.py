@@ -72,7 +72,7 @@ def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
     """Check that each message has an interface, and each interface a unique name that is legal for an entity."""
     prefix = config.project.prefix
     if prefix is not None and not is_prefix(prefix):
-        faults.error(f"no entity can be called '{prefix}_axis_to_...'", prefix.source, PREFIX_RULE)
+        faults.error(f"'{prefix}_axis_to_...' is not a legal entity name", prefix.source, PREFIX_RULE)
     seen: dict[str, Text] = {}
     for message in config.messages:
         names = (*message.subscribers, *message.publishers)
@@ -81,8 +81,8 @@ def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
             faults.error(f"'{message.name}' has no interface", message.name.source, hint)
         for name in names:
             if identifier(name) != name:
-                hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
-                faults.error(f"no entity can be called '{name}'", name.source, hint)
+                hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+                faults.error(f"'{name}' is not a legal entity name", name.source, hint)
             first = seen.setdefault(name.lower(), name)
             if first is not name:
-                faults.error(f"a second interface is called '{name}'; the first is at {first.source}", name.source)
+                faults.error(f"duplicate interface '{name}'; the first is at {first.source}", name.source)

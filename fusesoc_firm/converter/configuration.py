@@ -119,7 +119,7 @@ def _first_position(stream: Stream) -> int:
 def check_width(width: int) -> None:
     """Raise `InputError` if converters do not support a stream of this width."""
     if width not in WIDTHS:
-        fail(f"no converter is made for a stream of {width} bits", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
+        fail(f"a converter cannot have a stream of {width} bits", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
 
 
 def _check_size(frame: Frame) -> None:

@@ -107,7 +107,11 @@ def order_of_message(
 
 def _check_no_selection(selection: Selection, text: str) -> None:
     for source in (*selection.include.values(), *selection.exclude.values()):
-        fail(f"'{text}' is several messages, of which no fields can be selected", source, "name one of them instead")
+        fail(
+            f"'{text}' consists of several messages, so its fields cannot be selected",
+            source,
+            "name one of them instead",
+        )
 
 
 def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) -> Order:
@@ -168,11 +172,13 @@ def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, 
             entity = ENTITIES[direction](wanted.frame, prefix=prefix)
             _, twin = owners.setdefault(entity, (direction, wanted.frame))
             if twin.message == wanted.message and twin.ros is not wanted.ros:
-                message = f"'{wanted.message}' needs the entity '{entity}' for {twin.ros.title} already"
-                faults.error(message, entry.name.source, "one project has a message in one ROS version each way")
+                message = f"'{wanted.message}' already needs the entity '{entity}' for {twin.ros.title}"
+                faults.error(
+                    message, entry.name.source, "a project can have a message in only one ROS version per direction"
+                )
     for entry, wanted in found:
         own = {"subscriber": entry.subscribers, "publisher": entry.publishers}
         for name, direction in ((name, direction) for direction, names in own.items() for name in names):
             what, frame = owners.get(name.lower(), ("", wanted.frame))
             if what and (what, frame) != (direction, wanted.frame):
-                faults.error(f"'{name}' is what the {what} of {frame.message} is called", name.source)
+                faults.error(f"'{name}' is already the name of the {what} of {frame.message}", name.source)

@@ -125,7 +125,7 @@ def units_of(data: Data, text: object) -> BytesLike:
             return text.encode("utf-8", "surrogateescape")
         units = text.encode("utf-16-le", "surrogatepass")
     except UnicodeEncodeError as error:
-        raise CodecError(f"'{dotted(data.names)}' takes no lone surrogate: {shown(text)}") from error
+        raise CodecError(f"'{dotted(data.names)}' cannot hold a lone surrogate: {shown(text)}") from error
     count = len(units) // 2
     return struct.pack(f"<{count}I", *struct.unpack(f"<{count}H", units))
 

@@ -185,7 +185,7 @@ def _readers(path: Path) -> list[Reader]:
         # A recorder writes the metadata file last. Without it, the finished part of the bag is still readable.
         files = sorted((file for file in path.iterdir() if file.suffix in _SUFFIXES[1:]), key=_natural)
         if not files:
-            raise FileNotFoundError("there is no metadata.yaml in it, no .db3 and no .mcap")
+            raise FileNotFoundError("it contains neither metadata.yaml nor a .db3 or .mcap file")
         return [Rosbag2Reader(file) for file in files]
     return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
 
@@ -233,4 +233,4 @@ def _readable(path: Path, hint: str = "") -> Iterator[None]:
     except Exception as error:  # noqa: BLE001 - rosbags and its dependencies raise anything
         said = str(error) or type(error).__name__
         remedies = (text.format(path=path) for words, text in _REMEDIES.items() if words in said)
-        fail(f"{path} is not a bag that can be read: {said}", hint=next(remedies, hint))
+        fail(f"{path} is not a readable bag: {said}", hint=next(remedies, hint))

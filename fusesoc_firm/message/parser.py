@@ -81,10 +81,12 @@ def parse_sections(
         elif len(sections) < len(names):
             sections.append([])
         else:
-            diagnostics.error(f"more than the {len(names)} sections that belong here", line.source)
+            diagnostics.error(f"more than the {len(names)} expected sections", line.source)
     if len(sections) < len(names):
         diagnostics.error(
-            f"{len(sections)} of {len(names)} sections found", SourceRef(file, 1, 1), f"'{_SEPARATOR}' parts sections"
+            f"{len(sections)} of {len(names)} sections found",
+            SourceRef(file, 1, 1),
+            f"'{_SEPARATOR}' separates sections",
         )
     return [_parse_lines(section, name, ros, file, diagnostics) for section, name in zip(sections, names, strict=False)]
 
@@ -138,7 +140,7 @@ class _Reader:
             return
         kind, rest = code.split_word()
         if not rest.text:
-            self._diagnostics.error(f"'{kind.text}' has no name behind it", kind.source, "a field is 'type name'")
+            self._diagnostics.error(f"'{kind.text}' is not followed by a name", kind.source, "a field is 'type name'")
         elif "=" in rest.text:
             self._read_constant(kind, rest, line)
         else:
@@ -160,7 +162,7 @@ class _Reader:
     def _default(self, default: Piece, name: Piece, field_type: FieldType | None) -> DefaultValue | None:
         if not self._dialect.has_defaults:
             self._diagnostics.error(
-                f"unexpected '{default.text}' behind field '{name.text}'",
+                f"unexpected '{default.text}' after field '{name.text}'",
                 default.source,
                 f"{self._dialect.title} has no default values; a constant is 'type NAME=value'",
             )

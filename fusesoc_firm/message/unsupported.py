@@ -51,13 +51,13 @@ FEATURES = (
         "optional fields",
         "optional",
         (r"@optional\b", r"(?:std::)?optional\s*<[^>]*>?", _DECLARATION.format("optional"), r"\w+(?:/\w+)*\?(?=\s)"),
-        "write an array of none or one, or a bool beside the field",
+        "write an array of at most one element, or add a bool beside the field",
     ),
     _feature(
         "unions",
         "union variant oneof",
         (r"(?:std::)?variant\s*<[^>]*>?", _DECLARATION.format("(?:union|oneof)")),
-        "write a number that tells the kind, and a field of each kind",
+        "write a number for the kind, and a field for each kind",
     ),
     _feature(
         "typedefs",
@@ -75,7 +75,7 @@ FEATURES = (
         "inherited fields",
         "extends inherits",
         (r"(?:extends|inherits)(?=\s+\w+/\w)",),
-        "hold the base in a field, such as 'Base base'",
+        "put the base into a field, such as 'Base base'",
     ),
     _feature(
         "enum types",

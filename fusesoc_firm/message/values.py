@@ -77,7 +77,7 @@ def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
         match = _ELEMENT.match(inner.text, position)
         if match is None:
             rest = inner.part(position).strip()
-            hint = "elements are parted by ','; a string that starts with a quote ends with it"
+            hint = "elements are separated by ','; a string that starts with a quote ends with it"
             diagnostics.error(f"element {len(elements) + 1} of the array is empty or not closed", rest.source, hint)
             return None
         elements.append(inner.part(*match.span(1)))

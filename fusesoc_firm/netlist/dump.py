@@ -31,7 +31,7 @@ def read(text: str) -> Modules:
         try:
             reader.line(line)
         except (ValueError, IndexError) as error:
-            raise NetlistError(f"line {number} of the netlist that GHDL dumps is not understood: {line}") from error
+            raise NetlistError(f"cannot parse line {number} of GHDL's netlist: {line}") from error
     return {name: module for name, module in reader.modules.items() if not name.startswith("$")}
 
 

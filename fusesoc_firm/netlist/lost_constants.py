@@ -426,8 +426,8 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
     if lost:
         raise NetlistError(
             "\n".join(
-                f"{place}: error: GHDL makes zero of a constant of {width} bits of which only the highest {_WORD} have "
-                "a bit set; assign it in two slices, or an array by its elements"
+                f"{place}: error: GHDL turns a constant of {width} bits into zero if only its highest {_WORD} bits are "
+                "not zero; assign it in two slices, or an array by its elements"
                 for place, width in dict.fromkeys(lost)
             )
         )
@@ -436,6 +436,6 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
 def doubt(widths: Iterable[int], message: str) -> str:
     """A warning that constants of some widths were not looked at, as GHDL says."""
     return (
-        f"warning: GHDL makes zero of constants of {', '.join(map(str, sorted(widths)))} bits of which only the "
-        f"highest {_WORD} have a bit set, and does not say whether there are any: {message.splitlines()[0]}"
+        f"warning: GHDL turns constants of {', '.join(map(str, sorted(widths)))} bits into zero if only their "
+        f"highest {_WORD} bits are not zero, and cannot tell whether there are any: {message.splitlines()[0]}"
     )

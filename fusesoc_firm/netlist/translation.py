@@ -36,7 +36,11 @@ _GENERIC = re.compile(r"^ +\.(\w+)\((.*?)\),?$", re.MULTILINE)
 # ports that a message has in another ROS version only. A linter is to look at what people wrote.
 _WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT", "PINMISSING")
 _HEADER = "\n".join(
-    ["// Made of VHDL by GHDL; changes belong there.", *(f"// verilator lint_off {word}" for word in _WAIVED), ""]
+    [
+        "// Generated from VHDL by GHDL; edit the VHDL instead.",
+        *(f"// verilator lint_off {word}" for word in _WAIVED),
+        "",
+    ]
 )
 _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
 # What GHDL says of logic that is not there afterwards; the words are those of its sources.

@@ -309,7 +309,7 @@ class _Writer:
         elif (special := self._special.get(gate.kind)) is not None:
             yield from special(self, gate)
         else:
-            raise gate.error(f"GHDL made a '{gate.kind[1:]}' of this, which has no counterpart in Verilog")
+            raise gate.error(f"GHDL translates this to '{gate.kind[1:]}', which has no counterpart in Verilog")
 
     def _assign(self, gate: Instance, expression: str) -> Iterator[str]:
         yield _assignment(self.names[gate.outputs[0].number], expression)

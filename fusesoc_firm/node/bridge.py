@@ -210,7 +210,7 @@ class Ros1(Ros):
         for publisher in self._publishers.values():
             for connection in list(publisher.impl.connections):
                 _flush(connection, latest)
-        self._rospy.signal_shutdown("its hardware is gone")
+        self._rospy.signal_shutdown("the hardware is disconnected")
 
 
 def _raw_class(rospy: Any, topic: dict[str, Any]) -> Any:
@@ -287,7 +287,7 @@ class Ros2(Ros):
                     known = str(getattr(end, "topic_type_hash", topic["signature"]))
                     if (end.node_name, end.node_namespace) == mine and known != topic["signature"]:
                         raise BridgeError(
-                            "'{}' is installed as another message ({}) than that of the system ({})".format(
+                            "the installed '{}' ({}) differs from the system's ({})".format(
                                 topic["type"], known, topic["signature"]
                             )
                         )
@@ -348,7 +348,7 @@ def _message_class(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), message)
     except (ImportError, AttributeError):
         raise BridgeError(
-            f"the message '{name}' is not installed for {sys.executable}; ROS 2 needs its package built, and sourced"
+            f"the message '{name}' is not installed for {sys.executable}; ROS 2 needs its package built and sourced"
         ) from None
 
 

@@ -76,8 +76,8 @@ class BurstJoiner:
             return JoinedFrame(identifier, bytes(memoryview(frame)[_HEADER_BYTES:]))
         if len(burst) % self._beat_bytes:
             raise BurstError(
-                f"a burst of id {identifier} ends within a beat: {len(burst)} bytes, {self._beat_bytes} a beat,"
-                f" and the frame is not over"
+                f"a burst of id {identifier} ends within a beat: {len(burst)} bytes at {self._beat_bytes} per beat,"
+                f" and the frame is incomplete"
             )
         self._begun[identifier] = frame
         return None
@@ -128,7 +128,7 @@ def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
     for beats in runs:
         last = first + beats * beat_bytes
         if beats < 1 or last >= len(frame):
-            raise ValueError(f"run {len(bursts)} has {beats} beats; legal: 1 and more, fewer than are left")
+            raise ValueError(f"run {len(bursts)} has {beats} beats; legal: 1 and more, fewer than remain")
         bursts.append(_burst(frame, first, last, beat_bytes))
         first = last
     return [*bursts, _burst(frame, first, len(frame), beat_bytes)]

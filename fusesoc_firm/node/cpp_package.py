@@ -102,7 +102,7 @@ def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
         fail(f"the topics of '{description.name}' are of {titles}, but a node in C++ speaks one of them")
     if ros is not None and ros.number != found[0]:
         title = middleware_of(found[0]).title
-        hint = "the hardware is made for the bytes of one version: 'middleware' of blocks and interfaces says which"
+        hint = "the hardware handles one version: set it with 'middleware' of blocks and interfaces"
         fail(f"the topics of '{description.name}' are of {title}, not of {ros.title}", hint=hint)
     return found[0]
 

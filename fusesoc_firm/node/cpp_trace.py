@@ -120,7 +120,7 @@ def _step(row: dict[str, str], place: str) -> _Step:
         first, last = row["first_cycle"], row["last_cycle"]
         cycles = (int(first), int(last)) if first and last else None
     except (TypeError, ValueError):
-        fail(f"{place} is no step of a node")
+        fail(f"{place} is not a step of a node")
     if row["event"] not in _EVENTS:
-        fail(f"{place}: there is no step '{row['event']}'", hint=f"legal: {', '.join(_EVENTS)}")
+        fail(f"{place}: unknown step '{row['event']}'", hint=f"legal: {', '.join(_EVENTS)}")
     return _Step(time_ns, row["event"], converter, message, size, cycles)

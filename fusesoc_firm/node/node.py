@@ -286,7 +286,7 @@ class Node:
             frame = hardware.joiner.push(burst.data, burst.tid)
         except BurstError as error:
             self.statistics.faults += 1
-            self._report(f"the hardware sends what no Manager does: {error}")
+            self._report(f"the hardware sent an invalid burst: {error}")
             return
         hardware.has_answered = True
         first = None
@@ -333,12 +333,14 @@ class Node:
         if converter is not None and converter in self._subscriber_names:
             block = self._subscriber_names[converter]
             self.statistics.inputs[block].refused += 1
-            self._report(f"the hardware refused a message from '{block}': it is broken")
+            self._report(f"the hardware rejected a malformed message from '{block}'")
             if self._trace:
                 self._trace.refused(converter)
         else:
             self.statistics.faults += 1
-            self._report("the hardware refused a frame: " + ("its id" if converter is None else "a publisher's"))
+            self._report(
+                "the hardware rejected a frame " + ("with an unknown id" if converter is None else "of a publisher")
+            )
 
     def _begin_anew(self, hardware: _Hardware, error: TransportError) -> bool:
         """Reopen the transport if the settings allow it; return False if they do not, or if it fails."""
@@ -362,7 +364,7 @@ class Node:
 
     def _forget(self, transport: Transport, why: str) -> None:
         """Continue with hardware that starts from reset; forget all messages in it."""
-        self._report(f"{why}; it is started anew, and what was in it is lost")
+        self._report(f"{why}; it is restarted, and the messages in it are lost")
         self.statistics.restarts += 1
         if self._trace:
             self._trace.forget()
@@ -380,7 +382,7 @@ class _Reporter:
         if self._left > 0:
             self._report(text)
         elif self._left == 0:
-            self._report("from here on, more of this is only counted")
+            self._report("further reports of this kind are only counted")
         self._left -= 1
 
 

@@ -20,37 +20,41 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
         "--qos",
         choices=("reliable", "best_effort"),
         default="reliable",
-        help="of all topics in ROS 2 (default: reliable)",
+        help="reliability of all topics in ROS 2 (default: reliable)",
     )
     parser.add_argument(
         "--queue",
         type=_positive,
         default=10,
         metavar="N",
-        help="messages that each queue holds, those of ROS too (default: %(default)s)",
+        help="capacity of each queue, including those of ROS, in messages (default: %(default)s)",
     )
     parser.add_argument(
         "--overflow",
         choices=[rule.value for rule in Overflow],
         default=Overflow.DROP_OLDEST.value,
-        help="what a full queue does with a message; block stops all topics (default: drop_oldest)",
+        help="treatment of a message for a full queue; block stops all topics (default: drop_oldest)",
     )
     parser.add_argument(
         "--drain",
         type=_seconds,
         default=10.0,
         metavar="SECONDS",
-        help="how long the node works on what it has when it is to end (default: %(default)g)",
+        help="time limit for pending messages when the node ends (default: %(default)g)",
     )
-    parser.add_argument("--restart", action="store_true", help="start hardware that is gone anew, instead of ending")
-    parser.add_argument("--trace", type=Path, metavar="F.csv", help="write each message's way; see `firm trace`")
-    parser.add_argument("--ros-python", metavar="PATH", help="the Python that ROS is installed for (default: found)")
+    parser.add_argument("--restart", action="store_true", help="restart hardware that is lost, instead of ending")
+    parser.add_argument(
+        "--trace", type=Path, metavar="F.csv", help="write each message's trace to this table; see `firm trace`"
+    )
+    parser.add_argument(
+        "--ros-python", metavar="PATH", help="the Python that can import ROS (default: the first one found)"
+    )
     parser.add_argument(
         ROS_ARGUMENTS,
         nargs=argparse.REMAINDER,
         default=[],
         metavar="...",
-        help="ROS 2's own arguments, up to the end; NAME:=VALUE may stand anywhere, in both versions of ROS",
+        help="ROS 2's own arguments, up to the end; NAME:=VALUE is legal anywhere, in both versions of ROS",
     )
 
 
@@ -63,7 +67,7 @@ def remappings(rest: Sequence[str], error: Callable[[str], object]) -> tuple[str
 
 def _positive(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"'{text}' is no number of messages; legal: 1 and more")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of messages; legal: 1 and more")
     return int(text)
 
 
@@ -73,5 +77,5 @@ def _seconds(text: str) -> float:
     except ValueError:
         seconds = -1.0
     if not 0 <= seconds < float("inf"):
-        raise argparse.ArgumentTypeError(f"'{text}' is no time in seconds")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a time in seconds")
     return seconds

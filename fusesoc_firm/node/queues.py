@@ -175,7 +175,7 @@ class SubscriberQueues(Generic[Item]):
             waiting = [index for index, queue in enumerate(self._queues) if queue]
             if not waiting:
                 if self._closed:
-                    raise ClosedError("the queues are closed, and all is read")
+                    raise ClosedError("the queues are closed and empty")
                 raise EmptyError(f"no frame came in {timeout} s")
             subscriber = min(waiting, key=lambda index: self._policy.key(index, self._queues[index][0][0]))
             _, item = self._queues[subscriber].popleft()

@@ -39,11 +39,11 @@ def run_options(
     """Return the options from a command line; `ros` selects a version, if given. Raises `InputError`."""
     if ros is not None and ros not in description.versions:
         known = " and ".join(map(str, description.versions))
-        hint = "the hardware is made for the bytes of one version: 'middleware' of blocks and interfaces says which"
+        hint = "the hardware handles one version: set it with 'middleware' of blocks and interfaces"
         fail(f"system '{description.name}' has no topic of ROS {ros}, but of ROS {known}", hint=hint)
     versions = description.versions if ros is None else (ros,)
     if arguments.ros_args and 2 not in versions:
-        fail(f"'{ROS_ARGUMENTS}' is for ROS 2, and the topics are of ROS 1", hint="ROS 1 takes NAME:=VALUE as it is")
+        fail(f"'{ROS_ARGUMENTS}' is for ROS 2, and the topics are of ROS 1", hint="ROS 1 takes NAME:=VALUE without it")
     passed = [*rest, *([ROS_ARGUMENTS, *arguments.ros_args] if arguments.ros_args else ())]
     return RunOptions(
         versions,
@@ -86,7 +86,7 @@ def run_node(
     except (TransportError, CarrierError) as error:
         fail(str(error))
     if not is_complete:
-        fail("not all that was received has been processed")
+        fail("some received messages were not processed")
 
 
 def _topics(carrier: RosCarrier, description: NodeDescription) -> str:

@@ -24,7 +24,7 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
     """
     accept_interrupts()
     parser = argparse.ArgumentParser(description=f"The node of the system {description.name}.")
-    parser.add_argument("--transport", required=True, metavar="ADDRESS", help="the way to the hardware")
+    parser.add_argument("--transport", required=True, metavar="ADDRESS", help="the transport to the hardware")
     add_node_options(parser)
     arguments, rest = parser.parse_known_args()
     passed = remappings(rest, parser.error)

@@ -74,7 +74,7 @@ def serve(system: DerivedSystem, folder: Path, taken: BinaryIO, given: BinaryIO)
             try:
                 message = decode(topic.frame, payload)
             except CodecError as error:
-                print(f"a message of '{topic.block}' is none: {error}", file=sys.stderr, flush=True)
+                print(f"invalid message from '{topic.block}': {error}", file=sys.stderr, flush=True)
                 continue
             answers = functions.take(End(topic.block), message)
             given.writelines(_framed(ids[block], ports.outputs[ids[block]], answer) for block, answer in answers)
@@ -89,9 +89,9 @@ def _frames(row: BinaryIO, ids: int) -> Iterator[tuple[int, bytes]]:
     while header := row.read(_HEADER_BYTES):
         length = int.from_bytes(header[ID_BYTES:], "little")
         if len(header) < _HEADER_BYTES or len(payload := row.read(length)) < length:
-            fail("the frames end within one")
+            fail("the input ends within a frame")
         if header[0] >= ids:
-            fail(f"a frame has id {header[0]}, but those of the software's inputs are 0 to {ids - 1}")
+            fail(f"a frame has id {header[0]}, but the software's inputs have the ids 0 to {ids - 1}")
         yield header[0], payload
 
 
@@ -100,7 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("spec", type=Path, help="the specification of the system")
     parser.add_argument("--path", type=Path, action="append", default=[], metavar="DIR", help="message definitions")
-    parser.add_argument("--distro", metavar="NAME", help="the distribution whose standard messages are meant")
+    parser.add_argument("--distro", metavar="NAME", help="the ROS distribution that provides the standard messages")
     given = parser.parse_args(arguments)
     # Standard output carries frames only, whatever the functions print.
     frames = os.fdopen(os.dup(1), "wb")

@@ -74,7 +74,7 @@ def _draw(
     axis.set_xlabel("message")
     axis.set_ylabel(unit)
     if not whole:
-        axis.text(0.5, 0.5, "not known of this hardware", ha="center", va="center", transform=axis.transAxes)
+        axis.text(0.5, 0.5, "unknown for this hardware", ha="center", va="center", transform=axis.transAxes)
         return
     numbers = [_number(row["message"]) for row in whole]
     bottom = [0.0] * len(whole)
@@ -92,7 +92,7 @@ def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             if tuple(reader.fieldnames or ()) != COLUMNS:
-                fail(f"{table} is no trace of a node", hint="firm live ... --trace F.csv writes one")
+                fail(f"{table} is not the trace of a node", hint="firm live ... --trace F.csv writes one")
             found = [*reader]
     except OSError as error:
         fail(f"cannot read {table}: {error.strerror}")
@@ -110,11 +110,11 @@ def _values(row: dict[str, str], place: str) -> _Row:
     try:
         return {name: text if name in words else float(text) if text else None for name, text in row.items()}
     except (TypeError, ValueError):
-        fail(f"{place} is no row of a trace")
+        fail(f"{place} is not a row of a trace")
 
 
 def _number(value: float | str | None) -> float:
-    assert isinstance(value, float), "a row that is drawn has all its values"
+    assert isinstance(value, float), "only a row with all its values can be drawn"
     return value
 
 

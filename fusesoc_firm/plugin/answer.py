@@ -34,8 +34,8 @@ from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, fa
 from fusesoc_firm.tools.programs import explanation, missing
 
 # FuseSoC removes it at the start of every run of a target.
-_REMOVED = """the folder that this generator was started in was removed: the same target is being run twice at once
-      = 'firm build' does this without harm"""
+_REMOVED = """this generator's folder was removed during its run: the same target is being run twice at once
+      = 'firm build' can do this safely"""
 
 
 class _NotStoredError(Exception):
@@ -66,7 +66,9 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     """Run the generator `command` on FuseSoC's file; the exit status is 1 for faults and 130 for Ctrl-C."""
     try:
         if len(argv) != 1:
-            fail(f"{command} is a generator that FuseSoC calls with one file; a core uses it in its 'generate' section")
+            fail(
+                f"{command} is a generator that FuseSoC calls with one file; use it in the 'generate' section of a core"
+            )
         _answer(command, generators[command], Path(argv[0]), run_of(os.getppid()))
     except InputError as error:
         print(error, file=sys.stderr)
@@ -204,8 +206,10 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
     for name, source in names.items():
         current = message_folders(generated, core_name(name), run)
         if not current:
-            hint = "the requesting core depends on it, and it has the generator firm_messages in its target 'default'"
-            faults.error(f"there are no messages of core '{name}'", source, hint)
+            hint = (
+                "the requesting core must depend on it, and its target 'default' must use the generator firm_messages"
+            )
+            faults.error(f"core '{name}' provides no messages", source, hint)
         found += map(Path, current)
     faults.raise_if_any()
     return tuple(found)
@@ -219,7 +223,7 @@ def _check_locked(loaded: LoadedRequest) -> bool:
         places.append(request.files_root / str(name))
     if name := os.environ.get(LOCKED):
         if not Path(name).is_absolute():
-            fail(f"{LOCKED} is '{name}'", hint=f"a generator has a folder of its own; write {LOCKED}=$PWD/{name}")
+            fail(f"{LOCKED} is '{name}'", hint=f"a generator runs in its own folder; write {LOCKED}=$PWD/{name}")
         places.append(Path(name))
     for place in places:
         from fusesoc_firm.plugin.lock_file import check_request
@@ -236,7 +240,9 @@ def _check_declared(of_build: Reads, of_key: Reads) -> None:
     found = [(file, known) for file in of_build.files] + [(file, known | parts) for file in of_build.parts]
     for file, covered in found:
         if os.path.realpath(file) not in covered and Path(file).is_file():
-            faults.error(f"{file} was read, which is no input", hint="list it under the generator's parameter 'files'")
+            faults.error(
+                f"{file} was read, but is not an input", hint="list it under the generator's parameter 'files'"
+            )
     faults.raise_if_any()
 
 
@@ -251,9 +257,9 @@ def _write(files: Files, request: Request, marks: str, run: str) -> None:
     if found:
         unit, other = found
         fail(
-            f"{request.vlnv} and {other} define the design unit '{unit}' in two ways, and a tool keeps one",
+            f"{request.vlnv} and {other} define the design unit '{unit}' differently, and tools keep only one",
             find_requesting_core(request.files_root, request.name).instance(),
-            "the parameter 'name' of generator 'firm' gives the units of a core names of their own: name: left",
+            "give the units of one core distinct names by the parameter 'name' of generator 'firm', such as name: left",
         )
 
 

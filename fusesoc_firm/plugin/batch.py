@@ -81,7 +81,7 @@ def _ours(calls: Iterable[GeneratorCall]) -> list[GeneratorCall]:
 
 
 def _no_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
-    fail(f"there is no run that made the messages of {', '.join(names)}")
+    fail(f"no run generated the messages of {', '.join(names)}")
 
 
 def _request(call: GeneratorCall) -> Request:

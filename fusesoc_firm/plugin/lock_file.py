@@ -31,7 +31,7 @@ Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """Facts by kind (`messages`, `cores`, `tools`), by name of the item, and by name of the fact."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
-_HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. To be kept under version control.\n"
+_HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. Keep it under version control.\n"
 _WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
 
 
@@ -74,9 +74,9 @@ def read_lock(path: Path) -> Lock:
         data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
         return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
     except OSError as error:
-        fail(f"cannot read {path}: {error.strerror}", hint="firm lock writes it")
+        fail(f"cannot read {path}: {error.strerror}", hint="'firm lock' writes it")
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
-        fail(f"{path} is no lock file", hint="firm lock writes it anew")
+        fail(f"{path} is not a lock file", hint="'firm lock' rewrites it")
 
 
 def check_lock(locked: Lock, used: Lock) -> None:

@@ -60,7 +60,7 @@ def why(path: Path) -> list[Reason]:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        fail(f"{path} is no text that can be read: {error}")
+        fail(f"{path} is not a readable text: {error}")
     loaded = GENERATORS[command].load(request)
     rendering = rendering_of(loaded.generate, name, text, loaded.inputs)
     return reasons(rendering, _names(request))
@@ -72,7 +72,7 @@ def _generator(path: Path) -> str:
     generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
     if generator not in GENERATORS:
         fail(
-            f"no core in {call.files_root} has a generator of ours make {call.vlnv} any more",
+            f"no core in {call.files_root} generates {call.vlnv} any more",
             hint="generate it again with fusesoc run --setup",
         )
     return generator
@@ -96,18 +96,18 @@ def rendering_of(
     with recorded() as renderings:
         core = generate()
     if name not in core.files:
-        fail(f"'{name}' is none of the generated core's files", hint=f"these are {', '.join(core.files)}")
+        fail(f"'{name}' is not a file of the generated core", hint=f"its files: {', '.join(core.files)}")
     content = core.files[name].content
     made = content if isinstance(content, str) else content.decode(errors="replace")
     if made != text:
-        fail(f"'{name}' is not what would be generated now", hint="generate it again with fusesoc run --setup")
+        fail(f"'{name}' is outdated or was edited", hint="generate it again with fusesoc run --setup")
     if made not in renderings:
         copied = [
             str(item)
             for item in inputs
             if isinstance(item, Path) and item.is_file() and item.read_bytes() == text.encode()
         ]
-        fail(f"'{name}' is of no template", hint=f"it is a copy of {copied[0]}" if copied else "it is data")
+        fail(f"'{name}' does not come from a template", hint=f"it is a copy of {copied[0]}" if copied else "it is data")
     return renderings[made]
 
 
@@ -226,8 +226,8 @@ def call_file(path: Path) -> tuple[Path, str]:
     call, folder = next(found, (None, path))
     if call is None:
         fail(
-            f"no generator made {path}",
-            hint="what one made lies in a build, below 'generator_cache' or in the folder of a core <core>-<instance>",
+            f"{path} is not a generated file",
+            hint="generated files are in a build, below 'generator_cache' or in the folder of a core <core>-<instance>",
         )
     return call, path.relative_to(folder).as_posix()
 

@@ -84,11 +84,11 @@ def replay(
     Raises `InputError`, also if a message was rejected; the responses to the others are then recorded.
     """
     if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
-        fail(f"{target.path} is what is to be replayed")
+        fail(f"{target.path} is the bag to replay; write to another")
     check_writable(target.path, force=target.force)
     system = loaded.system
     if settings.has_latency and system.clock is None:
-        fail("without a 'clock' in the specification it is not known how long a cycle is")
+        fail("the latency in seconds is unknown: the specification has no 'clock'")
     clock = system.clock if settings.has_latency else None
     _check_names(settings.names, [item.block for item in (*stimulated(system), *published(system))])
     subscribers = renamed(stimulated(system), settings.names)
@@ -157,7 +157,7 @@ class _Replay:
             for subscriber in () if route.misfit else route.subscribers:
                 self.run.take(subscriber, recorded.payload, recorded.stamp)
         except (StuckError, TransportError) as error:
-            faults.append(f"nothing from here on is replayed: {error}")
+            faults.append(f"the rest of the bag is not replayed: {error}")
             self.is_over = True
         for sent in self.run.sent:
             self._record(sent)
@@ -187,7 +187,7 @@ class _Replay:
     def print_summary(self, path: Path) -> None:
         """Print the messages that went in and came out, topic by topic."""
         if self.errors > _SHOWN:
-            print(f"and {self.errors - _SHOWN} errors more", file=sys.stderr)
+            print(f"and {self.errors - _SHOWN} more errors", file=sys.stderr)
         rows = [("in", *self._way(stream), str(self.played[stream])) for stream in self.routes]
         rows += [("out", block, topic.name, topic.type, str(self.sent[block])) for block, topic in self.topics.items()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -195,7 +195,7 @@ class _Replay:
             print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
         dropped = {stream: count for stream, count in self.bag.streams.items() if stream not in self.routes}
         for stream, number in dropped.items():
-            print(f"nobody takes {stream.topic} of {stream.type}: {number}")
+            print(f"no subscriber for {stream.topic} of {stream.type}: {number}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out, {sum(dropped.values())} dropped,"
             f" {self.errors} errors, {self.run.simulator.cycle} cycles"
@@ -226,7 +226,7 @@ def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
     faults = Diagnostics()
     for block in names:
         if block not in blocks:
-            faults.error(f"the system has no subscriber and no publisher '{block}'", hint=nearest(block, blocks))
+            faults.error(f"the system has neither a subscriber nor a publisher '{block}'", hint=nearest(block, blocks))
     faults.raise_if_any()
 
 
@@ -234,7 +234,7 @@ def _form(target: Target, like: Form) -> Form:
     """The format of the bag to write."""
     said = form_of(target.path)
     if target.form and said and target.form is not said:
-        fail(f"{target.path} is to be a bag as {target.form.value}, but ends like one as {said.value}")
+        fail(f"the format of {target.path} is to be {target.form.value}, but its ending means {said.value}")
     return target.form or said or like
 
 
@@ -243,8 +243,8 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
     faults = Diagnostics()
     for topic in topics:
         if topic.frame.ros != form.ros:
-            message = f"'{topic.block}' speaks {topic.frame.ros.title}, but {path} is to be a bag of {form.ros.title}"
-            faults.error(message, hint="--format says what it is to be")
+            message = f"'{topic.block}' uses {topic.frame.ros.title}, but {path} would be a bag of {form.ros.title}"
+            faults.error(message, hint="choose another format with --format")
     faults.raise_if_any()
 
 

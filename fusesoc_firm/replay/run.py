@@ -176,7 +176,7 @@ class SystemRun:
                     case ErrorPulse(converter=converter):
                         self.faults.append(self._error(converter))
             if self._waiting and self.simulator.cycle >= self._deadline:
-                raise StuckError(f"the system does not take it at '{self._waiting[0].block}'")
+                raise StuckError(f"the system does not accept it at '{self._waiting[0].block}'")
 
     def _is_busy(self) -> bool:
         return self.simulator.quiet < self.quiet and self.simulator.cycle < self._deadline
@@ -197,7 +197,7 @@ class SystemRun:
             else:
                 self._send(publisher, frame.payload, cause, burst.last_cycle)
         except (BurstError, CodecError) as error:
-            self.faults.append(f"what the hardware sends is wrong: {error}")
+            self.faults.append(f"the hardware sent invalid data: {error}")
 
     def _send(self, topic: Topic, payload: bytes, cause: Cause, last_cycle: int | None) -> None:
         self.sent.append(Sent(topic, payload, self._causes.get(topic.block, cause), last_cycle))

@@ -47,7 +47,7 @@ class Parameter:
         if self.bounds:
             facts.append(f"{self.bounds[0]} to {self.bounds[1]}")
         if self.replaces:
-            facts.append(f"in place of {', '.join(self.replaces)}")
+            facts.append(f"instead of {', '.join(self.replaces)}")
         if self.is_required:
             facts.append("required")
         elif self.default is not None:
@@ -65,13 +65,13 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
         if name not in table:
             faults.error(f"unknown parameter '{name}'", origin.key(name), nearest(name, table))
         elif replacing.get(name) in given:
-            hint = f"'{replacing[name]}' stands in its place"
-            faults.error(f"parameter '{name}' does not go with '{replacing[name]}'", origin.key(name), hint)
+            hint = "remove one of them"
+            faults.error(f"parameter '{name}' cannot be combined with '{replacing[name]}'", origin.key(name), hint)
     for name, parameter in table.items():
         if name not in given:
             if parameter.is_required and replacing.get(name) not in given:
-                hint = f"or give '{replacing[name]}' in its place" if name in replacing else ""
-                faults.error(f"parameter '{name}' is missing; it is {parameter.meaning}", origin.instance(), hint)
+                hint = f"or give '{replacing[name]}' instead" if name in replacing else ""
+                faults.error(f"parameter '{name}' is missing: {parameter.meaning}", origin.instance(), hint)
         elif fault := _fault(parameter, given[name]):
             faults.error(f"parameter '{name}' is {given[name]!r}, but must be {fault}", origin.value(name))
     faults.raise_if_any()

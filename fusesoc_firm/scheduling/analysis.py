@@ -298,26 +298,26 @@ def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float, na
     best = analyses[0]
     found = [f"The publishers ask for {100 * load:.1f} % of the channel."]
     if load > 1:
-        found[0] += " That is more than there is: each sends less often than its period says."
+        found[0] += " The channel is overloaded: each sends less often than its period allows."
     holding = [each for each in analyses if each.is_schedulable]
     finishing = [each for each in analyses if each.all_finish]
     if criterion is Criterion.FINISH:
-        found.append(f"Everybody finishes under {len(finishing)} of {len(analyses)} policies.")
+        found.append(f"All publishers finish under {len(finishing)} of {len(analyses)} policies.")
     elif holding:
         found.append(f"All deadlines hold under {len(holding)} of {len(analyses)} policies.")
     else:
         found.append("No policy is certain to hold all deadlines.")
     found.append(f"{best.policy} {_MERITS[criterion](best)}")
     if best.priorities == names:
-        found.append("Its priorities are the order in which the publishers stand.")
+        found.append("Its priorities are the publishers' order in the specification.")
     elif best.priorities:
-        found.append(f"Its priorities, the highest first: {', '.join(best.priorities)}. So must the publishers stand.")
+        found.append(f"Put the publishers in the order of its priorities: {', '.join(best.priorities)}.")
     return found
 
 
 def _lut_words(analysis: Analysis) -> str:
     if analysis.lut is None:
-        return "takes a number of LUTs that is not known"
+        return "takes an unknown number of LUTs"
     if not area.measured():
         source = "by the dissertation's table 4.1"
     else:

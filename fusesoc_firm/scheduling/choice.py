@@ -86,7 +86,7 @@ def _text(choice: Choice) -> str:
     parts = [
         f"scheduler: {best.policy}\n",
         "\n".join(choice.reasons) + "\n",
-        "Times in cycles, bounds at worst; buffers in bytes.\n",
+        "Times are worst-case bounds in cycles; buffers are in bytes.\n",
         grid(columns, bounds),
         grid(others, policies),
         "\n".join(f"{analysis.policy}: {end_of(analysis)}" for analysis in choice.analyses) + "\n",

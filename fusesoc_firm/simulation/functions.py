@@ -44,8 +44,8 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
         yield
         for _, file, place in _imported(known, owners):
             if file not in listed:
-                message = f"software imports {file.relative_to(place)}, which is none of its sources"
-                fail(message, owners[place].sources[0].source, "every file of it is listed in 'sources'")
+                message = f"software imports {file.relative_to(place)}, which is not one of its sources"
+                fail(message, owners[place].sources[0].source, "list all its files in 'sources'")
     finally:
         sys.path[:], sys.dont_write_bytecode = paths, writes
         for name, _, _ in [*_imported(known, owners)]:
@@ -171,12 +171,12 @@ def _answer(function: UserFunction, when: str, side: MessageSide, value: object)
     if value is None:
         return None
     if not isinstance(value, Mapping):
-        message = f"for {when}, {function.what} gave {value!r}, which is not a mapping of fields"
+        message = f"for {when}, {function.what} returned {value!r}, which is not a mapping of fields"
         function.fail(message, _expected([side]))
     try:
         return decode(side.frame, encode_used(side.frame, value))
     except CodecError as error:
-        function.fail(f"for {when}, what {function.what} gave does not fit: {error}")
+        function.fail(f"for {when}, {function.what} returned an invalid message: {error}")
 
 
 def _expected(outputs: Sequence[MessageSide]) -> str:

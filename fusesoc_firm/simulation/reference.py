@@ -76,15 +76,16 @@ class _Model:
         block, message = item
         if not isinstance(block, str) or block not in known:
             self.respond.fail(
-                f"for {when}, 'respond' gave a message to {block!r}, not a publisher", nearest(str(block), known)
+                f"for {when}, 'respond' returned a message for {block!r}, which is not a publisher",
+                nearest(str(block), known),
             )
         if not isinstance(message, Mapping):
             self.respond.fail(
-                f"for {when}, 'respond' gave {message!r} to '{block}', which is not a mapping of fields", _ANSWER
+                f"for {when}, 'respond' returned {message!r} for '{block}', which is not a mapping of fields", _ANSWER
             )
         publisher = known[block]
         try:
             payload = encode_used(publisher.frame, message)
         except CodecError as error:
-            self.respond.fail(f"for {when}, what 'respond' gave to '{block}' does not fit: {error}")
+            self.respond.fail(f"for {when}, 'respond' returned an invalid message for '{block}': {error}")
         return Response(publisher, payload, decode(publisher.frame, payload), cause)

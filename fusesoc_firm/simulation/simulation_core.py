@@ -109,19 +109,19 @@ def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None
     if not known.reads_vhdl and system.clocks:
         fail(
             f"{simulator} cannot simulate a system of several clocks",
-            hint=f"the clocks beside the host's are made in VHDL: --target={target}",
+            hint=f"the additional clocks are generated in VHDL: use --target={target}",
         )
     if not known.reads_vhdl and system.link:
         fail(
             f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",
-            hint=f"the host's end of a link is written in VHDL: --target={target}",
+            hint=f"the host's end of a link is written in VHDL: use --target={target}",
         )
     for type_ in system.accelerator_types:
         accelerator = type_.accelerator
         if known.reads_vhdl and accelerator.type == "Verilog":
             others = " or ".join(f"'{name}'" for name in fitting(has_verilog=True)).replace("'", "'simulator: ", 1)
             hint = f"{others} link it with the Verilog that GHDL makes of the VHDL"
-            message = f"{known.title} simulates no Verilog, which '{accelerator.name}' is written in"
+            message = f"{known.title} cannot simulate Verilog, the language of '{accelerator.name}'"
             fail(message, accelerator.name.source, hint)
         if not known.calls_functions and accelerator.type == "HLS":
             hint = f"only GHDL calls a C++ function from within a simulation: --target={target}"

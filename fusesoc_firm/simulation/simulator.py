@@ -173,7 +173,7 @@ def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
     if done.returncode:
         lines = [line for line in done.stdout.splitlines() if not line.startswith("INFO:")]
         shown = "\n".join(lines[-_SHOWN_LINES:])
-        fail(f"the simulator of {spec} cannot be built, {shlex.join(command)} in {folder} fails:\n{shown}")
+        fail(f"cannot build the simulator of {spec}: {shlex.join(command)} in {folder} failed:\n{shown}")
     return done.stdout
 
 
@@ -193,5 +193,5 @@ def _words(work: Path, tool: str) -> list[str]:
 def _live(tool: str) -> Live:
     """Return the tool's support for live simulation. Raises `InputError` if it has none."""
     if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
-        fail(f"there is no simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
+        fail(f"unknown simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
     return live

@@ -84,7 +84,7 @@ def _item(text: YamlText, node: yaml.Node, known: dict[str, Topic], faults: Diag
     key, value = node.value[0]
     subscriber = known.get(key.value) if isinstance(key, yaml.ScalarNode) else None
     if subscriber is None:
-        faults.error(f"no subscriber is called {kind(key)}", text.source(key), nearest(str(key.value), known))
+        faults.error(f"{kind(key)} is not a subscriber", text.source(key), nearest(str(key.value), known))
         return None
     before = len(faults.found)
     message = read_message(text, value, subscriber.frame, faults)

@@ -183,7 +183,7 @@ class Store:
         except OSError as error:
             # Users of a read-only store expect this; `firm cache show` reports it.
             if self.is_writable():
-                print(f"warning: nothing is kept in the store {self.root}: {error.strerror}", file=sys.stderr)
+                print(f"warning: results cannot be cached in the store {self.root}: {error.strerror}", file=sys.stderr)
 
     def _shrink_if_needed(self) -> None:
         if self.size() > self.limit:
@@ -215,7 +215,10 @@ def default_store(environment: Mapping[str, str] = os.environ) -> Store:
     """The store that the environment names. Raises `InputError` if the limit is not a size."""
     limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
-        fail(f"FUSESOC_FIRM_CACHE_SIZE is '{limit}', which is no size", hint="bytes, or such as 500M or 2G")
+        fail(
+            f"FUSESOC_FIRM_CACHE_SIZE is '{limit}', which is not a size",
+            hint="legal: a number of bytes, such as 4096, 500M or 2G",
+        )
     return Store(Path(layout.default_root(environment)), size)
 
 

@@ -74,7 +74,7 @@ def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None
     The text appears in comments, strings, labels and messages, so it must be one printable line. It must not contain
     control characters, Unicode line ends, lone surrogates, or characters that change the writing direction.
     """
-    legal = f"legal is one line of at most {longest} printable characters"
+    legal = f"legal: one line of at most {longest} printable characters"
     if len(text) > longest:
         return f"has {len(text)} characters", legal
     if unprintable := next((character for character in text if not character.isprintable()), None):

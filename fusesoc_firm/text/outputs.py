@@ -15,7 +15,7 @@ def check_output(path: Path, endings: Sequence[str] = ()) -> None:
     """
     if endings and path.suffix not in endings:
         fail(
-            f"{path} cannot be written: its name does not say what it is to be",
+            f"cannot write {path}: its ending does not name a format",
             hint=f"legal endings: {', '.join(endings)}",
         )
     if path.is_dir():

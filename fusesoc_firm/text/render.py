@@ -215,7 +215,7 @@ class _Expansion:
             return text
         if quote not in self.quotes:
             known = ", ".join(sorted(self.quotes)) or "none"
-            raise TemplateError(f"'{quote}' is no way to quote here; the template's language has {known}")
+            raise TemplateError(f"unknown quoting '{quote}'; the template's language has {known}")
         return self.quotes[quote](text)
 
     def _section(self, section: _Section, scope: _Scope, is_taken: bool) -> str:
@@ -260,7 +260,7 @@ def _is_there(value: object) -> bool:
 def _look_up(key: str, scope: _Scope) -> object:
     while key.startswith("../"):
         if scope.outer is None:
-            raise TemplateError(f"no scope is around {scope.path or 'the context'} for '{key}'")
+            raise TemplateError(f"no scope encloses {scope.path or 'the context'} for '{key}'")
         key, scope = key.removeprefix("../"), scope.outer
     if key == ".":
         return scope.data

@@ -161,7 +161,7 @@ class _Reader:
 
     def _sections(self, entry: Key, node: yaml.Node, name: str) -> tuple[Section, ...] | None:
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{name}' must be a list, one '- ' an item, not {kind(node)}", node, entry.meaning)
+            self._error(f"'{name}' must be a list with one '- ' per item, not {kind(node)}", node, entry.meaning)
             return None
         if not node.value and entry.is_required:
             self._error(f"'{name}' is an empty list", node, entry.meaning)

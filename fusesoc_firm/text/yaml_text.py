@@ -203,7 +203,7 @@ def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
     if indent in open_blocks or not open_blocks:
         return ""
     legal = ", ".join(f"{blanks} ({begin})" for blanks, begin in open_blocks.items())
-    return f"the line is indented by {indent}, what is open above it by {legal}"
+    return f"the line is indented by {indent}, but the open blocks above it by {legal}"
 
 
 def _block_begins(line: str) -> Iterator[tuple[int, str]]:

@@ -22,7 +22,7 @@ def check_picture(path: Path | None, form: str | None) -> None:
     if form and path.suffix != f".{form}":
         fail(
             f"{path} is not a picture in the format {form}",
-            hint=f"without --format, the ending says it: {', '.join(ENDINGS)}",
+            hint=f"without --format, the ending sets the format: {', '.join(ENDINGS)}",
         )
 
 

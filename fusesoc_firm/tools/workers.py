@@ -106,8 +106,8 @@ def _security(distributed: Any, address: str) -> Any:
     if protocol != "tls":
         if protocol in _OPEN_PROTOCOLS and not _is_here(place):
             print(
-                f"warning: '{address}' is neither on this machine nor tls://: who has access to that network can run "
-                "programs on all machines of the cluster, this one included",
+                f"warning: '{address}' is neither on this machine nor tls://: anyone with access to that network can "
+                "run programs on all machines of the cluster, including this one",
                 file=sys.stderr,
             )
         return distributed.Security()
@@ -122,7 +122,7 @@ def _security(distributed: Any, address: str) -> Any:
             )
             fail(f"'{address}' needs distributed.comm.tls.{name}", hint=hint)
         if not Path(file).is_file():
-            fail(f"there is no file '{file}', which Dask's configuration names as distributed.comm.tls.{name}")
+            fail(f"the file '{file}' of distributed.comm.tls.{name} in Dask's configuration is missing")
     return security
 
 

@@ -44,7 +44,7 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
     """
     if settings.width not in WIDTHS:
         legal = ", ".join(map(str, WIDTHS))
-        fail(f"no converter is made for a stream of {settings.width} bits", hint=f"legal here: {legal}")
+        fail(f"a converter cannot have a stream of {settings.width} bits", hint=f"legal here: {legal}")
     if places.report:
         check_output(places.report, (".json",))
     if places.keep:
@@ -91,7 +91,7 @@ def _print_summary(report: Report, places: Places) -> None:
     for entry in alone[:_SHOWN]:
         print(f"{entry.name}: {entry.result.detail}\n  to repeat: {shlex.join([*places.command, str(entry.name)])}")
     if len(alone) > _SHOWN:
-        print(f"and {len(alone) - _SHOWN} layouts more that failed")
+        print(f"and {len(alone) - _SHOWN} more failed layouts")
     for verdict in (Verdict.NO_JUDGE, Verdict.REFUSED):
         found = [entry for entry in report.entries if entry.result.verdict is verdict]
         for entry in found[:_SHOWN]:

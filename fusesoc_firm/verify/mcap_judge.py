@@ -50,14 +50,14 @@ def check(
     names = dict(zip(definitions, renamed, strict=True))
     text = joint_text(names[name], renamed)
     decode = DecoderFactory().decoder_for("cdr", Schema(1, text.encode(), "ros2msg", str(names[name])))
-    assert decode is not None, "it knows cdr and ros2msg"
+    assert decode is not None, "it supports cdr and ros2msg"
     for value, payload in zip(values, payloads, strict=True):
         try:
             found = decode(payload)
         except Exception as error:
             raise NoJudgementError(f"{TITLE} refuses the bytes: {type(error).__name__}: {error}") from error
         if not _is_same_message(found, definitions[name], definitions, value):
-            raise NoJudgementError(f"{TITLE} reads another value")
+            raise NoJudgementError(f"{TITLE} reads a different value")
 
 
 def _renamed(definitions: Definitions) -> dict[MessageName, MessageDefinition]:

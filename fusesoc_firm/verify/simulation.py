@@ -133,5 +133,5 @@ def _detail(output: str) -> str:
     lines = output.splitlines()
     faults = [line.partition(": ")[2] for line in lines if line.startswith("fault in cycle")]
     faults += [_REPORT.sub("", line) for line in lines if "(assertion failure)" in line and "FAIL" not in line]
-    faults = faults or [line for line in lines if "error" in line] or lines[:1] or ["GHDL ended without a word"]
+    faults = faults or [line for line in lines if "error" in line] or lines[:1] or ["GHDL ended without a message"]
     return "; ".join(faults[:_DETAIL_LINES])

@@ -102,7 +102,7 @@ def _verify_in(folder: Path, task: Task, library: Path) -> Result:
     # The loop cannot detect two fields that both converters swap in the same way.
     for value, payload in zip(values, judgement.payloads, strict=True):
         if fault := _layout_fault(frame, value, payload):
-            return replace(told, detail=f"the layout is not the judge's: {fault}")
+            return replace(told, detail=f"the layout differs from the reference's: {fault}")
     frames = [_stimulus(frame, payload, chance) for payload in judgement.payloads]
     answers = [_answer(frame, payload, sent) for payload, sent in zip(judgement.payloads, frames, strict=True)]
     write_frames(folder, frames, answers)

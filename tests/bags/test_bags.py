@@ -115,7 +115,7 @@ def test_messages_go_by_topic_or_type_in_order_of_time(tmp_path: Path, kind: str
 def test_a_damaged_bag(tmp_path: Path, kind: str, share: float) -> None:
     path = write(tmp_path, kind, many(kind, 100))
     cut(path, share)
-    with pytest.raises(InputError, match="is not a bag that can be read"):
+    with pytest.raises(InputError, match="is not a readable bag"):
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", version(kind))])
 
 
@@ -151,12 +151,12 @@ def test_a_bag_without_a_message_for_anybody(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("name", ["notes.txt", "broken.bag", "broken.mcap", "broken.db3"])
 def test_what_is_no_bag(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_bytes(b"This is no bag, whatever it is called.\n" * 10)
-    with pytest.raises(InputError, match=r"is not a bag that can be read: .*\n +=? .*YAML"):
+    with pytest.raises(InputError, match=r"is not a readable bag: .*\n +=? .*YAML"):
         read_stimuli(tmp_path / name, [subscriber("p", "geometry_msgs/Point", ROS1)])
 
 
 def test_a_folder_that_is_no_bag(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is not a bag that can be read"):
+    with pytest.raises(InputError, match="is not a readable bag"):
         read_stimuli(tmp_path, [subscriber("p", "geometry_msgs/Point", ROS1)])
 
 
@@ -279,7 +279,7 @@ def test_another_message_of_the_same_name(tmp_path: Path, kind: str) -> None:
     name = parse_name("geometry_msgs/Point")
     ours = signature(name, MessageLibrary(version(kind)).closure(name))
     assert routed(path, kind, ours) == [""]
-    assert routed(path, kind, "other") == [f"it is another geometry_msgs/Point than that of 'p': {ours}, not other"]
+    assert routed(path, kind, "other") == [f"its geometry_msgs/Point differs from that of 'p': {ours}, not other"]
 
 
 @pytest.mark.parametrize(

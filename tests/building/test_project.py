@@ -216,8 +216,8 @@ def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatc
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["me:p:bush"], "'me:p:bush' is no core that FuseSoC knows here"),
-        (["me:p:a bush"], "'me:p:a bush' is no core that FuseSoC knows here"),
+        (["me:p:bush"], "unknown core 'me:p:bush'"),
+        (["me:p:a bush"], "unknown core 'me:p:a bush'"),
         (["me:p:top", "--target", "fly"], "'me:p:top:1.0' has no target 'fly'"),
     ],
 )
@@ -319,7 +319,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
 def test_what_is_no_lock_file_is_a_fault(project: Path, capsys: Captured, text: str) -> None:
     assert "cannot read" in locked(capsys)[0]
     (project / "top/top.lock").write_text(text)
-    assert "is no lock file" in locked(capsys)[0]
+    assert "is not a lock file" in locked(capsys)[0]
 
 
 def test_what_a_dependency_has_generated_is_locked_too(project: Path, capsys: Captured) -> None:

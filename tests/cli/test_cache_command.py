@@ -65,10 +65,10 @@ def test_clean_to_a_wrong_size() -> None:
 
 def test_verify(root: Path, capsys: Captured) -> None:
     assert main(["cache", "verify"]) == 0
-    assert capsys.readouterr().out == f"{root}: every entry is whole\n"
+    assert capsys.readouterr().out == f"{root}: all entries are intact\n"
     damaged = entries(root)[1]
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"x")
     assert main(["cache", "verify"]) == 1
-    assert capsys.readouterr().err == f"error: 1 entry was damaged, and removed:\n{damaged}\n"
+    assert capsys.readouterr().err == f"error: 1 entry was damaged and removed:\n{damaged}\n"
     assert len(entries(root)) == 2
     assert main(["cache", "verify"]) == 0

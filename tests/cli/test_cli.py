@@ -260,7 +260,7 @@ def test_a_fault_in_a_message_is_shown_in_its_file(tmp_path: Path, capsys: Captu
         (["message", "show", "Quaternion"], "Quaternion"),
         (
             ["message", "show", "sensor_msgs/Image", "--stage", "vhdl", "--width", "24"],
-            "no converter is made for a stream of 24 bits",
+            "a converter cannot have a stream of 24 bits",
         ),
         (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9 bits"),
         (["message", "list", "--path", "no/such/folder"], "no/such/folder"),
@@ -275,7 +275,7 @@ def test_faults_are_told_without_a_traceback(arguments: list[str], message: str,
 
 def test_a_right_specification(capsys: Captured) -> None:
     text = out(capsys, "system", "check", str(SPEC))
-    assert text == f"{SPEC}: quat2euler is right: 1 subscriber, 1 accelerator, 1 publisher\n"
+    assert text == f"{SPEC}: quat2euler is valid: 1 subscriber, 1 accelerator, 1 publisher\n"
 
 
 def test_software_is_counted_apart(capsys: Captured) -> None:
@@ -286,7 +286,7 @@ def test_software_is_counted_apart(capsys: Captured) -> None:
 
 @pytest.mark.parametrize("distro", ["noetic", "humble"])
 def test_a_distribution_of_either_version_serves_a_specification(distro: str, capsys: Captured) -> None:
-    assert "is right" in out(capsys, "system", "check", str(SPEC), "--distro", distro)
+    assert "is valid" in out(capsys, "system", "check", str(SPEC), "--distro", distro)
 
 
 def test_the_derived_system_has_the_content_of_the_dissertations_listings(capsys: Captured) -> None:
@@ -323,7 +323,7 @@ def test_a_system_is_made_drawn_and_counted(capsys: Captured, tmp_path: Path, mo
     answers = ["robot", *[""] * 8, "no", "sub", "", "ROS", "subscriber", point, *[""] * 3, "yes", "pub", "", "", "no"]
     answers += ["yes", "pub", "", "ROS", "publisher", point, *[""] * 7, "no", "no"]
     monkeypatch.setattr("sys.stdin", io.StringIO("".join(f"{answer}\n" for answer in answers)))
-    assert f"{spec}: robot is right: 1 subscriber" in out(capsys, "system", "new", str(spec))
+    assert f"{spec}: robot is valid: 1 subscriber" in out(capsys, "system", "new", str(spec))
     assert out(capsys, "system", "diagram", str(spec), "-o", str(picture)) == ""
     assert '"block sub" -> "block pub"' in picture.read_text(encoding="utf-8")
     assert out(capsys, "system", "diagram", str(spec), "--format", "dot") == picture.read_text(encoding="utf-8")
@@ -386,7 +386,7 @@ def test_where_nothing_can_be_written_is_told_before_the_work(
     monkeypatch.chdir(tmp_path)
     message = error(capsys, *command, name)
     assert message == (
-        f"error: {name} cannot be written: its name does not say what it is to be\n      = legal endings: {legal}\n"
+        f"error: cannot write {name}: its ending does not name a format\n      = legal endings: {legal}\n"
     )
     good = f"x{legal.split(',', maxsplit=1)[0]}"
     assert error(capsys, *command, f"none/{good}") == f"error: cannot write none/{good}: there is no folder none\n"
@@ -416,7 +416,7 @@ def test_steps_of_a_node_in_cpp_need_its_system(capsys: Captured, tmp_path: Path
         "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n"
         "1,received,0,0,32,,\n2,sent,0,0,32,,\n3,burst,0,0,29,,\n4,published,0,0,24,,\n"
     )
-    assert "--system SPEC says what its ids mean" in error(capsys, "trace", str(steps))
+    assert "give the specification with --system SPEC" in error(capsys, "trace", str(steps))
     ways = tmp_path / "steps-ways.csv"
     assert out(capsys, "trace", str(steps), "--system", str(SPEC), "-o", str(picture)) == f"{ways}\n{picture}\n"
     assert "0,QuaternionToEuler_sub,QuaternionToEuler_pub,32,24,0,0,1,2,3," in ways.read_text(encoding="utf-8")

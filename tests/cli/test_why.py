@@ -127,7 +127,7 @@ def test_a_core_of_converters_alone_and_all_lines(tmp_path: Path, capsys: Captur
     # Which generator it was, nobody else knows.
     (tmp_path / "converters.core").unlink()
     assert main(["why", str(path)]) == 1
-    assert f"error: no core in {tmp_path} has a generator of ours make " in capsys.readouterr().err
+    assert f"error: no core in {tmp_path} generates " in capsys.readouterr().err
 
 
 def test_the_generated_core_itself_may_be_named(tmp_path: Path, capsys: Captured) -> None:
@@ -146,17 +146,17 @@ def test_faults(tmp_path: Path, capsys: Captured) -> None:
     path = copy / "quat2euler_system.vhd"
     last = len(path.read_text().splitlines())
     for number in (last + 1, 0):
-        assert f"has no line {number}, its last one is {last}" in fault(f"{path}:{number}")
+        assert f"has no line {number}; its last line is {last}" in fault(f"{path}:{number}")
     source = SPECS / "quat2euler/rtl/quat2euler.vhd"
-    assert f"is of no template\n      = it is a copy of {source}\n" in fault(
+    assert f"does not come from a template\n      = it is a copy of {source}\n" in fault(
         f"{copy / 'quat2euler/rtl/quat2euler.vhd'}:1"
     )
     (copy / "robot.vhd").write_text("")
-    assert "'robot.vhd' is none of the generated core's files" in fault(f"{copy / 'robot.vhd'}:1")
+    assert "'robot.vhd' is not a file of the generated core" in fault(f"{copy / 'robot.vhd'}:1")
     path.write_text(path.read_text() + "-- edited\n")
-    assert "is not what would be generated now" in fault(f"{path}:1")
+    assert "is outdated or was edited" in fault(f"{path}:1")
     (tmp_path / "a.vhd").write_text("")
-    assert "no generator made" in fault(str(tmp_path / "a.vhd"))
+    assert "is not a generated file" in fault(str(tmp_path / "a.vhd"))
     for place in (f"{copy / 'nothing.vhd'}:1", f"{path}:x", f"{path}:-1", str(copy), ""):
         assert "there is no file" in fault(place)
 

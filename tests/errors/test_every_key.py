@@ -131,7 +131,7 @@ def sites(checker: Checker) -> list[KeySite]:
 
 def problem(checker: Checker, answer: Answer) -> str:
     """An error in a result, whatever the text: an impossible place, or a status that does not fit."""
-    if (answer.code == 0) != (not answer.faults) or (answer.code == 0) != (" is right: " in answer.output):
+    if (answer.code == 0) != (not answer.faults) or (answer.code == 0) != (" is valid: " in answer.output):
         return f"exit status {answer.code} with {len(answer.faults)} faults"
     lines = answer.text.splitlines()
     for fault in answer.faults:

@@ -143,7 +143,7 @@ def test_elements_have_defaults_but_arrays_of_messages_none() -> None:
         ("string[2] x\n", {"x": [""]}, r"'x' takes a list of 2, not \[''\]"),
         ("string[] x\n", {"x": "abc"}, "'x' takes a list, not 'abc'"),
         ("string x\n", {"x": b"abc"}, "'x' takes a string, not b'abc'"),
-        ("string x\n", {"x": "\ud800"}, "'x' takes no lone surrogate"),
+        ("string x\n", {"x": "\ud800"}, "'x' cannot hold a lone surrogate"),
     ],
 )
 def test_a_value_that_does_not_fit(text: str, value: dict[str, Any], error: str) -> None:

@@ -406,7 +406,7 @@ blocks:
   - {{name: out, middleware: ROS, mode: publisher, message: geometry_msgs/Point}}
 """
 RIGHT = {"name": "robot", "clock": "1 MHz", "block": "in", "message": "geometry_msgs/Point"}
-LEGAL = "legal is one line of at most 200 printable characters"
+LEGAL = "legal: one line of at most 200 printable characters"
 BOARD = {"flow": "vivado", "clock": "1 MHz", "interconnect": "axi_stream", "part": "x", "processor": "zynqmp"}
 
 

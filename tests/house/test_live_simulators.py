@@ -176,7 +176,7 @@ def test_the_core_beside_it_is_the_one_that_names_it() -> None:
 def test_what_cannot_be_built_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InputError, match="there is no specification"):
         build_simulator(tmp_path / "none.yaml")
-    with pytest.raises(InputError, match="there is no simulator 'questa' of live systems"):
+    with pytest.raises(InputError, match="unknown simulator 'questa' of live systems"):
         build_simulator(SPECS / "quat2euler" / "quat2euler.yaml", "questa")
     with pytest.raises(InputError, match="is for verilator"):
         build_simulator(SPECS / "multi_type" / "multi_type_verilog.yaml", build_root=tmp_path / "build")
@@ -209,4 +209,4 @@ def test_the_command_prints_a_program(tmp_path: Path, capsys: pytest.CaptureFixt
         simulator.quit()
     with pytest.raises(SystemExit):
         main(["simulator", str(spec), "--seed", "0"])
-    assert "0 is no whole number from 1 to 2147483562" in capsys.readouterr().err
+    assert "0 is not a whole number from 1 to 2147483562" in capsys.readouterr().err

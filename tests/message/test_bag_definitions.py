@@ -104,7 +104,7 @@ def test_what_is_no_bag_or_has_no_definitions(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("")
     with pytest.raises(InputError) as raised:
         MessageLibrary(ROS1, [tmp_path / "drive.bag", tmp_path / "notes.txt"])
-    assert "drive.bag is not a bag that can be read" in str(raised.value)
+    assert "drive.bag is not a readable bag" in str(raised.value)
     assert "notes.txt' is neither a folder nor a bag" in str(raised.value)
     empty = record(tmp_path, "mcap", {})
     with pytest.raises(InputError, match="drive' is a bag without definitions"):
@@ -179,7 +179,7 @@ def test_whoever_reads_the_bag_itself_must_declare_it(
             file.read_bytes()
         return loaded.generate()
 
-    with pytest.raises(InputError, match="was read, which is no input"):
+    with pytest.raises(InputError, match="was read, but is not an input"):
         obtain(replace(loaded, generate=generate), FIRM, basis)
 
 

@@ -182,7 +182,7 @@ def test_a_broken_file_is_reported_on_every_request(tmp_path: Path) -> None:
     write(tmp_path / "my_msgs" / "msg" / "A.msg", "uint8 x\nnonsense\n")
     library = MessageLibrary(ROS2, [tmp_path])
     for _ in range(2):
-        with pytest.raises(InputError, match="2:1: error: 'nonsense' has no name behind it"):
+        with pytest.raises(InputError, match="2:1: error: 'nonsense' is not followed by a name"):
             library.get(MessageName("my_msgs", "A"))
     diagnostics = Diagnostics()
     definition = library.find(MessageName("my_msgs", "A"), diagnostics)

@@ -111,8 +111,8 @@ def test_types_of_one_version(text: str, ros: Middleware, expected: FieldType) -
 @pytest.mark.parametrize(
     ("line", "ros", "fault"),
     [
-        ("uint8", ROS1, "1:1 'uint8' has no name behind it"),
-        ("uint8=3", ROS1, "1:1 'uint8=3' has no name behind it"),
+        ("uint8", ROS1, "1:1 'uint8' is not followed by a name"),
+        ("uint8=3", ROS1, "1:1 'uint8=3' is not followed by a name"),
         ("uint8 =3", ROS1, "1:7 the constant name is missing"),
         ("uint8 []  data", ROS1, "1:7 a blank before '['"),
         ("uint8 [] data", ROS2, "1:7 a blank before '['"),
@@ -142,7 +142,7 @@ def test_types_of_one_version(text: str, ros: Middleware, expected: FieldType) -
         ("uint8 _a", ROS2, "1:7 '_a' is not a legal field name in ROS 2"),
         ("uint8 Foo = 1", ROS2, "1:7 'Foo' is not a legal constant name in ROS 2"),
         ("uint8 A_ = 1", ROS2, "1:7 'A_' is not a legal constant name in ROS 2"),
-        ("uint8 x 5", ROS1, "1:9 unexpected '5' behind field 'x'"),
+        ("uint8 x 5", ROS1, "1:9 unexpected '5' after field 'x'"),
         ("uint8 x more garbage", ROS2, "1:9 'more garbage' is not a value of uint8"),
         ('string s "a=b"', ROS2, "1:8 's \"a' is not a legal constant name in ROS 2"),
         ("time T=1", ROS1, "1:1 'time' is not a type for constants"),
@@ -399,7 +399,7 @@ def test_an_action_is_three_definitions() -> None:
     ("text", "fault"),
     [
         ("int64 a", "Add.srv:1:1: error: 1 of 2 sections found"),
-        ("---\nint64 a\n---\n", "Add.srv:3:1: error: more than the 2 sections that belong here"),
+        ("---\nint64 a\n---\n", "Add.srv:3:1: error: more than the 2 expected sections"),
     ],
 )
 def test_a_wrong_number_of_sections(text: str, fault: str) -> None:

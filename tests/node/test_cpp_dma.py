@@ -39,8 +39,8 @@ def test_frames_go_there_and_back(driver: Driver, count: int, longest: int, buff
         ("halt", "the DMA engine's S2MM: it has halted"),
         ("stall", "the transport is closed"),
         ("overrun", "the DMA engine wrote beyond a buffer"),
-        ("simple", "the DMA engine has no scatter and gather, so it is none of a generated block design"),
-        ("reset", "the DMA engine does not end its reset: has it a clock?"),
+        ("simple", "the DMA engine lacks scatter-gather, so it is not from a generated block design"),
+        ("reset", "the DMA engine does not leave its reset: does it have a clock?"),
         ("start", "the DMA engine does not start"),
     ],
 )
@@ -91,6 +91,6 @@ def test_a_device_that_does_not_serve_is_named(driver: Driver, tmp_path: Path) -
     assert far == ["error: udmabuf0 ends beyond the 4 GiB that the DMA engine reaches"]
     size = root / "sys/class/u-dma-buf/udmabuf0/size"
     size.write_text("many\n")
-    assert driver.answers([], "files", str(root)) == [f"error: {size} holds 'many', which is no number"]
+    assert driver.answers([], "files", str(root)) == [f"error: {size} holds 'many', which is not a number"]
     size.unlink()
     assert driver.answers([], "files", str(root)) == [f"error: {size} cannot be read: is its driver loaded?"]

@@ -124,7 +124,7 @@ def test_threads_do_not_race() -> None:
         ("cut", "the simulator ended with status 4"),
         ("garbage", "byte "),
         ("unsent", "the simulator reports a frame that it was not sent"),
-        ("backwards", "the simulator stands at cycle 0 and stood at "),
+        ("backwards", "the simulator is at cycle 0, but was at "),
         ("long", "the simulator reports a burst of 4294967295 bytes; legal: 1 to 10000069"),
     ],
 )
@@ -171,7 +171,7 @@ def test_a_simulator_that_hangs_holds_messages_back_and_is_abandoned(node_driver
         node_driver, puts(messages), f"pipe:{SIMULATOR} --fault hang", overflow="drop_oldest", depth=4, drain=300
     )
     assert outcome.said["status"] == "1"
-    assert outcome.said["error"] == "the time to stop is over, and not all was sent and received"
+    assert outcome.said["error"] == "the time limit for stopping is over, but some frames were not sent or received"
     # 2 are in flight, one is the sender's, 4 are in the queue.
     assert outcome.count("dropped") >= 100 - 2 - 1 - 4 and outcome.count("sent") <= 2
 
@@ -227,7 +227,7 @@ def test_an_address_that_is_none(node_driver: Driver, address: str) -> None:
 @pytest.mark.parametrize(
     ("address", "error"),
     [
-        ("uart:/dev/null:fast", "the baud rate is 'fast', which is no number"),
+        ("uart:/dev/null:fast", "the baud rate is 'fast', which is not a number"),
         ("uart:/nowhere/tty:9600:rtscts", "/nowhere/tty: No such file or directory"),
         ("uart:/dev/null:9600", "/dev/null: Inappropriate ioctl for device"),
         ("dma:/dev/uio99:udmabuf0", "/sys/class/uio/uio99/maps/map0/size cannot be read: is its driver loaded?"),

@@ -266,7 +266,7 @@ def test_a_fault_of_the_engine(root: Path, engine: Engine, bits: int, message: s
 
 def test_an_engine_that_is_none(root: Path, engine: Engine) -> None:
     engine.stop()
-    with pytest.raises(TransportError, match="does not end its reset"):
+    with pytest.raises(TransportError, match="does not leave its reset"):
         DmaTransport(device(root))
 
 
@@ -282,7 +282,7 @@ def test_buffers_that_cannot_be(root: Path, buffers: DmaBuffers) -> None:
     ("file", "value", "message"),
     [
         ("sys/class/uio/uio0/maps/map0/size", None, "map0/size cannot be read: is its driver loaded"),
-        ("sys/class/u-dma-buf/udmabuf0/phys_addr", "soon", "phys_addr holds 'soon', which is no number"),
+        ("sys/class/u-dma-buf/udmabuf0/phys_addr", "soon", "phys_addr holds 'soon', which is not a number"),
         ("sys/class/u-dma-buf/udmabuf0/phys_addr", "0xffff8000", "udmabuf0 ends beyond the 4 GiB"),
         ("dev/uio0", None, "cannot be used: .*No such file"),
     ],

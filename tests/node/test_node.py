@@ -188,7 +188,7 @@ def test_hardware_that_is_gone_is_started_anew(tmp_path: Path) -> None:
     run.stop()
     assert run.is_complete
     assert [payload for _, payload in run.carrier.published] == POINTS[:2]
-    assert run.reports == ["the simulator was killed; it is started anew, and what was in it is lost"]
+    assert run.reports == ["the simulator was killed; it is restarted, and the messages in it are lost"]
     assert run.node.statistics.restarts == 1
 
 
@@ -219,8 +219,8 @@ def test_garbage_from_the_hardware_is_reported_and_the_rest_goes_on(tmp_path: Pa
     assert run.node.statistics.faults == 40
     # A link that is broken for hours does not fill the disk.
     assert len(run.reports) == 21
-    assert run.reports[0].startswith("the hardware sends what no Manager does: ")
-    assert run.reports[20] == "from here on, more of this is only counted"
+    assert run.reports[0].startswith("the hardware sent an invalid burst: ")
+    assert run.reports[20] == "further reports of this kind are only counted"
 
 
 def test_a_message_that_the_hardware_refuses_is_counted(tmp_path: Path) -> None:
@@ -230,7 +230,7 @@ def test_a_message_that_the_hardware_refuses_is_counted(tmp_path: Path) -> None:
         run.node.refused(converter_)
     run.stop()
     assert (run.node.statistics.inputs["a1"].refused, run.node.statistics.faults) == (2, 1)
-    assert run.reports[0] == "the hardware refused a message from 'a1': it is broken"
+    assert run.reports[0] == "the hardware rejected a malformed message from 'a1'"
 
 
 def test_a_carrier_that_is_gone_ends_the_node(tmp_path: Path) -> None:
@@ -340,7 +340,7 @@ def test_a_message_that_is_none_is_reported(tmp_path: Path) -> None:
         run.carrier.give(0, b"short", POINTS[1])
         run.stop()
     assert [payload for _, payload in run.carrier.published] == [point(2.0)]
-    assert "a message from 'sub' is no geometry_msgs/Point" in str(faults[0])
+    assert "a message from 'sub' is not a valid geometry_msgs/Point" in str(faults[0])
 
 
 # --- the trace -------------------------------------------------------------------------------------------------------
@@ -435,9 +435,9 @@ def test_the_steps_of_a_node_in_cpp_become_ways(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("1,received,0,zero,24,,", "steps.csv:2 is no step of a node"),
-        ("1,received,0", "steps.csv:2 is no step of a node"),
-        ("1,lost,0,0,24,,", "steps.csv:2: there is no step 'lost'"),
+        ("1,received,0,zero,24,,", "steps.csv:2 is not a step of a node"),
+        ("1,received,0", "steps.csv:2 is not a step of a node"),
+        ("1,lost,0,0,24,,", "steps.csv:2: unknown step 'lost'"),
         ("1,received,2,0,24,,", "steps.csv:2: 'robot' has no topic of converter 2, received"),
     ],
 )
@@ -466,11 +466,11 @@ def test_a_trace_is_drawn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "picture", "message"),
     [
-        ("trace.csv", "ways.gif", "ways.gif cannot be written: its name"),
+        ("trace.csv", "ways.gif", "ways.gif: its ending does not name a format"),
         ("none.csv", "ways.svg", "cannot read "),
-        ("other.csv", "ways.svg", "is no trace of a node"),
+        ("other.csv", "ways.svg", "is not the trace of a node"),
         ("trace.csv", "ways.svg", "has no message that came back"),
-        ("broken.csv", "ways.svg", "broken.csv:2 is no row of a trace"),
+        ("broken.csv", "ways.svg", "broken.csv:2 is not a row of a trace"),
         ("good.csv", "no/ways.svg", "/no/ways.svg: there is no folder "),
     ],
 )

@@ -75,15 +75,15 @@ def test_frames_are_answered(tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
     assert _served(tmp_path, row) == [(0, 2.0), (1, 2.0), (2, 10.0)]
     garbage = pack_frame(0, b"short")
     assert _served(tmp_path, garbage + frame(tmp_path, 1, 3.0)) == [(2, 6.0)]
-    assert "a message of 'sub' is none: " in capfd.readouterr().err
+    assert "invalid message from 'sub': " in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("row", "error"),
     [
-        (b"\0\1", "the frames end within one"),
-        (b"\0\5\0\0\0abc", "the frames end within one"),
-        (b"\2\0\0\0\0", "a frame has id 2, but those of the software's inputs are 0 to 1"),
+        (b"\0\1", "the input ends within a frame"),
+        (b"\0\5\0\0\0abc", "the input ends within a frame"),
+        (b"\2\0\0\0\0", "a frame has id 2, but the software's inputs have the ids 0 to 1"),
     ],
 )
 def test_a_row_that_is_no_frames_is_refused(tmp_path: Path, row: bytes, error: str) -> None:
@@ -129,7 +129,7 @@ def test_a_function_that_fails_ends_the_node_or_is_started_again(node_driver: Dr
 
 def test_a_process_that_talks_nonsense_ends_the_node(node_driver: Driver) -> None:
     outcome = run(node_driver, ["put 0 00"], "software:printf '\\377nonsense'; cat >/dev/null")
-    assert outcome.said["error"] == "the software sends no frames: the id is 255, but the publishers are 0 to 1"
+    assert outcome.said["error"] == "the software sent an invalid frame: the id is 255, but the publishers are 0 to 1"
 
 
 def test_faults_of_the_specification_are_told(tmp_path: Path) -> None:

@@ -118,7 +118,10 @@ def test_a_frame_that_comes_in_pieces(board: Board, transport: Transport, monkey
 
 @pytest.mark.parametrize(
     ("sent", "why"),
-    [(b"\x00\xff\xff\xff\xff\x00", "announces 4294967295 bytes"), (b"\x00\x09\x00\x00\x00abc", "stops before its end")],
+    [
+        (b"\x00\xff\xff\xff\xff\x00", "announces 4294967295 bytes"),
+        (b"\x00\x09\x00\x00\x00abc", "a frame is incomplete"),
+    ],
 )
 def test_what_cannot_be_a_frame_makes_a_break(
     board: Board, transport: Transport, breaks: list[float], sent: bytes, why: str
@@ -149,10 +152,10 @@ def test_a_break_ends_the_frame_that_is_held(board: Board, transport: Transport)
     # A receiver that waits for a short time only finds it, too.
     assert transport.receive(0.01) is None
     time.sleep(0.3)
-    with pytest.raises(TransportResetError, match="stops before its end"):
+    with pytest.raises(TransportResetError, match="a frame is incomplete"):
         transport.receive(0.01)
     sender.join()
-    assert refusals == [f"{board.device}: a break ended the frame that was on its way"]
+    assert refusals == [f"{board.device}: a break interrupted a frame"]
 
 
 def test_a_line_that_is_never_silent(board: Board, breaks: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,7 +206,7 @@ def test_closing_wakes_who_waits(board: Board, transport: Transport) -> None:
 
 def test_a_board_that_goes(board: Board, transport: Transport) -> None:
     board.close()
-    with pytest.raises(TransportError, match=r"/dev/pts/\d+ is gone"):
+    with pytest.raises(TransportError, match=r"/dev/pts/\d+ is lost"):
         transport.receive(60)
 
 
@@ -211,12 +214,12 @@ def test_a_board_that_goes(board: Board, transport: Transport) -> None:
     ("address", "message"),
     [
         ("uart:/dev/none:115200", "cannot open the serial line /dev/none: No such file"),
-        ("uart:/dev/null:115200", "/dev/null is no serial line"),
-        ("uart:/dev/null:123", "123 is no speed of a serial line"),
-        ("uart:/dev/null:fast", "the baud rate is 'fast', which is no number"),
+        ("uart:/dev/null:115200", "/dev/null is not a serial line"),
+        ("uart:/dev/null:123", "123 is not a legal baud rate"),
+        ("uart:/dev/null:fast", "the baud rate is 'fast', which is not a number"),
         ("uart:/dev/null", "the transport is 'uart:/dev/null'; legal: pipe:COMMAND, uart:"),
         ("pipe:", "the transport is 'pipe:'; legal: pipe:COMMAND"),
-        ("pipe:'a", "whose command is none: No closing quotation"),
+        ("pipe:'a", "whose command is invalid: No closing quotation"),
         ("telepathy:x", "the transport is 'telepathy:x'; legal: "),
     ],
 )

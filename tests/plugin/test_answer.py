@@ -220,8 +220,8 @@ def test_a_fault_of_the_input_is_printed_without_traceback(bench: Bench, capsys:
         ({"seed": 0, "spec": "b"}, 9, "9:13: error: parameter 'seed' is 0, but must be 1 to 99\n"),
         ({"paths": "a", "spec": "b"}, 9, "9:14: error: parameter 'paths' is 'a', but must be a list of strings\n"),
         ({"paths": [1], "spec": "b"}, 10, "10:7: error: parameter 'paths' is [1], but must be a list of strings\n"),
-        ({"width": 8}, 6, "6:3: error: parameter 'spec' is missing; it is a path\n"),
-        ({"file": "a", "spec": "b"}, 10, "10:7: error: parameter 'spec' does not go with 'file'\n"),
+        ({"width": 8}, 6, "6:3: error: parameter 'spec' is missing: a path\n"),
+        ({"file": "a", "spec": "b"}, 10, "10:7: error: parameter 'spec' cannot be combined with 'file'\n"),
     ],
 )
 def test_a_fault_in_a_parameter_is_shown_in_the_core(
@@ -236,9 +236,9 @@ def test_a_fault_in_a_parameter_is_shown_in_the_core(
 
 def test_one_parameter_stands_in_for_others(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
     assert bench.run(width=8) == 1
-    assert capsys.readouterr().err.endswith("      = or give 'file' in its place\n")
+    assert capsys.readouterr().err.endswith("      = or give 'file' instead\n")
     assert bench.run(file="spec.yaml", width=16) == 1
-    assert "parameter 'width' does not go with 'file'" in capsys.readouterr().err
+    assert "parameter 'width' cannot be combined with 'file'" in capsys.readouterr().err
     assert bench.run(file="spec.yaml") == 0
 
 

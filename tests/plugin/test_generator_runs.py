@@ -206,7 +206,7 @@ def test_what_is_in_the_way_is_done_without(calls: Calls, right: dict[str, bytes
     _folder(path)
     status, origin, errors = calls.run("second")
     assert (status, origin) == (0, "generated")
-    assert errors == f"warning: nothing is kept in the store {calls.store}: Is a directory\n"
+    assert errors == f"warning: results cannot be cached in the store {calls.store}: Is a directory\n"
     assert calls.written("second") == right
 
 
@@ -225,7 +225,7 @@ def test_a_store_that_may_only_be_read(calls: Calls, right: dict[str, bytes]) ->
         show = [*UNPRIVILEGED, sys.executable, "-m", "fusesoc_firm.cli", "cache", "show"]
         environment = os.environ | {"PYTHONPATH": str(ROOT), "FUSESOC_FIRM_CACHE": str(calls.store)}
         shown = subprocess.run(show, env=environment, capture_output=True, text=True, check=True).stdout
-        assert shown.splitlines()[-1] == "rights   read only: nothing is kept of what you generate"
+        assert shown.splitlines()[-1] == "rights   read only: what you generate is not cached"
         assert calls.written("second") == calls.written("third") == right
         assert {path: path.is_file() and path.read_bytes() for path in calls.store.rglob("*")} == before
     finally:
@@ -259,7 +259,7 @@ def test_a_full_disk(calls: Calls, right: dict[str, bytes], full: str) -> None:
     status, origin, errors = calls.run("work", "unshare", "-rm", "sh", "-c", script, "sh")
     if full == "store":
         assert (status, origin) == (0, "generated")
-        assert f"warning: nothing is kept in the store {calls.store}: No space left on device\n" in errors
+        assert f"warning: results cannot be cached in the store {calls.store}: No space left on device\n" in errors
         assert calls.written("work") == right
     else:
         assert status == 1

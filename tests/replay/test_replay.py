@@ -90,13 +90,13 @@ def test_the_name_says_the_form(tmp_path: Path, name: str, form: str | None, fil
 
 def test_a_form_against_the_name(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
-    with pytest.raises(InputError, match="is to be a bag as sqlite3, but ends like one as mcap"):
+    with pytest.raises(InputError, match="is to be sqlite3, but its ending means mcap"):
         run(loaded, bag(tmp_path, "mcap", points("mcap", 1)), Target(tmp_path / "o.mcap", Form.SQLITE3), "echo")
 
 
 def test_a_bag_that_cannot_hold_the_answers(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 2)))
-    with pytest.raises(InputError, match=r"'p_out' speaks ROS 2, but .*o\.bag is to be a bag of ROS 1"):
+    with pytest.raises(InputError, match=r"'p_out' uses ROS 2, but .*o\.bag would be a bag of ROS 1"):
         run(loaded, bag(tmp_path, "mcap", points("mcap", 1)), tmp_path / "o.bag", "echo")
 
 
@@ -105,14 +105,14 @@ def test_a_bag_that_is_there_is_replaced_only_by_force(tmp_path: Path) -> None:
     source = bag(tmp_path, "mcap", points("mcap", 2))
     target = tmp_path / "out"
     run(loaded, source, target, "echo")
-    with pytest.raises(InputError, match=r"is there already\n.*--force"):
+    with pytest.raises(InputError, match=r"already exists\n.*--force"):
         run(loaded, source, target, "echo")
     run(loaded, Source(source, limit=1), Target(target, force=True), "echo")
     assert len(read(target)) == 1
     (target / "notes.txt").touch()
-    with pytest.raises(InputError, match=r"is a folder, and no bag's: it holds notes\.txt"):
+    with pytest.raises(InputError, match=r"is a folder, but not a bag: it holds notes\.txt"):
         run(loaded, source, Target(target, force=True), "echo")
-    with pytest.raises(InputError, match="is what is to be replayed"):
+    with pytest.raises(InputError, match="is the bag to replay"):
         run(loaded, source, Target(source, force=True), "echo")
     assert len(read(source)) == 2
 
@@ -136,9 +136,9 @@ def test_nothing_is_left_of_a_replay_that_cannot_begin(tmp_path: Path) -> None:
         (["--map", "/a"], "'/a' is not TOPIC=BLOCK"),
         (["--map", "=a"], "'=a' is not TOPIC=BLOCK"),
         (["--limit", "0"], "0 is less than 1"),
-        (["--start", "-1"], "'-1' is no number of seconds"),
-        (["--duration", "inf"], "'inf' is no number of seconds"),
-        (["--duration", "ten"], "'ten' is no number of seconds"),
+        (["--start", "-1"], "'-1' is not a number of seconds"),
+        (["--duration", "inf"], "'inf' is not a number of seconds"),
+        (["--duration", "ten"], "'ten' is not a number of seconds"),
         (["--format", "csv"], "invalid choice: 'csv'"),
     ],
 )
@@ -208,7 +208,7 @@ def test_the_latency_is_that_of_the_hardware(tmp_path: Path) -> None:
 
 def test_latency_needs_a_clock(tmp_path: Path) -> None:
     loaded = load(specification(tmp_path, passing("p", "geometry_msgs/Point", 1)))
-    with pytest.raises(InputError, match="without a 'clock' in the specification"):
+    with pytest.raises(InputError, match="the specification has no 'clock'"):
         run(loaded, bag(tmp_path, "ros1", points("ros1", 1)), tmp_path / "o.bag", "echo", has_latency=True)
 
 
@@ -241,7 +241,7 @@ def test_topics_that_the_command_names(tmp_path: Path) -> None:
     with pytest.raises(InputError) as raised:
         run(loaded, source, tmp_path / "p.bag", "echo", "echo", names={"lift": "/b"})
     assert str(raised.value) == (
-        "error: the system has no subscriber and no publisher 'lift'\n      = did you mean 'left'?"
+        "error: the system has neither a subscriber nor a publisher 'lift'\n      = did you mean 'left'?"
     )
     with pytest.raises(InputError, match=r"has no topic /bb for 'left'\n.*did you mean '/b'"):
         run(loaded, source, tmp_path / "p.bag", "echo", "echo", names={"left": "/bb", "right": "/a"})
@@ -294,7 +294,7 @@ def test_the_summary(tmp_path: Path, capsys: Captured) -> None:
     assert lines[:3] == [
         "in  p     /p     geometry_msgs/msg/Point 12",
         "out p_out /p_out geometry_msgs/msg/Point 12",
-        f"nobody takes /s of {STRING}: 1",
+        f"no subscriber for /s of {STRING}: 1",
     ]
     # A message takes 4 + 19 + 4 cycles, and 100 cycles of rest.
     assert lines[3] == f"{tmp_path}/o.bag: 12 in, 12 out, 1 dropped, 0 errors, {12 * 127} cycles"
@@ -353,7 +353,10 @@ def test_a_hardware_that_knows_no_id(tmp_path: Path, capsys: Captured) -> None:
 
 def test_a_message_that_is_never_taken(tmp_path: Path, capsys: Captured) -> None:
     assert replayed(tmp_path, "ros1", points("ros1", 4), capsys, "stuck") == [
-        "/p, message 1, at 1000000000.010000000: nothing from here on is replayed: the system does not take it at 'p'"
+        (
+            "/p, message 1, at 1000000000.010000000: the rest of the bag is not replayed: "
+            "the system does not accept it at 'p'"
+        )
     ]
     assert read(tmp_path / "o.bag") == []
 
@@ -386,14 +389,14 @@ def test_a_bag_that_is_damaged_within(tmp_path: Path, capsys: Captured) -> None:
     source.write_bytes(content)
     with pytest.raises(InputError, match="1 error; 0 of"):
         run(load(specification(tmp_path, passing("p", "geometry_msgs/Point"))), source, tmp_path / "o.bag", "echo")
-    assert "is not a bag that can be read" in capsys.readouterr().err
+    assert "is not a readable bag" in capsys.readouterr().err
     found = read(tmp_path / "o.bag")
     assert 0 < len(found) < len(items)
     assert found == renamed(items[: len(found)], "/p_out")
 
 
 def test_a_hardware_that_sends_what_it_must_not(tmp_path: Path, capsys: Captured) -> None:
-    place = "/p, message 0, at 1000000000.000000000: what the hardware sends is wrong: "
+    place = "/p, message 0, at 1000000000.000000000: the hardware sent invalid data: "
     assert replayed(tmp_path, "ros1", points("ros1", 1), capsys, "garbled") == [
         f"{place}the frame of id 0 is 9 bytes longer than it announces",
         f"{place}the id is 200, but the publishers are 0 to 0",
@@ -411,7 +414,7 @@ def test_many_faults_are_counted(tmp_path: Path, capsys: Captured) -> None:
         )
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 101
-    assert lines[100] == "and 30 errors more"
+    assert lines[100] == "and 30 more errors"
 
 
 def test_bursts_are_joined(tmp_path: Path) -> None:

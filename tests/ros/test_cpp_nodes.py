@@ -411,4 +411,4 @@ def test_a_message_that_is_installed_with_another_definition_is_refused(workshop
     workshop.ros.compile(package, program, workshop.header)
     done = run(workshop, program, "--transport", simulator())
     assert done.returncode == 1
-    assert "that is installed is not the one that the hardware was made for (RIHS01_beef" in done.stderr
+    assert "is installed in another version than the hardware has (RIHS01_beef" in done.stderr

@@ -114,7 +114,7 @@ def test_the_cheapest_that_holds_all_deadlines(no_area: None) -> None:
     assert holding == ["fixed_priority_preemptive", "edf_resources", "edf_latency"]
     assert "All deadlines hold under 3 of 7 policies." in choice.reasons
     assert "the fewest LUTs of these, 54 (by the dissertation's table 4.1)" in choice.reasons[2]
-    assert choice.reasons[3].startswith("Its priorities, the highest first: imu, arm, camera.")
+    assert choice.reasons[3].startswith("Put the publishers in the order of its priorities: imu, arm, camera.")
 
 
 def test_lst_needs_longer_runs() -> None:
@@ -135,8 +135,8 @@ def test_nobody_may_starve(no_area: None) -> None:
     too_much = (Task("a", 10, 8, 10), Task("b", 20, 15, 20), Task("c", 1_000, 10, 1_000))
     choice = choose(too_much, Criterion.FINISH)
     assert choice.reasons[0] == (
-        "The publishers ask for 156.0 % of the channel. That is more than there is: each sends less often than its "
-        "period says."
+        "The publishers ask for 156.0 % of the channel. The channel is overloaded: each sends less often than its "
+        "period allows."
     )
     assert choice.best.all_finish
     assert not choice.analyses[-1].all_finish

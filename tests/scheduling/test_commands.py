@@ -79,13 +79,13 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path, options: list[str]) 
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [
-        (["--policies", "lur"], "there is no policy 'lur'\n      = did you mean 'lru'?"),
-        (["--dataset", "cc5"], "there is no data set 'cc5'\n      = did you mean"),
-        (["--requesters", "2,257"], "'257' is no number of accelerators\n      = legal: 1 to 256"),
-        (["--requesters", "x"], "'x' is no number of accelerators"),
-        (["--requesters", ""], "'' is no number of accelerators"),
-        (["--requesters", "0"], "'0' is no number of accelerators"),
-        (["--policies", ""], "there is no policy ''\n      = legal here: edf_latency"),
+        (["--policies", "lur"], "unknown policy 'lur'\n      = did you mean 'lru'?"),
+        (["--dataset", "cc5"], "unknown data set 'cc5'\n      = did you mean"),
+        (["--requesters", "2,257"], "'257' is not a number of accelerators\n      = legal: 1 to 256"),
+        (["--requesters", "x"], "'x' is not a number of accelerators"),
+        (["--requesters", ""], "'' is not a number of accelerators"),
+        (["--requesters", "0"], "'0' is not a number of accelerators"),
+        (["--policies", ""], "unknown policy ''\n      = legal here: edf_latency"),
         (["--output", "{file}/below"], "/below: Not a directory"),
         (["--csv", "{file}/values.csv"], "/values.csv: there is no folder "),
     ],
@@ -102,7 +102,7 @@ def test_bad_arguments_of_bench(arguments: list[str], fault: str, tmp_path: Path
     [
         ("--sets", "0", "0 is less than 1"),
         ("--jobs", "-3", "-3 is less than 1"),
-        ("--cycles", "many", "'many' is no whole number"),
+        ("--cycles", "many", "'many' is not a whole number"),
         ("--shortest-run", "0", "0 is less than 1"),
         ("--resume-beats", "-1", "-1 is less than 0"),
         ("--seed", "-1", "-1 is less than 0"),
@@ -135,14 +135,14 @@ def test_choose_tells_the_policy_and_why(spec: Path, capsys: Captured) -> None:
     assert out.startswith("scheduler: fixed_priority\n")
     # 5 bytes of header and 28 of payload in beats of 4; 100,000 cycles are 1 ms.
     assert "| slow      | 100000 |             9 |   100000 |" in out
-    assert "priorities, the highest first: fast, slow, third." in out
+    assert "Put the publishers in the order of its priorities: fast, slow, third." in out
 
 
 def test_choose_sees_that_publishers_stand_in_order(spec: Path, capsys: Captured) -> None:
     in_order = SPEC.replace("period: 1 kHz", "period: 100, deadline: 28").replace("deadline: 40", "deadline: 60")
     spec.write_text(with_a_third(in_order))
     assert main(["scheduler", "choose", str(spec)]) == 0
-    assert "Its priorities are the order in which the publishers stand." in capsys.readouterr().out
+    assert "Its priorities are the publishers' order in the specification." in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("form", ["json", "yaml"])
@@ -167,5 +167,5 @@ def test_choose_needs_the_times(spec: Path, capsys: Captured) -> None:
     assert main(["scheduler", "choose", str(spec)]) == 1
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert "error: the 'period' of publisher 'slow' is not given" in captured.err
-    assert "error: the 'period' of publisher 'fast' is not given" in captured.err
+    assert "error: publisher 'slow' needs a 'period'" in captured.err
+    assert "error: publisher 'fast' needs a 'period'" in captured.err

@@ -145,28 +145,38 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "def respond(block, m):\n    return [('lift', m)]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', 'respond' gave a message to 'lift', not a publisher\n"
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned a message for 'lift', "
+                "which is not a publisher\n"
                 "    1 | def respond(block, m):\n      | ^\n      = did you mean 'left'?"
             ),
         ),
         (
             "def respond(block, m):\n    return [([], m)]\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' gave a message to [], not a publisher",
+            (
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned a message for [], "
+                "which is not a publisher"
+            ),
         ),
         (
             "def respond(block, m):\n    return [('left', 5)]\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' gave 5 to 'left', which is not a mapping of fields",
+            (
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned 5 for 'left', "
+                "which is not a mapping of fields"
+            ),
         ),
         (
             "def respond(block, m):\n    return [('left', {'x': 'one', 'y': 0, 'z': 0})]\n",
             (
-                "model.py:1:1: error: for message 0 to 'sub', what 'respond' gave to 'left' does not fit: "
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
                 "'x' takes a float64, not 'one'"
             ),
         ),
         (
             "def respond(block, m):\n    return [('left', {'x': 0, 'y': 0})]\n",
-            "model.py:1:1: error: for message 0 to 'sub', what 'respond' gave to 'left' does not fit: no value for 'z'",
+            (
+                "model.py:1:1: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
+                "no value for 'z'"
+            ),
         ),
         ("def answer(block, m):\n    return []\n", "error: model.py has no function 'respond(subscriber, message)'"),
         ("respond = 5\n", "error: model.py has no function 'respond(subscriber, message)'"),

@@ -212,7 +212,7 @@ def test_every_fault_of_a_file_is_shown_where_it_is(tmp_path: Path) -> None:
 """,
     )
     assert [line for line in text.splitlines() if ": error: " in line] == [
-        "stimuli.yaml:1:3: error: no subscriber is called 'pont'",
+        "stimuli.yaml:1:3: error: 'pont' is not a subscriber",
         "stimuli.yaml:2:17: error: a geometry_msgs/Point has no field 'Y'",
         "stimuli.yaml:2:29: error: 'z' is a float64, not 'one'",
         "stimuli.yaml:4:22: error: 'pose.position' is a mapping of its fields, not a list",
@@ -223,7 +223,7 @@ def test_every_fault_of_a_file_is_shown_where_it_is(tmp_path: Path) -> None:
         "stimuli.yaml:7:3: error: a stimulus is one block with its message: '- <subscriber>: {...}'",
         "stimuli.yaml:8:17: error: key 'x' is given twice",
         "stimuli.yaml:9:3: error: a stimulus is one block with its message: '- <subscriber>: {...}'",
-        "stimuli.yaml:10:3: error: no subscriber is called a list",
+        "stimuli.yaml:10:3: error: a list is not a subscriber",
     ]
     assert "did you mean 'point'?" in text
     assert "did you mean 'y'?" in text
@@ -231,7 +231,7 @@ def test_every_fault_of_a_file_is_shown_where_it_is(tmp_path: Path) -> None:
 
 def test_faults_of_form_and_of_content_come_together(tmp_path: Path) -> None:
     text = faults(tmp_path, "- pint: {x: 0}\n- point: {x: 0\n- byte: {data: 0}\n")
-    assert "stimuli.yaml:1:3: error: no subscriber is called 'pint'" in text
+    assert "stimuli.yaml:1:3: error: 'pint' is not a subscriber" in text
     assert "stimuli.yaml:3:7: error: this is not YAML: expected ',' or '}', but got ':'" in text
 
 

@@ -96,7 +96,7 @@ def test_a_store_that_cannot_be_written_is_done_without(tmp_path: Path, capfd: p
     (tmp_path / "file").write_text("")
     root = tmp_path / "file" / "store"
     assert obtain(root) == Entry(FILES, False)
-    assert capfd.readouterr().err == f"warning: nothing is kept in the store {root}: Not a directory\n"
+    assert capfd.readouterr().err == f"warning: results cannot be cached in the store {root}: Not a directory\n"
 
 
 def test_a_store_that_can_only_be_read_gives_what_it_has(
@@ -112,7 +112,9 @@ def test_a_store_that_can_only_be_read_gives_what_it_has(
     assert obtain(tmp_path) == Entry(FILES, True)
     assert capfd.readouterr().err == ""
     assert obtain(tmp_path, request="cd" + "0" * 62) == Entry(FILES, False)
-    assert capfd.readouterr().err == f"warning: nothing is kept in the store {tmp_path}: Read-only file system\n"
+    assert (
+        capfd.readouterr().err == f"warning: results cannot be cached in the store {tmp_path}: Read-only file system\n"
+    )
     assert stored(tmp_path) == before
 
 
@@ -131,7 +133,7 @@ assert store.obtain(Key(sys.argv[2]), lambda: files).files == files
 def test_a_full_disk_is_done_without(tmp_path: Path) -> None:
     command = [sys.executable, "-c", FULL, str(tmp_path), REQUEST]
     done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=True)
-    assert done.stderr == f"warning: nothing is kept in the store {tmp_path}: File too large\n"
+    assert done.stderr == f"warning: results cannot be cached in the store {tmp_path}: File too large\n"
     assert stored(tmp_path) == {}
 
 
@@ -412,7 +414,7 @@ def test_sizes(text: str, size: int | None) -> None:
 
 
 def test_a_limit_that_is_no_size_is_a_fault() -> None:
-    with pytest.raises(InputError, match="FUSESOC_FIRM_CACHE_SIZE is 'lots', which is no size"):
+    with pytest.raises(InputError, match="FUSESOC_FIRM_CACHE_SIZE is 'lots', which is not a size"):
         default_store({"FUSESOC_FIRM_CACHE_SIZE": "lots"})
     assert default_store({"FUSESOC_FIRM_CACHE_SIZE": "5M"}).limit == 5 * 2**20
     assert default_store({}).limit == 2**30

@@ -169,10 +169,10 @@ def test_faults_that_only_follow_are_not_reported(tmp_path: Path) -> None:
             "typ: same, outgoing: [{name: b}]",
             "an item of 'blocks' has no key 'typ'",
         ),
-        ("[{name: b}]", "[{name: c}]", "no block is called 'c'"),
+        ("[{name: b}]", "[{name: c}]", "unknown block 'c'"),
         ("{name: b,", "{nam: b,", "an item of 'blocks' has no key 'nam'"),
         ("interface: ", "interfaces: ", "an item of 'accelerators' has no key 'interfaces'"),
-        ("{name: a, type: same", "{name: a, type: sama", "no accelerator is called 'sama'"),
+        ("{name: a, type: same", "{name: a, type: sama", "unknown accelerator 'sama'"),
     ):
         assert old in right
         with pytest.raises(InputError) as raised:

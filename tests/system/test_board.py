@@ -125,11 +125,11 @@ def test_a_board_of_spi(tmp_path: Path) -> None:
     ("text", "message"),
     [
         (BOARD.replace("{port: uart_rxd, site: A2}", "{port: led, site: A2}"), "the board has no pin for 'uart_rxd'"),
-        (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' has a pin already"),
-        (BOARD + "  - {port: Clk, site: A4}\n", "port 'Clk' has a pin already"),
+        (BOARD + "  - {port: clk, site: A4}\n", "port 'clk' already has a pin"),
+        (BOARD + "  - {port: Clk, site: A4}\n", "port 'Clk' already has a pin"),
         (BOARD.replace("trellis", "ise"), "'flow' cannot be 'ise'"),
         (BOARD.split("pins:", maxsplit=1)[0], "the board has no pin for 'clk'"),
-        (BOARD.replace("uart\n", "axi_stream\n"), "flow 'trellis' has no processor to take streams"),
+        (BOARD.replace("uart\n", "axi_stream\n"), "flow 'trellis' has no processor for streams"),
         (BOARD.replace("trellis", "vivado"), "flow 'vivado' takes streams"),
         (BOARD.replace("trellis", "vivado"), "flow 'vivado' takes no pins"),
         (BOARD.replace("trellis", "vivado"), "a board of flow 'vivado' needs the key 'part'"),
@@ -207,17 +207,17 @@ def test_pins_without_a_place_and_places_without_a_pin(tmp_path: Path) -> None:
     with pytest.raises(InputError) as raised:
         check_fits(with_pins(tmp_path, board, PINS), board)
     said = str(raised.value)
-    assert "spec.yaml:9:19: error: pin 'Lamp' of 'Block' has no place on board 'board'" in said
-    assert "give a board file of your own a '{port: block_lamp, site: ...}'" in said
-    assert "error: pin 'level' of 'Block' has no place on board 'board'" in said
+    assert "spec.yaml:9:19: error: pin 'Lamp' of 'Block' has no site on board 'board'" in said
+    assert "add '{port: block_lamp, site: ...}' to a board file of your own" in said
+    assert "error: pin 'level' of 'Block' has no site on board 'board'" in said
     assert "'{port: block_level[1], site: ...}'" in said
-    assert "error: nothing of the system is called 'block_lmp'" in said
+    assert "error: the system has no port 'block_lmp'" in said
     assert "did you mean 'block_lamp'?" in said
 
 
 def test_a_pin_is_not_called_as_a_port_of_the_board(tmp_path: Path) -> None:
     board = written(tmp_path, BOARD)
-    with pytest.raises(InputError, match="pin 'n' of 'led' is called 'led_n', as a port of every board may be"):
+    with pytest.raises(InputError, match="pin 'n' of 'led' has the name 'led_n', which is reserved for boards"):
         check_fits(with_pins(tmp_path, board, "{name: n, direction: out}", "led"), board)
 
 

@@ -151,5 +151,5 @@ def test_without_a_simulation_there_is_no_target_for_it(tmp_path: Path) -> None:
 def test_another_core_is_left_alone(tmp_path: Path, text: str) -> None:
     path = tmp_path / "robot.core"
     path.write_text(text)
-    with pytest.raises(InputError, match=r"robot\.core( is no core| has no inst|:\d+:\d+: error: this is not YAML)"):
+    with pytest.raises(InputError, match=r"robot\.core( is not a core| has no inst|:\d+:\d+: error: this is not YAML)"):
         updated_core(system(tmp_path), path)

@@ -66,7 +66,7 @@ def test_a_word_is_text_whatever_yaml_takes_it_for(tmp_path: Path, word: str) ->
         ("project: {name: ''}", "'name' must be a word, not ''"),
         ("project:", "'project' must be a mapping of keys to values, not nothing"),
         ("blocks: []", "'blocks' is an empty list"),
-        ("blocks: {name: a}", "'blocks' must be a list, one '- ' an item, not a mapping"),
+        ("blocks: {name: a}", "'blocks' must be a list with one '- ' per item, not a mapping"),
         ("blocks: [a]", "an item of 'blocks' must be a mapping of keys to values, not 'a'"),
         ("- project", "a specification must be a mapping of keys to values, not a list"),
         ("word", "a specification must be a mapping of keys to values, not 'word'"),

@@ -167,7 +167,7 @@ def test_no_accelerator_is_called_like_a_length_entity(tmp_path: Path) -> None:
     with pytest.raises(InputError) as raised:
         derived(tmp_path, specification(blocks, accelerator("sensor_msgs_image_length", IMAGE, IMAGE)))
     (message,) = messages(raised.value)
-    assert message.endswith("but so does what computes the length of sensor_msgs/Image")
+    assert message.endswith("but so does the unit that computes the length of sensor_msgs/Image")
 
 
 FORKS = (
@@ -245,7 +245,7 @@ def test_a_subscriber_without_all_parts_does_not_have_the_length(tmp_path: Path)
     assert length("include: height")["length"] == "computed"
     found = length("exclude: data", ", buffer: 100")
     assert found["length"] == "buffered"
-    assert found["because"] == "the subscriber's is with 'data', which goes nowhere"
+    assert found["because"] == "the subscriber's length includes 'data', which no block uses"
 
 
 def test_parts_of_two_outputs_have_two_entities(tmp_path: Path) -> None:

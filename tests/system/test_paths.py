@@ -108,7 +108,7 @@ def test_every_command_finds_the_messages(
     spec = str(project.spec)
     assert "acc.vhd" in project.run(capsys, "system", "skeleton", spec)
     assert "in_found_spec" in (project.root / "acc.vhd").read_text()
-    assert "is right" in project.run(capsys, "system", "check", spec)
+    assert "is valid" in project.run(capsys, "system", "check", spec)
     assert "found_spec" in project.shown(capsys)
     assert "thing_msgs/Thing" in project.run(capsys, "system", "diagram", spec, "--format", "dot")
     assert "generated for each line" in project.run(capsys, "system", "report", spec)
@@ -123,7 +123,7 @@ def test_every_command_finds_the_messages(
     assert "robot_system" in written.path.read_text()
     # And the wizard, which extends what is right.
     monkeypatch.setattr("sys.stdin", io.StringIO("no\nno\n\n"))
-    assert project.run(capsys, "system", "new", spec).count("is right") == 2
+    assert project.run(capsys, "system", "new", spec).count("is valid") == 2
 
 
 def test_the_distribution_is_that_of_the_core(project: Project, capsys: Captured) -> None:

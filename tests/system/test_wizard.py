@@ -105,7 +105,7 @@ def test_software_may_have_no_sources(tmp_path: Path) -> None:
 def test_the_paths_of_messages_decide_what_can_be_named(tmp_path: Path) -> None:
     (tmp_path / "msg").mkdir()
     answers = turner()
-    answers.add(paths=["msg"], one_more_of_paths=["me:msgs:arm"])
+    answers.add(paths=["msg"], another_item_of_paths=["me:msgs:arm"])
     asked: list[Sequence[str]] = []
 
     def names(paths: Sequence[str]) -> list[str]:
@@ -194,8 +194,8 @@ def test_answers_read_well(tmp_path: Path) -> None:
     answers = turner(
         name=["0x10", "turner", "on", "acc", "acc", "a, b", "a, b"],
         sources=["rtl/turn.vhd"],
-        one_more_of_sources=["rtl/two.vhd", "rtl/three.vhd"],
-        one_more_of_include=["no"],
+        another_item_of_sources=["rtl/two.vhd", "rtl/three.vhd"],
+        another_item_of_include=["no"],
         include=["x", "y"],
         fpgaPart=["007"],
         clock=["100 MHz"],
@@ -214,7 +214,7 @@ def test_answers_read_well(tmp_path: Path) -> None:
     ):
         assert line in text, line
     # An answer after the second is asked for as the second is.
-    assert max(question.name.count("one more of") for question in answers.asked) == 1
+    assert max(question.name.count("another item of") for question in answers.asked) == 1
 
 
 @pytest.mark.parametrize(("item", "dash"), [(2, 0), (4, 2), (6, 3)])
@@ -265,5 +265,5 @@ def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], messa
 def test_no_block_is_called_like_another(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
     answers = ["robot", *[""] * 8, "no", "a", "", "ROS", "subscriber", POINT, "", "", "", "no", "yes", "a"]
-    with pytest.raises(InputError, match="answer 21: there is 'a' already"):
+    with pytest.raises(InputError, match="answer 21: 'a' already exists"):
         extend_specification(path, PipeAsker(answers, io.StringIO()), list)

@@ -185,7 +185,7 @@ def test_templates_name_ways_that_their_language_has(tmp_path: Path) -> None:
     (tmp_path / "a.tcl.mustache").write_text("set a {{word x}} ;# {{comment x}}\n{{#l}}{{word .}} {{/l}}{{{x}}}\n")
     assert render("a.tcl", {"x": "a b", "l": ["$", 1]}, tmp_path) == 'set a "a b" ;# a b\n"\\$" 1 a b\n'
     (tmp_path / "a.vhd.mustache").write_text("{{word x}}\n")
-    with pytest.raises(TemplateError, match=r"'word' is no way to quote here; the template's language has comment"):
+    with pytest.raises(TemplateError, match=r"unknown quoting 'word'; the template's language has comment"):
         render("a.vhd", {"x": "a"}, tmp_path)
 
 

@@ -112,7 +112,9 @@ def test_the_bracket_that_is_open_is_named() -> None:
 def test_how_far_a_line_may_be_indented_is_said(text: str, legal: str) -> None:
     _, fault = parse(text)
     indent = len(text.splitlines()[-1]) - len(text.splitlines()[-1].lstrip())
-    assert fault.splitlines()[-1] == f"      = the line is indented by {indent}, what is open above it by {legal}"
+    assert (
+        fault.splitlines()[-1] == f"      = the line is indented by {indent}, but the open blocks above it by {legal}"
+    )
 
 
 @pytest.mark.parametrize(

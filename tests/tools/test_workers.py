@@ -235,7 +235,9 @@ def test_certificates_that_are_missing(certificates: Path, tmp_path: Path) -> No
         workers.cluster_workers(address).__enter__()
     with (
         _configuration(tmp_path, "node", "ca"),
-        pytest.raises(InputError, match=r"there is no file '.*/ca.pem', which .* distributed.comm.tls.ca-file"),
+        pytest.raises(
+            InputError, match=r"the file '.*/ca.pem' of distributed.comm.tls.ca-file in Dask's configuration is missing"
+        ),
     ):
         workers.cluster_workers(address).__enter__()
 

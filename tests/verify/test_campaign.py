@@ -86,5 +86,5 @@ def test_patterns_and_names(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("pattern", ["geometry_msgs/Piont", "geometry_msgs/Piont*"])
 def test_what_means_no_message_is_an_error(pattern: str) -> None:
-    with pytest.raises(InputError, match=r"unknown message 'geometry_msgs/Piont'|no message is like"):
+    with pytest.raises(InputError, match=r"unknown message 'geometry_msgs/Piont'|no message matches"):
         select(MessageLibrary(ROS1), [pattern])

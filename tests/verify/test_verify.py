@@ -119,7 +119,7 @@ def test_a_layout_that_takes_fields_for_each_other_fails(monkeypatch: pytest.Mon
     monkeypatch.setattr(task, "frame_of", lambda *arguments: with_swapped_fields(frame_of(*arguments)))
     found = result()
     assert found.verdict is Verdict.FAIL
-    assert found.detail.startswith("the layout is not the judge's: byte ")
+    assert found.detail.startswith("the layout differs from the reference's: byte ")
 
 
 @pytest.mark.parametrize("which", ["subscriber_files", "publisher_files"])
@@ -234,8 +234,8 @@ def test_the_command_reports(tmp_path: Path, capsys: Captured) -> None:
     ("arguments", "words"),
     [
         (["geometry_msgs/Piont"], "unknown message 'geometry_msgs/Piont'"),
-        (["nowhere/*"], "no message is like 'nowhere/*'"),
-        (["std_msgs/Bool", "--width", "7"], "no converter is made for a stream of 7 bits"),
+        (["nowhere/*"], "no message matches 'nowhere/*'"),
+        (["std_msgs/Bool", "--width", "7"], "a converter cannot have a stream of 7 bits"),
         (["std_msgs/Bool", "--cluster", "tcp://127.0.0.1:1"], "no Dask scheduler answers|the package 'distributed'"),
     ],
 )

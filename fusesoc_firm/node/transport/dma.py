@@ -217,9 +217,9 @@ class DmaTransport:
 
     def _start(self) -> None:
         if not self._reset():
-            raise TransportError("the DMA engine does not end its reset: has it a clock?")
+            raise TransportError("the DMA engine does not leave its reset: does it have a clock?")
         if not self._device.read(TO_SYSTEM + STATUS) & Status.HAS_SCATTER_GATHER:
-            raise TransportError("the DMA engine has no scatter and gather, so it is none of a generated block design")
+            raise TransportError("the DMA engine lacks scatter-gather, so it is not from a generated block design")
         self._to_system.start(Control.INTERRUPT_ON_ERROR)
         self._from_system.start(Control.INTERRUPT_ON_COMPLETE | Control.INTERRUPT_ON_ERROR)
         if not all(_soon(self._runs(channel)) for channel in (TO_SYSTEM, FROM_SYSTEM)):

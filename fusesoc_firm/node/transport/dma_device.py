@@ -121,4 +121,4 @@ def _number(path: Path) -> int:
     except OSError:
         raise TransportError(f"{path} cannot be read: is its driver loaded?") from None
     except ValueError:
-        raise TransportError(f"{path} holds '{text}', which is no number") from None
+        raise TransportError(f"{path} holds '{text}', which is not a number") from None

@@ -43,7 +43,7 @@ def _words(address: str, command: str) -> list[str]:
     try:
         return shlex.split(command)
     except ValueError as error:
-        raise TransportError(f"the transport is '{address}', whose command is none: {error}") from None
+        raise TransportError(f"the transport is '{address}', whose command is invalid: {error}") from None
 
 
 def _device(text: str, option: str) -> tuple[str, str, bool]:
@@ -55,5 +55,5 @@ def _device(text: str, option: str) -> tuple[str, str, bool]:
 
 def _baud(text: str) -> int:
     if not text.isdecimal() or len(text) > 9:
-        raise TransportError(f"the baud rate is '{text}', which is no number")
+        raise TransportError(f"the baud rate is '{text}', which is not a number")
     return int(text)

@@ -55,7 +55,9 @@ class UartTransport:
         self._is_closed = False
         speed = getattr(termios, f"B{baud}", None)
         if not speed:
-            raise TransportError(f"{baud} is no speed of a serial line; 115200, 1000000 and 2000000 are some")
+            raise TransportError(
+                f"{baud} is not a legal baud rate; legal are 115200, 1000000 and 2000000, among others"
+            )
         try:
             self._line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as error:
@@ -67,7 +69,7 @@ class UartTransport:
             self._cut()
         except termios.error as error:
             self.close()
-            raise TransportError(f"{device} is no serial line: {error.args[-1]}") from None
+            raise TransportError(f"{device} is not a serial line: {error.args[-1]}") from None
 
     def send(self, frame: bytes) -> None:
         """Send a whole frame; wait while the line is busy or held. Raises `TransportError`.
@@ -84,7 +86,7 @@ class UartTransport:
                 select.select([self._wake], [self._line], [], _LONGEST_PAUSE_SECONDS)
                 with self._writing:
                     if self._cuts != cuts:
-                        raise TransportResetError(f"{self._device}: a break ended the frame that was on its way")
+                        raise TransportResetError(f"{self._device}: a break interrupted a frame")
                     rest = rest[self._write(rest) :]
 
     def receive(self, timeout: float | None = None) -> Burst | None:
@@ -125,7 +127,7 @@ class UartTransport:
                 self._begun += self._read()
                 self._last_byte = time.monotonic()
             elif pause is not None and (rest is None or pause <= rest):
-                self._begin_anew("a frame stops before its end")
+                self._begin_anew("a frame is incomplete")
             elif rest is not None:
                 return None
         return None
@@ -140,7 +142,7 @@ class UartTransport:
         while self._is_readable(_SILENT_SECONDS):
             self._read()
             if time.monotonic() > end:
-                raise TransportError(f"{self._device} is never silent, so no frame can be told from the next")
+                raise TransportError(f"{self._device} is never silent, so frames cannot be told apart")
         self._begun.clear()
 
     def _begin_anew(self, why: str) -> None:
@@ -174,7 +176,7 @@ class UartTransport:
         except OSError as error:
             raise self._gone(error.strerror) from None
         if not data:
-            raise self._gone("it was hung up")
+            raise self._gone("it hung up")
         return data
 
     def _write(self, data: memoryview) -> int:
@@ -186,7 +188,7 @@ class UartTransport:
             raise self._gone(error.strerror) from None
 
     def _gone(self, reason: str | None) -> TransportError:
-        return TransportError("the transport is closed" if self._is_closed else f"{self._device} is gone: {reason}")
+        return TransportError("the transport is closed" if self._is_closed else f"{self._device} is lost: {reason}")
 
 
 def _configure(line: int, speed: int, *, has_flow_control: bool) -> None:

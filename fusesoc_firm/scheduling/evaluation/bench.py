@@ -194,7 +194,7 @@ def names_of(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in legal:
-            fail(f"there is no {what} '{name}'", hint=nearest(name, legal))
+            fail(f"unknown {what} '{name}'", hint=nearest(name, legal))
     return names
 
 
@@ -203,6 +203,6 @@ def numbers_of(text: str, most: int = 256) -> tuple[int, ...]:
     found = set()
     for word in text.split(","):
         if not word.strip().isdecimal() or not 1 <= int(word) <= most:
-            fail(f"'{word.strip()}' is no number of accelerators", hint=f"legal: 1 to {most}, such as 2,8,256")
+            fail(f"'{word.strip()}' is not a number of accelerators", hint=f"legal: 1 to {most}, such as 2,8,256")
         found.add(int(word))
     return tuple(sorted(found))

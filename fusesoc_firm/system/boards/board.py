@@ -59,8 +59,10 @@ def word_fault(text: str) -> tuple[str, str] | None:
 class BoardPin(Section):
     """A pin of the FPGA that the top level uses."""
 
-    port: Text = key("what is connected there: a port of the board's, or a pin of an accelerator", is_required=True)
-    site: Text = key("the pin, as the FPGA's maker calls it", is_required=True, rule=word_fault)
+    port: Text = key(
+        "the connected port of the top level: a standard one, or a pin of an accelerator", is_required=True
+    )
+    site: Text = key("the pin's name by the FPGA's manufacturer", is_required=True, rule=word_fault)
     standard: Text | None = key("its electrical standard, if it is not the board's", rule=word_fault)
 
 
@@ -69,17 +71,19 @@ class Board(Section):
     """The board file."""
 
     description: Text = key("maker, board and FPGA", is_required=True)
-    flow: Text = key("what of Edalize builds for it", is_required=True, choices=(*FLOWS, *_NEEDED))
+    flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=(*FLOWS, *_NEEDED))
     clock: Text = key("frequency of clk, such as 25 MHz", is_required=True)
-    interconnect: Text = key("how the host is connected", is_required=True, choices=(AXI_STREAM, *LINKS))
-    part: Text | None = key("the FPGA as Vivado calls it", rule=word_fault)
+    interconnect: Text = key("the connection to the host", is_required=True, choices=(AXI_STREAM, *LINKS))
+    part: Text | None = key("the FPGA's name in Vivado", rule=word_fault)
     board_part: Text | None = key(
-        "the board as Vivado calls it, if Vivado is to set up the processor", name="boardPart", rule=word_fault
+        "the board's name in Vivado, if Vivado sets up the processor", name="boardPart", rule=word_fault
     )
     processor: Text | None = key("the FPGA's processor", choices=tuple(PROCESSORS))
-    standard: Text | None = key("electrical standard of the pins, where the flow wants one", rule=word_fault)
-    device: Text | None = key("the device, for flows that ask for one", rule=word_fault)
-    device_family: Text | None = key("its family, for flows that ask for one", name="deviceFamily", rule=word_fault)
+    standard: Text | None = key("electrical standard of the pins, for flows that need one", rule=word_fault)
+    device: Text | None = key("the device, for flows that need one", rule=word_fault)
+    device_family: Text | None = key(
+        "the device's family, for flows that need one", name="deviceFamily", rule=word_fault
+    )
     synth_options: tuple[Text, ...] = key("options of Yosys' synth command", name="synthOptions", form="texts")
     nextpnr_options: tuple[Text, ...] = key("options of nextpnr", name="nextpnrOptions", form="texts")
     pins: tuple[BoardPin, ...] = key("the pins that are used", form="sections", section=BoardPin)
@@ -137,15 +141,13 @@ def read_board(name: str, folder: Path = Path()) -> Board:
 
 def _check_pins(board: Board, faults: Diagnostics) -> None:
     if board.interconnect not in LINKS:
-        faults.error(
-            f"flow '{board.flow}' has no processor to take streams", board.interconnect.source, nearest("", LINKS)
-        )
+        faults.error(f"flow '{board.flow}' has no processor for streams", board.interconnect.source, nearest("", LINKS))
         return
     seen: dict[str, Text] = {}
     for pin in board.pins:
         twin = seen.setdefault(pin.port.lower(), pin.port)
         if twin is not pin.port:
-            faults.error(f"port '{pin.port}' has a pin already, at {twin.source}", pin.port.source)
+            faults.error(f"port '{pin.port}' already has a pin, at {twin.source}", pin.port.source)
     source = board.pins[-1].source if board.pins else board.source
     needed = {_CLOCK, *(name for name, _, _ in LINK_PINS[LinkKind(board.interconnect)])} - _OPTIONAL
     for port in sorted(needed - seen.keys()):
@@ -166,7 +168,7 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
         faults.error(f"flow '{board.flow}' takes streams", board.interconnect.source, f"legal here: {AXI_STREAM}")
     if board.pins:
         message = f"flow '{board.flow}' takes no pins"
-        faults.error(message, board.place("pins"), "constraints of your own belong into a fileset of the core")
+        faults.error(message, board.place("pins"), "put your own constraints into a fileset of the core")
 
 
 def on_board(specification: Specification, board: Board) -> Specification:
@@ -183,7 +185,7 @@ def check_fits(system: DerivedSystem, board: Board) -> None:
     """Raise `InputError` for features of a system that a board's file cannot describe."""
     clocks = 1 + len(system.clocks)
     if board.processor and clocks > MOST_CLOCKS:
-        fail(f"board '{board.name}' makes {MOST_CLOCKS} clocks, clk included; the system has {clocks}")
+        fail(f"board '{board.name}' has at most {MOST_CLOCKS} clocks, including clk; the system has {clocks}")
     if not board.is_linked:
         return
     faults = Diagnostics()
@@ -198,14 +200,14 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
     places = {pin.port.lower() for pin in board.pins}
     for pin in pins:
         if pin.name in _PORTS:
-            faults.error(f"{pin.what} is called '{pin.name}', as a port of every board may be", pin.source)
+            faults.error(f"{pin.what} has the name '{pin.name}', which is reserved for boards", pin.source)
         elif missing := next((bit for bit in pin.bits() if bit not in places), None):
-            hint = f"give a board file of your own a '{{port: {missing}, site: ...}}'"
-            faults.error(f"{pin.what} has no place on board '{board.name}'", pin.source, hint)
+            hint = f"add '{{port: {missing}, site: ...}}' to a board file of your own"
+            faults.error(f"{pin.what} has no site on board '{board.name}'", pin.source, hint)
     known = (*_PORTS, *(bit for pin in pins for bit in pin.bits()))
     for place in board.pins:
         if place.port.lower() not in known:
-            message = f"nothing of the system is called '{place.port}'"
+            message = f"the system has no port '{place.port}'"
             faults.error(message, place.port.source, nearest(place.port, known))
 
 

@@ -24,7 +24,7 @@ def clocks_of(specification: Specification, own: Fraction | None, faults: Diagno
         return ()
     if project.clock is None:
         if project.is_sound:
-            message = "'clocks' are there, but the frequency of clk is not given"
+            message = "'clocks' needs the frequency of clk, which is missing"
             hint = "add 'clock' to the project, such as 'clock: 100 MHz'"
             faults.error(message, project.clocks[0].source, hint)
         return ()
@@ -43,11 +43,11 @@ def _check_names(specification: Specification, faults: Diagnostics) -> None:
             continue
         twin = seen.setdefault(clock.name.lower(), clock)
         if identifier(clock.name) != clock.name:
-            hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
-            faults.error(f"no clock can be called '{clock.name}'", clock.name.source, hint)
+            hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+            faults.error(f"'{clock.name}' is not a legal clock name", clock.name.source, hint)
         elif twin is not clock:
-            hint = "VHDL knows no case" if twin.name != clock.name else ""
-            message = f"a second clock is called '{clock.name}'; the first is at {twin.name.source}"
+            hint = "VHDL ignores case" if twin.name != clock.name else ""
+            message = f"duplicate clock '{clock.name}'; the first is at {twin.name.source}"
             faults.error(message, clock.name.source, hint)
         elif pin := _pin_called(specification, f"clk_{clock.name}"):
             message = f"clock '{clock.name}' has the port 'clk_{clock.name}', which is {pin}"
@@ -72,7 +72,7 @@ def _check_uses(specification: Specification, faults: Diagnostics) -> None:
     for item in specification.accelerators:
         if item.is_software and item.width is not None:
             message = f"'width' belongs to hardware, but '{item.name}' is of type {item.type}"
-            faults.error(message, item.place("width"), "software gets whole messages")
+            faults.error(message, item.place("width"), "software exchanges whole messages")
     used = set()
     for block in blocks:
         if block.clock is None:
@@ -86,9 +86,9 @@ def _check_uses(specification: Specification, faults: Diagnostics) -> None:
             faults.error(message, block.clock.source)
         elif all(names) and project.is_sound and block.clock not in names:
             hint = nearest(block.clock, names) if names else "add 'clocks' to the project"
-            faults.error(f"no clock is called '{block.clock}'", block.clock.source, hint)
+            faults.error(f"unknown clock '{block.clock}'", block.clock.source, hint)
     are_known = not specification.is_cut and all(block.is_sound for block in blocks)
     for clock in project.clocks:
         if are_known and clock.name and clock.name.lower() not in used:
-            message = f"no block runs at clock '{clock.name}'"
-            faults.error(message, clock.name.source, f"'clock: {clock.name}' at a block of an accelerator")
+            message = f"no block uses clock '{clock.name}'"
+            faults.error(message, clock.name.source, f"set 'clock: {clock.name}' in an accelerator's block")

@@ -83,7 +83,7 @@ class Wiring:
                 name, first = rival
                 what = f"'{dotted(name)}'" if outgoing.include or outgoing.exclude else "this message"
                 hint = f"a field comes from one block; this one is named at {first.name.source}"
-                self.faults.error(f"'{outgoing.name}' gets {what} already", outgoing.name.source, hint)
+                self.faults.error(f"'{outgoing.name}' already gets {what}", outgoing.name.source, hint)
             return False
         pair = self._chosen(block, free)
         source, sink = self._source(block, pair), self._sink(outgoing, pair)
@@ -99,7 +99,7 @@ class Wiring:
             return False
         if name not in self.blocks:
             if not self.has_more_blocks:
-                self.faults.error(f"no block is called '{name}'", name.source, nearest(name, self.blocks))
+                self.faults.error(f"unknown block '{name}'", name.source, nearest(name, self.blocks))
             self.strays |= {side.kind for side in self.outputs.get(block.name, ())}
             return False
         target = self.blocks[name]
@@ -123,7 +123,7 @@ class Wiring:
                 outgoing.name.source,
                 _what_lacks(block, gives, "output")
                 or _what_lacks(self.blocks[outgoing.name], takes, "input")
-                or "a connection is between blocks of the same message, in the same ROS version",
+                or "both ends of a connection must have the same message in the same ROS version",
             )
             return {}
         try:
@@ -136,7 +136,7 @@ class Wiring:
             self.faults.error(
                 f"no field goes from '{block.name}' to '{outgoing.name}'",
                 outgoing.name.source,
-                "what both ends have and 'include' and 'exclude' leave goes there",
+                "a connection carries the fields of both ends that 'include' and 'exclude' leave",
             )
         return pairs
 
@@ -171,7 +171,7 @@ class Wiring:
         missing = sorted(dotted(name) for name in _names(side.frame) - driven.keys())
         if not driven:
             self.faults.error(
-                f"nothing goes to {_words('input', side)} of '{block.name}' ({side.frame.message})",
+                f"{_words('input', side)} of '{block.name}' ({side.frame.message}) has no source",
                 block.name.source,
                 f"name '{block.name}' as 'outgoing' of a block that gives {side.frame.message}",
             )
@@ -179,7 +179,7 @@ class Wiring:
             self.faults.error(
                 f"{_words('input', side)} of '{block.name}' ({side.frame.message}) lacks {', '.join(missing)}",
                 block.name.source,
-                "let a connection include it, or the accelerator's interface exclude it",
+                "include it in a connection, or exclude it in the accelerator's interface",
             )
 
     def _check_sources(self) -> None:
@@ -188,7 +188,7 @@ class Wiring:
                 is_excused = not block.is_sound or block.name in self.broken_sources
                 if not is_excused and End(str(block.name), side.prefix) not in self.sinks:
                     self.faults.error(
-                        f"{_words('output', side)} of '{block.name}' ({side.frame.message}) goes nowhere",
+                        f"{_words('output', side)} of '{block.name}' ({side.frame.message}) has no destination",
                         block.name.source,
                         f"name a block that takes {side.frame.message} as 'outgoing' of '{block.name}'",
                     )

@@ -106,8 +106,8 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
     name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
     function = function_name(accelerator)
     if identifier(function) != function:
-        hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
-        message = f"the function is called after its file, and '{function}' cannot be its name"
+        hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+        message = f"the function has the name of its file, but '{function}' is not a legal name"
         faults.error(message, sources[0].source, hint)
     if not accelerator.inputs or not accelerator.outputs:
         lacking = "output" if accelerator.inputs else "input"

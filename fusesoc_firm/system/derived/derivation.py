@@ -152,12 +152,12 @@ class _Analysis:
             # VHDL ignores case, so names that differ only in case would collide.
             twin = seen.setdefault(identifier(name).lower(), name)
             if twin is not name and twin == name:
-                self.faults.error(f"a second {what} is called '{name}'; the first is at {twin.source}", name.source)
+                self.faults.error(f"duplicate {what} '{name}'; the first is at {twin.source}", name.source)
             elif twin is not name:
                 self.faults.error(
                     f"{what} '{name}' has the same name in VHDL as '{twin}' at {twin.source}",
                     name.source,
-                    "VHDL knows no case, and only letters, digits and single '_' between them",
+                    "VHDL ignores case, and allows only letters, digits and single '_' between them",
                 )
 
     # --- types -------------------------------------------------------------------------------------------------
@@ -241,8 +241,8 @@ class _Analysis:
         # A block may refer to an accelerator that could not be read.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
-            hint = nearest(block.type, names) or "there is none under 'accelerators'"
-            self.faults.error(f"no accelerator is called '{block.type}'", block.type.source, hint)
+            hint = nearest(block.type, names) or "add it to 'accelerators'"
+            self.faults.error(f"unknown accelerator '{block.type}'", block.type.source, hint)
         for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
@@ -276,7 +276,7 @@ class _Analysis:
     def _check_no_publisher_keys(self, block: Block) -> None:
         for key in keys_only_of(Block, PUBLISHER):
             if getattr(block, key) is not None:
-                message = f"'{key}' belongs to a publisher, but '{block.name}' is none"
+                message = f"'{key}' belongs to a publisher, but '{block.name}' is not one"
                 self.faults.error(message, block.place(key), "a publisher is a block with 'mode: publisher'")
 
     def _check_count(self, mode: str) -> None:
@@ -288,7 +288,7 @@ class _Analysis:
             self.faults.error(message, blocks[0].name.source, f"a {mode} is a block with 'mode: {mode}'")
         elif len(found) > MOST_CONVERTERS:
             self.faults.error(
-                f"the system has {len(found)} {mode}s; an id of one byte tells {MOST_CONVERTERS} apart",
+                f"the system has {len(found)} {mode}s; ids have one byte, so the limit is {MOST_CONVERTERS}",
                 found[MOST_CONVERTERS].name.source,
             )
 

@@ -29,27 +29,27 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
     for entity, block, frame in _converters(system):
         if frames.setdefault(entity, frame) != frame:
             message = f"'{block}' and {owners[entity]} need the entity '{entity}' for different messages"
-            hint = f"one system has a message in one ROS version: here {frames[entity].ros.title}"
+            hint = f"a system can have a message in only one ROS version: here {frames[entity].ros.title}"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(entity, f"converter '{block}'")
         package = constants_package(frame.message)
         if packages.setdefault(package, frame.message) != frame.message:
             message = f"'{block}' and {owners[package]} need the package '{package}' for different messages"
-            hint = "a package is called after package and name of its message, joined with '_', in small letters"
+            hint = "a package's name is the package and name of its message, joined with '_', in lower case"
             faults.error(message, blocks[block].name.source, hint)
         owners.setdefault(package, f"converter '{block}'")
     for frame, suffix in system.computed_lengths.items():
-        owners.setdefault(length_entity(frame, suffix), f"what computes the length of {frame.message}")
+        owners.setdefault(length_entity(frame, suffix), f"the unit that computes the length of {frame.message}")
     for accelerator in system.accelerator_types:
         name = accelerator.accelerator.name
         if accelerator.accelerator.type != "HLS" and identifier(name) != name:
-            hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
+            hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
             faults.error(
-                f"no {'module' if accelerator.is_component else 'entity'} can be called '{name}'", name.source, hint
+                f"'{name}' is not a legal {'module' if accelerator.is_component else 'entity'} name", name.source, hint
             )
         for entity in _entities(accelerator):
             if owner := owners.get(entity.lower()):
-                hint = "the entities of one system have names of their own, whatever their capitals"
+                hint = "the names of a system's entities must differ in more than case"
                 faults.error(f"'{name}' needs an entity '{entity}', but so does {owner}", name.source, hint)
             owners[entity.lower()] = f"accelerator '{name}'"
 

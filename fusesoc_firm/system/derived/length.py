@@ -65,11 +65,13 @@ def _check_whole(
         place = blocks[end.block].name.source
         if given != whole:
             apart = ", ".join(f"'{dotted(name)}'" for name in sorted(given ^ whole))
-            text = f"'{end.block}' takes other fields of {message} than '{connection.source.block}' gives: {apart}"
-            faults.error(text, place, "a message of variable size goes with the same fields to all that take it")
+            text = (
+                f"'{end.block}' takes different fields of {message} than '{connection.source.block}' outputs: {apart}"
+            )
+            faults.error(text, place, "all blocks that take a message of variable size must take the same fields")
         if sum(end in other.sinks for other in connections) > 1:
             text = f"'{end.block}' gets {message} from several blocks"
-            faults.error(text, place, "a message of variable size comes from one block")
+            faults.error(text, place, "a message of variable size must come from one block")
 
 
 def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
@@ -83,9 +85,9 @@ def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
         return PayloadLength(LengthSource.GIVEN, "the subscriber has it")
     length = sent_length_of(frame)
     if length.minimum == length.maximum:
-        return PayloadLength(LengthSource.COMPUTED, "it is always the same without what is not used")
+        return PayloadLength(LengthSource.COMPUTED, "it is constant without the unused parts")
     names = ", ".join(dict.fromkeys(f"'{dotted(node.names)}'" for node in unused))
-    return PayloadLength(LengthSource.BUFFERED, f"the subscriber's is with {names}, which goes nowhere")
+    return PayloadLength(LengthSource.BUFFERED, f"the subscriber's length includes {names}, which no block uses")
 
 
 def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> PayloadLength | None:
@@ -136,7 +138,7 @@ def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics)
     if frame.is_fixed_size:
         if block.buffer is not None:
             message = f"'{block.name}' has a 'buffer', but {frame.message} is of fixed size"
-            faults.error(message, block.place("buffer"), "leave it out: only what is of variable size is stored")
+            faults.error(message, block.place("buffer"), "leave it out: only messages of variable size are stored")
         return None
     length = sent_length_of(frame)
     size = block.buffer
@@ -164,8 +166,8 @@ def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -
                 needs = dict.fromkeys(waiting, _Need(reason, _ADD_BUFFER)) | needs
         if connection.length.source is LengthSource.BUFFERED:
             source = connection.source.block
-            reason = f"the length of what '{source}' gives must be counted, as {connection.length.reason}"
-            hint = f"{_ADD_BUFFER}, or 'length: given' to the output of '{source}' if it has the length on a port"
+            reason = f"the length of the message from '{source}' must be counted, because {connection.length.reason}"
+            hint = f"{_ADD_BUFFER}, or 'length: given' to the output of '{source}' if a port has the length"
             counted = (end.block for end in connection.sinks if end.block in publishers)
             needs |= dict.fromkeys(counted, _Need(reason, hint))
     return needs

@@ -24,7 +24,7 @@ def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, fa
         faults.error(
             f"interconnect '{kind.value}' cannot carry the bursts of scheduler '{scheduling.policy}'",
             project.interconnect.source,
-            "a row of bytes does not show where a burst ends: take a scheduler that is not preemptive, or 'axi_stream'",
+            "a sequence of bytes does not mark the end of a burst: use a non-preemptive scheduler or 'axi_stream'",
         )
     return Link(kind, _clock_hz(project, clock, faults))
 

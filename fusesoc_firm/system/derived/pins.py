@@ -35,9 +35,9 @@ def _check_pin(pin: Pin, taken: dict[str, str], faults: Diagnostics) -> None:
     if not pin.name:
         return
     if identifier(pin.name) != pin.name:
-        hint = "letters, digits and single '_' between them, and no keyword of VHDL or Verilog"
-        faults.error(f"no port can be called '{pin.name}'", pin.name.source, hint)
+        hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+        faults.error(f"'{pin.name}' is not a legal port name", pin.name.source, hint)
     elif owner := taken.get(pin.name.lower()):
-        hint = "the ports of an entity have names of their own, whatever their capitals"
-        faults.error(f"a pin cannot be called '{pin.name}', which is {owner}", pin.name.source, hint)
+        hint = "the names of an entity's ports must differ in more than case"
+        faults.error(f"a pin cannot have the name '{pin.name}', which is {owner}", pin.name.source, hint)
     taken[pin.name.lower()] = f"the pin at {pin.name.source}"

@@ -45,7 +45,7 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
     accelerator = type_.accelerator
     if not type_.inputs:
         message = f"'{accelerator.name}' takes no message, so nothing would call its function"
-        hint = "without 'sources' it stands for software elsewhere, which sends when it likes"
+        hint = "without 'sources' it represents external software, which can send at any time"
         faults.error(message, accelerator.name.source, hint)
         return
     if not is_file(path) or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:

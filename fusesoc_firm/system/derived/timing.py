@@ -74,7 +74,7 @@ def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
             hint = "the least time between its messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
-            faults.error(f"the 'period' of publisher '{publisher.block}' is not given", hint=hint)
+            faults.error(f"publisher '{publisher.block}' needs a 'period'", hint=hint)
         if times.transfer_time is None:
             hint = "the cycles that its longest frame takes to be sent"
             message = f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound"

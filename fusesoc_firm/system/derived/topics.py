@@ -28,10 +28,10 @@ class TopicUse:
 def check_topic_name(name: Text, faults: Diagnostics) -> None:
     """Note a private name, and a name that ROS 1 or ROS 2 does not accept."""
     if name.startswith("~"):
-        message = f"topic '{name}' depends on the node's name, which a node is only given when it is started"
+        message = f"topic '{name}' depends on the node's name, which is unknown before the node starts"
         faults.error(message, name.source, _LEGAL)
     elif not _NAME.fullmatch(name):
-        faults.error(f"'{name}' is not a topic's name", name.source, _LEGAL)
+        faults.error(f"'{name}' is not a legal topic name", name.source, _LEGAL)
 
 
 def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
@@ -62,4 +62,4 @@ def _check_loop(name: str, uses: Iterable[TopicUse], faults: Diagnostics) -> Non
     giving = next((use for use in uses if use.is_published), None)
     if taking and giving:
         message = f"'{giving.topic.block}' publishes on topic {name}, to which '{taking.topic.block}' subscribes"
-        faults.warn(message, giving.source, "what the system sends there comes back to it: a loop")
+        faults.warn(message, giving.source, "the system would receive its own messages")

@@ -125,7 +125,7 @@ class _Wizard:
     def _connect_blocks(self) -> None:
         """Ask for further connections from the file's existing blocks."""
         blocks = {str(block["name"]): block for block in self.content.get("blocks", [])}
-        question = Question("block", "one that gets further connections", [*blocks], is_choice=True)
+        question = Question("block", "a block to which further connections are added", [*blocks], is_choice=True)
         while name := self.asker.ask(question):
             if added := self._sections("outgoing", _key(Block, "outgoing"), name):
                 blocks[name].setdefault("outgoing", []).extend(added)
@@ -184,7 +184,7 @@ class _Wizard:
     def _texts(self, question: Question) -> Any:
         """Ask for one answer after the other, up to an empty one."""
         found: list[str] = []
-        further = Question(f"one more of {question.name}", question.meaning, question.words, check=question.check)
+        further = Question(f"another item of {question.name}", question.meaning, question.words, check=question.check)
         while answer := self.asker.ask(further if found else question):
             found.append(answer)
         return _words(found)
@@ -219,7 +219,7 @@ class _Wizard:
         if name == "name" and draft.section in (Accelerator, Block):
             taken = self._names("blocks" if draft.section is Block else "accelerators")
             if answer in (*taken, *(str(item["name"]) for item in draft.siblings)):
-                return f"there is '{answer}' already"
+                return f"'{answer}' already exists"
         return None
 
 

@@ -224,5 +224,5 @@ def test_ghdl_is_not_asked_for_verilog(tmp_path: Path) -> None:
     model = SWAP_MODEL.format(asks=False)
     write(tmp_path, {**SOURCES, "spec.yaml": SWAP, "stimuli.yaml": SWAP_STIMULI, "model.py": model})
     request = systems.call(tmp_path / "spec.yaml", tmp_path / "stimuli.yaml", tmp_path / "model.py")
-    with pytest.raises(InputError, match="GHDL simulates no Verilog, which 'swap' is written in"):
+    with pytest.raises(InputError, match="GHDL cannot simulate Verilog, the language of 'swap'"):
         systems.build(request, tmp_path / "build")

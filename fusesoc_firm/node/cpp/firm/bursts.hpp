@@ -74,7 +74,7 @@ class BurstJoiner {
     }
     if (size % beat_bytes_ != 0) {
       throw BurstError("a burst of id " + std::to_string(id) + " ends within a beat: " + std::to_string(size) +
-                       " bytes, " + std::to_string(beat_bytes_) + " a beat, and the frame is not over");
+                       " bytes at " + std::to_string(beat_bytes_) + " per beat, and the frame is incomplete");
     }
     begun_.emplace(id, std::move(frame));
     return std::nullopt;

@@ -66,7 +66,7 @@ inline std::uint64_t number_in(const std::string& path) {
   try {
     return std::stoull(text, nullptr, 0);
   } catch (const std::exception&) {
-    throw TransportError(path + " holds '" + text + "', which is no number");
+    throw TransportError(path + " holds '" + text + "', which is not a number");
   }
 }
 

@@ -128,9 +128,9 @@ class DmaTransport : public Transport {
         count_(dma),
         to_system_(ring(dma::kMm2s, dma.send_buffers, 0)),
         from_system_(ring(dma::kS2mm, dma.receive_buffers, dma.send_buffers)) {
-    if (!reset()) throw TransportError("the DMA engine does not end its reset: has it a clock?");
+    if (!reset()) throw TransportError("the DMA engine does not leave its reset: does it have a clock?");
     if ((device_->read(dma::kMm2s + dma::kStatus) & dma::kHasScatterGather) == 0) {
-      throw TransportError("the DMA engine has no scatter and gather, so it is none of a generated block design");
+      throw TransportError("the DMA engine lacks scatter-gather, so it is not from a generated block design");
     }
     to_system_.start(dma::kInterruptOnError);
     from_system_.start(dma::kInterruptOnComplete | dma::kInterruptOnError);

@@ -123,7 +123,7 @@ class Node {
     // Nothing reads the queues any more, so wake all threads that wait for room in them.
     queues_.close();
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (is_abandoned_) fault = "the time to stop is over, and not all was sent and received";
+    if (is_abandoned_) fault = "the time limit for stopping is over, but some frames were not sent or received";
     if (fault) log(error_ = *fault);
     has_ended_ = true;
     changed_.notify_all();

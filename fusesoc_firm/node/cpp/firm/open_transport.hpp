@@ -52,7 +52,7 @@ struct TransportAddress {
   unsigned number() const {
     constexpr std::size_t kMostDigits = 9;
     if (second.size() > kMostDigits || second.find_first_not_of("0123456789") != std::string::npos) {
-      throw TransportError("the baud rate is '" + second + "', which is no number");
+      throw TransportError("the baud rate is '" + second + "', which is not a number");
     }
     return static_cast<unsigned>(std::stoul(second));
   }

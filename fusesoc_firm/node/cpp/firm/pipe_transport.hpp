@@ -196,8 +196,8 @@ class PipeTransport : public Transport {
       default:
         break;
     }
-    char text[96];
-    std::snprintf(text, sizeof text, "byte %llu of the simulator's reports is 0x%02x, which begins none: T, B, E, S",
+    char text[112];
+    std::snprintf(text, sizeof text, "byte %llu of the simulator's reports is 0x%02x, not the start of one: T, B, E, S",
                   static_cast<unsigned long long>(place), letter);
     throw TransportError(text);
   }
@@ -241,7 +241,7 @@ class PipeTransport : public Transport {
   void take_standing() {
     const std::uint64_t cycle = number(8), quiet = number(4);
     if (cycle < cycle_) {
-      throw TransportError("the simulator stands at cycle " + std::to_string(cycle) + " and stood at " +
+      throw TransportError("the simulator is at cycle " + std::to_string(cycle) + ", but was at " +
                            std::to_string(cycle_) + " before");
     }
     cycle_ = cycle;

@@ -89,7 +89,7 @@ class LeastSlackTime : public Policy {
   LeastSlackTime(std::vector<std::int64_t> deadlines, const std::vector<std::int64_t>& transfer_times)
       : latest_starts_(std::move(deadlines)) {
     if (latest_starts_.size() != transfer_times.size()) {
-      throw std::invalid_argument("there are not as many transfer times as deadlines");
+      throw std::invalid_argument("the numbers of transfer times and deadlines differ");
     }
     for (std::size_t index = 0; index < transfer_times.size(); ++index) latest_starts_[index] -= transfer_times[index];
   }

@@ -74,11 +74,11 @@ inline const rosidl_message_type_support_t* type_support(const Topic& topic) {
   rosidl_type_hash_t expected;
   if (rosidl_parse_type_hash_string(topic.signature.c_str(), &expected) != RCUTILS_RET_OK) {
     rcl_reset_error();
-    throw MiddlewareError("'" + topic.signature + "' is no hash of a type, as " + topic.name + " must have");
+    throw MiddlewareError("'" + topic.signature + "' is not the hash of a type, which " + topic.name + " needs");
   }
   const rosidl_type_hash_t* installed = support->get_type_hash_func(support);
   if (installed->version != expected.version || std::memcmp(installed->value, expected.value, sizeof expected.value) != 0) {
-    throw MiddlewareError("the message " + topic.type + " that is installed is not the one that the hardware was made for (" +
+    throw MiddlewareError("the message " + topic.type + " is installed in another version than the hardware has (" +
                           topic.signature + ")");
   }
 #endif

@@ -138,26 +138,26 @@ inline NodeArguments parse_arguments(const System& system, bool has_quality, int
 }
 
 inline void print_help(std::ostream& out, const System& system, const std::string& ros_arguments, bool has_quality) {
-  out << "The node of the system " << system.name << ": messages of its topics to the hardware, and back.\n\n"
+  out << "The node of the system " << system.name << ": it carries messages between its topics and the hardware.\n\n"
       << "usage: " << system.name << "_node --transport ADDRESS [OPTION ...] [ROS' own arguments]\n\n"
-      << "  --transport ADDRESS  the way to the hardware: pipe:COMMAND (a simulator), uart:DEVICE:BAUD[:rtscts],\n"
+      << "  --transport ADDRESS  the transport to the hardware: pipe:COMMAND (a simulator), uart:DEVICE:BAUD[:rtscts],\n"
       << "                       dma:UIO:BUFFER[:poll]\n";
   if (system.has_software()) {
     out << "  --software COMMAND   the blocks in software, such as\n"
         << "                       'python3 -m fusesoc_firm.node.software_process SPECIFICATION'\n";
   }
-  out << "  --depth N            messages that each queue holds, those of ROS too (" << system.queue_depth << ")\n"
-      << "  --overflow WORD      what a full queue does with a message: drop_oldest (the default), drop_newest, or\n"
+  out << "  --depth N            capacity of each queue, including those of ROS, in messages (" << system.queue_depth << ")\n"
+      << "  --overflow WORD      treatment of a message for a full queue: drop_oldest (the default), drop_newest, or\n"
       << "                       block, which stops all topics\n"
-      << "  --drain SECONDS      how long the node works on what it has when it is to end (10)\n"
-      << "  --restart            open the transport again when it fails, as often as that happens\n"
+      << "  --drain SECONDS      time limit for pending messages when the node ends (10)\n"
+      << "  --restart            open the transport again each time that it fails\n"
       << "  --trace FILE         write each step of each message to FILE, as CSV\n";
-  if (has_quality) out << "  --qos WORD           of all topics: reliable (the default) or best_effort\n";
+  if (has_quality) out << "  --qos WORD           reliability of all topics: reliable (the default) or best_effort\n";
   out << "  --help               print this\n\n" << ros_arguments << "\n\ntopics to the hardware:\n";
   for (const auto& topic : system.subscribers) out << "  " << topic.name << "  " << topic.type << "\n";
   out << "topics from the hardware:\n";
   for (const auto& topic : system.publishers) out << "  " << topic.name << "  " << topic.type << "\n";
-  out << "\nSIGINT and SIGTERM end it when all that was taken is through; a second one ends it at once.\n"
+  out << "\nSIGINT and SIGTERM end it after all pending messages; a second one ends it at once.\n"
       << "exit status: 0, 1 if the hardware or ROS failed, 2 for a wrong command line\n";
 }
 

@@ -64,7 +64,7 @@ class SoftwareTransport : public Transport {
     try {
       read_ += stream_.push(buffer_.data() + read_, filled_ - read_);
     } catch (const FrameError& error) {
-      throw TransportError(std::string("the software sends no frames: ") + error.what());
+      throw TransportError(std::string("the software sent an invalid frame: ") + error.what());
     }
   }
 

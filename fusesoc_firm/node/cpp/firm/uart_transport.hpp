@@ -49,7 +49,7 @@ class UartTransport : public Transport {
     cut();
     const Deadline deadline(uart_.patience);
     while (is_dropping_ && !deadline.is_over()) receive_within(deadline);
-    if (is_dropping_) throw TransportError(device_ + ": the board is never silent, so nobody knows where frames begin");
+    if (is_dropping_) throw TransportError(device_ + ": the board is never silent, so frames cannot be told apart");
   }
 
   void send(const std::uint8_t* frame, std::size_t size) override {
@@ -179,7 +179,7 @@ class UartTransport : public Transport {
     const ssize_t found = ::read(line_.get(), buffer_.data(), buffer_.size());
     if (found < 0 && (errno == EAGAIN || errno == EINTR)) return;
     if (found < 0) fail_with_errno(device_);
-    if (found == 0) throw TransportError(device_ + ": the device is gone");
+    if (found == 0) throw TransportError(device_ + ": the device is lost");
     read_ = 0;
     filled_ = static_cast<std::size_t>(found);
     moved_ = std::chrono::steady_clock::now();
