@@ -1,4 +1,4 @@
-"""`python -m fusesoc_firm.netlist FILE`: translate what a file of `Translation.to_json` says."""
+"""`python -m fusesoc_firm.netlist FILE`: run the translation described in a file that `Translation.to_json` wrote."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fusesoc_firm.tools.manifest import note
 
 
 def main(path: Path) -> int:
-    """The exit status is 1 where there is no netlist; then it is said why."""
+    """Translate, and return the exit status: 1 if there is no netlist; the reason is then printed."""
     translation = Translation.from_json(path.read_text(encoding="utf-8"))
     try:
         warnings = translate(translation, path.with_suffix(".ghdl"))

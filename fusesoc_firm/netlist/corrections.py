@@ -1,7 +1,8 @@
-"""Corrects what GHDL 2.0 synthesises wrongly, as far as a netlist and its sources show what was meant.
+"""Corrects errors in GHDL 2.0's synthesis for which the netlist and its sources show the intended logic.
 
-* A rotation by as many places as there are bits, or by more, gives zeros: it is made of two shifts.
-* A comparison of a vector that our functions (`sources.py`) lengthen with a constant is as wide as the vector.
+* A rotation by the vector's width or more yields zeros, because GHDL builds it from two shifts.
+* If our functions (`sources.py`) extend a vector to compare it with a constant, the comparison is narrowed to the
+  vector's width.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from fusesoc_firm.netlist.model import Instance, Modules, Net
 from fusesoc_firm.netlist.verilog import constant
 
 _SIGNED, _UNSIGNED = {"$sextend"}, {"$uextend"}
-# What a comparison says of numbers, and how a vector can be lengthened before.
+# The operator of each comparison, and the gates that may extend the vector before it.
 _COMPARISONS: Mapping[str, tuple[Callable[[int, int], bool], set[str]]] = {
     "$eq": (eq, _SIGNED | _UNSIGNED),
     "$ne": (ne, _SIGNED | _UNSIGNED),
@@ -44,10 +45,11 @@ def correct(modules: Modules) -> None:
 
 
 def doubts(modules: Modules) -> list[str]:
-    """Warnings of constants whose bits GHDL may have mixed up.
+    """Return warnings about constants whose bits GHDL may have reordered.
 
-    Where one branch assigns a constant to all of a signal and another assigns parts of it, GHDL 2.0 takes the parts of
-    the constant from the wrong end. The gates are those of a constant that was assigned in parts.
+    If one branch assigns a constant to a whole signal and another branch assigns parts of the signal, GHDL 2.0 takes
+    the parts of the constant from the wrong end. The resulting gates look the same as those for a constant assigned in
+    parts.
     """
     found: dict[str, None] = {}
     for module in modules.values():
@@ -63,7 +65,7 @@ def doubts(modules: Modules) -> list[str]:
 
 
 def _mixed(parts: Instance, drivers: Mapping[int, Instance]) -> Iterator[str]:
-    """The places of selections that have different constants for several of these parts on one side."""
+    """Return the places of selections that have different constants for several of these parts on one side."""
     constants: dict[tuple[str, int, int], list[str]] = defaultdict(list)
     for index in range(len(parts.inputs)):
         selection = _driver(parts, index, drivers)
@@ -83,7 +85,7 @@ def _driver(gate: Instance, index: int, drivers: Mapping[int, Instance]) -> Inst
 
 
 def _correct_rotation(gate: Instance, drivers: Mapping[int, Instance]) -> None:
-    """`shift(value, places) | other_shift(value, width - places)`, all of one place in the VHDL."""
+    """Convert `shift(value, places) | other_shift(value, width - places)` from one place in the VHDL to a rotation."""
     one, other = (_driver(gate, index, drivers) for index in (0, 1))
     if one and other and one.location == other.location == gate.location:
         kind = _SHIFTS.get((one.kind, other.kind))
@@ -93,7 +95,7 @@ def _correct_rotation(gate: Instance, drivers: Mapping[int, Instance]) -> None:
 
 
 def _correct_comparison(gate: Instance, drivers: dict[int, Instance]) -> Instance | None:
-    """Of a lengthened vector and a number: a comparison of the vector, with the new constant, or what it always is."""
+    """Compare the vector before its extension with a new constant, which is returned; or replace a constant result."""
     for index in (0, 1):
         number, lengthened = _driver(gate, index, drivers), _driver(gate, 1 - index, drivers)
         bits = constant(number) if number else None
@@ -111,7 +113,7 @@ def _correct_comparison(gate: Instance, drivers: dict[int, Instance]) -> Instanc
                 drivers[net.number] = Instance(name, "$const_UB32", gate.location, [parameter], outputs=[net])
                 gate.inputs = [net, vector] if index == 0 else [vector, net]
                 return drivers[net.number]
-            # Any number that the vector can be is on the same side of this one.
+            # All values of the vector are on the same side of this number.
             compared = (value, 0) if index == 0 else (0, value)
             gate.parameters = [str(int(_COMPARISONS[gate.kind][0](*compared)))]
             gate.kind, gate.inputs = "$const_UB32", []

@@ -1,7 +1,7 @@
 """Reads a netlist as `ghdl --synth --out=dump` prints it: every gate with its kind, its parameters and its nets.
 
-GHDL's netlists in VHDL and Verilog are translations of this one. The one in Verilog loses much on the way; here
-nothing is lost but the generics of components without an entity.
+GHDL translates this form to its VHDL and Verilog netlists. GHDL's Verilog netlist loses much information; the dump
+lacks only the generics of components without an entity.
 """
 
 from __future__ import annotations
@@ -10,20 +10,20 @@ import re
 
 from fusesoc_firm.netlist.model import Instance, Module, Modules, Net, NetlistError, Port
 
-# A name is parts with dots: of the VHDL (which may be an extended identifier), of GHDL, or a number.
+# A name consists of parts separated by dots: a VHDL name (possibly an extended identifier), a GHDL name, or a number.
 _PART = re.compile(r"\\(\\(?:[^\\]|\\\\)*\\|[^\\.\s{\[:;]+)|\$(\w+)|%(\d+)")
 _NET = re.compile(r"(\S.*?)\{n(\d+)w(\d+)\}")
 _DRIVER = re.compile(r".* <- (?:.*\{n(\d+)w(\d+)\})?")
 _PORT = re.compile(r"(input|output) (.*?)(?:\[(?:(\d+):0|(\?))\])?;")
 _INSTANCE = re.compile(r"instance (.*?)\{i\d+\}: (.*)")
-# Who reads a net is known from the readers' inputs.
+# The inputs of the instances already name the readers of each net.
 _NOT_NEEDED = ("connect ", "attribute ")
 _MODULE = re.compile(r"module \{m\d+\} (.*)")
 _LOCATION = re.compile(r"# (.*:\d+:\d+)")
 
 
 def read(text: str) -> Modules:
-    """The modules of a netlist by name, as GHDL orders them; without GHDL's gates."""
+    """Return the modules of a netlist by name, in GHDL's order and without GHDL's gates."""
     reader = _Reader()
     for number, line in enumerate(text.splitlines(), 1):
         if line.lstrip().startswith(_NOT_NEEDED):
@@ -36,7 +36,7 @@ def read(text: str) -> Modules:
 
 
 class _Reader:
-    """What the lines so far say; a line belongs to what is less indented before it."""
+    """Collects the modules from the lines read so far; a line belongs to the nearest less indented line above."""
 
     def __init__(self) -> None:
         self.modules: dict[str, Module] = {}
@@ -74,7 +74,7 @@ class _Reader:
 
     def _begin_module(self, depth: int, text: str) -> None:
         name = _matched(_MODULE, text)[1]
-        # A gate keeps its dollar sign, so that it is no module of the user.
+        # The dollar sign distinguishes a gate from a user's module.
         module = Module(name if name.startswith("$") else _name(name))
         self._stack = [*self._stack[:depth], module]
         self.modules[module.name] = module
@@ -92,7 +92,7 @@ class _Reader:
         self._instance = instance
         self._module = None
         if instance.kind == module.name:
-            # A module seen from within: its outputs are inputs there.
+            # From inside a module, the module's outputs are inputs.
             module.is_defined = True
             self._module = module
         else:
@@ -118,7 +118,7 @@ def _matched(pattern: re.Pattern[str], text: str) -> re.Match[str]:
 
 
 def _name(text: str) -> str:
-    r"""A name as GHDL's own netlists write it: `\sum.%3` is `sum_n3`; an extended identifier loses its backslashes."""
+    r"""Spell a name as GHDL's netlists do: `\sum.%3` is `sum_n3`; an extended identifier loses its backslashes."""
     parts = [_plain(user) if user else own or f"n{number}" for user, own, number in _PART.findall(text)]
     if not parts:
         raise ValueError(text)

@@ -1,8 +1,9 @@
-"""Constants of which GHDL 2.0 makes zero: those of 64, 96, ... bits of which only the highest 32 have a bit set.
+"""Finds constants that GHDL 2.0 turns into zero: 64, 96, ... bits wide, with bits set only in the highest 32.
 
-The netlist has a zero for them, as for any other. So where it has a zero of so many bits, GHDL is asked for the value
-of each constant expression in the VHDL: a copy of the sources has functions that look at them (probes), and
-synthesis calls those, as all they need is constant. The same goes for levels other than 0 and 1.
+In the netlist, a lost constant looks like any other zero. So if the netlist contains a zero of such a width, GHDL
+reports the value of each constant expression in the VHDL: a copy of the sources contains functions that examine the
+expressions (probes). Synthesis evaluates the probes, because all their arguments are constant. Levels other than 0 and
+1 are treated in the same manner.
 """
 
 from __future__ import annotations
@@ -127,7 +128,7 @@ _PORT = re.compile(rf"{_NAMES}\s*(?:out|inout|buffer)\s+(\w+(?:\s*\((?:[^()]|\([
 _DYNAMIC = re.compile(rf"\b(?:signal|variable)\s+{_NAMES}", re.IGNORECASE)
 _INTERFACE = re.compile(r"\b(generic|port|function|procedure)\b[^()]*\(", re.IGNORECASE)
 _COMMA = r"\s*,\s*"
-# What is behind a constant that is used as a whole, or of which an element is used.
+# The text after a constant of which the whole, or an element, is used.
 _NO_SLICE = r"(?P<index>)(?!\s*(?:'|\(\s*\d+(?:\s+(?:downto|to)\s+\d+)?\s*\)))"
 _OF_ELEMENT = r"\s*\((?P<index>[^();]*)\)"
 _SCALAR = re.compile(
@@ -137,7 +138,7 @@ _ASSIGNMENT = re.compile(
     r"(?:;|=>|\b(?:begin|then|else|loop|generate)\b|\w\s*:)\s*(\w+)\s*(?:<=|:=)([^;]*)(?=;)",
     re.IGNORECASE,
 )
-# What is between two values of a conditional assignment, or after the last one.
+# The text between two values of a conditional assignment, or after the last value.
 _CONDITION = re.compile(r"\bwhen\b.*?\belse\b|\bwhen\b.*|\bafter\b.*", re.IGNORECASE | re.DOTALL)
 _CALL = re.compile(
     r"\b(?:shift_left|shift_right|rotate_left|rotate_right|resize|(?:std_logic_vector|unsigned|signed)\b'?)\s*\(",
@@ -152,7 +153,7 @@ _REPORT = re.compile(r"firm lost (\d+) (\d+)")
 
 @dataclass(frozen=True)
 class _Probe:
-    """Text to put in place of some of a file's; `constant` is where the expression is that it looks at, if it does."""
+    """A text that replaces a part of a file; `constant` is the span of the expression that it examines, if any."""
 
     start: int
     end: int
@@ -166,7 +167,7 @@ class Source:
     def __init__(self, name: str) -> None:
         self.name = name
         self.text = Path(name).read_bytes().decode("latin-1")
-        # Without comments and the contents of literals, at the same places.
+        # Comments and the contents of literals are blank, so that all positions stay the same.
         self.code = _HIDDEN.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), self.text)
         self.units = [
             (found.start(), found.end(), (found[1] or found[2] or found[4] or found[3]).lower())
@@ -176,7 +177,7 @@ class Source:
         self.dynamic = {name.strip().lower() for names in found for name in names.split(",")}
         self.constants = [item for item in _OBJECT.finditer(self.code) if item[1].lower() == "constant"]
         self._begins = [start for start, _, _ in self.units]
-        # How many parentheses are open before each of them, and where they are.
+        # The number of open parentheses before each parenthesis, and the positions of the parentheses.
         self._depths = [0]
         self._parentheses = []
         for parenthesis in re.finditer(r"[()]", self.code):
@@ -189,12 +190,12 @@ class Source:
                 yield from _FIELDS.findall(self.code, found.end(), _closed(self.code, found.end()))
 
     def place(self, position: int) -> str:
-        """`file:line:column` of a position."""
+        """Return `file:line:column` for a position."""
         before = self.text[:position]
         return f"{self.name}:{before.count(chr(10)) + 1}:{position - before.rfind(chr(10))}"
 
     def unit(self, position: int) -> str:
-        """The kind of the unit around a position; none within parentheses, where interfaces are."""
+        """Return the kind of the unit around a position; empty within parentheses, which enclose interfaces."""
         index = bisect_right(self._begins, position)
         is_inside = self._depths[bisect_right(self._parentheses, position)]
         return self.units[index - 1][2] if index and not is_inside else ""
@@ -203,11 +204,11 @@ class Source:
         return bisect_right(self._begins, position)
 
     def constant(self, position: int) -> re.Match[str] | None:
-        """The declaration of a constant around a position."""
+        """Return the constant declaration around a position."""
         return next((found for found in self.constants if found.start() <= position < found.end()), None)
 
     def types(self, *, of_packages: bool) -> Iterator[tuple[str, int, str]]:
-        """The arrays and records of packages, or the others: name, where it ends, and a function of its bits."""
+        """Yield the array and record types in packages, or all others: name, end, and a function that returns bits."""
         for found in _TYPE.finditer(self.code):
             kind = self.unit(found.start())
             if kind and (kind == "package") == of_packages:
@@ -216,7 +217,7 @@ class Source:
                 yield found[1], found.end(), (_RECORD if fields else _ARRAY).format(found[1], bits)
 
     def literals(self) -> Iterator[tuple[int, int]]:
-        """The places of literals that GHDL loses, and their widths."""
+        """Yield the position and width of each literal that GHDL loses."""
         code = re.sub(r"--[^\n]*", lambda found: " " * len(found[0]), self.text)
         for found in _LITERAL.finditer(code):
             digits = (found[1] or found[2]).replace("_", "")
@@ -225,7 +226,7 @@ class Source:
                 yield found.start(), width
 
     def probes(self, types: Mapping[str, str]) -> Iterator[_Probe]:
-        """The probes of a file; `types` are those of packages, with the functions of their bits."""
+        """Yield the probes of a file; `types` maps each package type to the function that returns its bits."""
         yield from (_Probe(start, start, _USE) for start, _, kind in self.units if kind != "entity")
         yield from (_Probe(end, end, text) for _, end, text in self.types(of_packages=False))
         ends = [*self._begins[1:], len(self.code)]
@@ -254,7 +255,7 @@ class Source:
     def _assigned(
         self, declared: Mapping[tuple[int, str], re.Match[str]], spans: Sequence[tuple[int, int]]
     ) -> Iterator[_Probe]:
-        """Probes of what is assigned: beside the declaration of its target, or of ports where they are assigned."""
+        """Yield probes of assigned values: next to the target's declaration or, for a port, in the assignment."""
         for found in _ASSIGNMENT.finditer(self.code):
             if not self.unit(found.start(1)) or _is_within(found.start(1), spans):
                 continue
@@ -264,11 +265,11 @@ class Source:
                     yield from filter(None, [self._value(target, start, end) if target else self._joined(start, end)])
 
     def _joined(self, start: int, end: int) -> _Probe | None:
-        """A probe of vectors that are joined; a function is seen by itself."""
+        """Return a probe of concatenated vectors; function calls have their own probes."""
         return self._seen(start, end) if "&" in self.code[start:end] else None
 
     def _calls(self, spans: Sequence[tuple[int, int]]) -> Iterator[_Probe]:
-        """Probes of what functions make of constants within expressions."""
+        """Yield probes of the results of functions applied to constants within expressions."""
         last = 0
         for found in _CALL.finditer(self.code):
             start, end = found.start(), _closed(self.code, found.end())
@@ -307,7 +308,7 @@ def _escaped(text: str) -> str:
 
 
 def _values(text: str, start: int) -> Iterator[tuple[int, int]]:
-    """Where the values of an assignment, perhaps a conditional one, begin and end."""
+    """Yield the start and end of each value in an assignment, which may be conditional."""
     last = 0
     for found in _CONDITION.finditer(text):
         yield start + last, start + found.start()
@@ -317,7 +318,7 @@ def _values(text: str, start: int) -> Iterator[tuple[int, int]]:
 
 
 def _closed(code: str, start: int) -> int:
-    """Where a parenthesis ends that begins before `start`."""
+    """Return the position after the closing parenthesis that matches the opening one just before `start`."""
     depth = 1
     for position in range(start, len(code)):
         depth += {"(": 1, ")": -1}.get(code[position], 0)
@@ -327,7 +328,7 @@ def _closed(code: str, start: int) -> int:
 
 
 def widths(modules: Modules) -> set[int]:
-    """How many bits the constants have of which GHDL may have lost some."""
+    """Return the widths, in bits, of the constants that GHDL may have lost."""
     return {
         gate.outputs[0].width
         for module in modules.values()
@@ -346,17 +347,17 @@ class Copies:
         functions = {name: text for name, _, text in types}
         self.folder = folder
         self.probes = {name: list(source.probes(functions)) for name, source in self.sources.items()}
-        # The probes that are in each line of a copy.
+        # The probes in each line of a copy.
         self._lines: dict[str, dict[int, set[_Probe]]] = {}
         self._seen: list[tuple[str, int]] = []
 
     @property
     def has_probes(self) -> bool:
-        """Whether there is a constant expression to look at."""
+        """Whether the sources contain a constant expression to examine."""
         return any(probe.constant for probes in self.probes.values() for probe in probes)
 
     def write(self) -> dict[str, str]:
-        """The copies' names by those of the files."""
+        """Write the copies; return the name of each copy by the name of its file."""
         self._seen = []
         return {name: self._write(source, index) for index, (name, source) in enumerate(self.sources.items())}
 
@@ -378,14 +379,14 @@ class Copies:
         return copy
 
     def drop(self, messages: str) -> bool:
-        """Drop the probes that GHDL does not understand; False if there are none."""
+        """Drop the probes that GHDL rejects; return False if there are none."""
         dropped = False
         for number, (name, probes) in enumerate(self.probes.items()):
             copy = str(self.folder / f"{number}.vhd")
             wrong: set[_Probe] = set()
             lines = sorted(self._lines[copy])
             for line in map(int, re.findall(rf"{re.escape(copy)}:(\d+):", messages)):
-                # GHDL may see an error of syntax in a line behind.
+                # GHDL may report a syntax error at a later line.
                 index = bisect_right(lines, line)
                 wrong |= self._lines[copy][lines[index - 1]] if index else set()
             dropped = dropped or bool(wrong)
@@ -393,7 +394,7 @@ class Copies:
         return dropped
 
     def lost(self, messages: str, among: set[int]) -> Iterator[tuple[str, int]]:
-        """The places of constants that GHDL reports, and their widths, if these are among some."""
+        """Yield the place and width of each lost constant that GHDL reports, if the width is in `among`."""
         reported = ((*self._seen[int(number)], int(width)) for number, width in _REPORT.findall(messages))
         literals = ((name, *found) for name in self.sources for found in self._literals(name))
         for name, position, width in chain(reported, literals):
@@ -402,7 +403,7 @@ class Copies:
                 yield self.sources[name].place(position), width
 
     def _literals(self, name: str) -> Iterator[tuple[int, int]]:
-        """Literals that GHDL loses, without those within what a probe looks at, unless it is taken apart."""
+        """Yield the literals that GHDL loses; an examined literal counts only if elements of its constant are used."""
         source = self.sources[name]
         seen = sorted(probe.constant for probe in self.probes[name] if probe.constant)
         for position, width in source.literals():
@@ -411,7 +412,7 @@ class Copies:
                 yield position, width
 
     def _is_used(self, declaration: re.Match[str], how: str) -> bool:
-        """Whether a constant is used in a way but in its own declaration."""
+        """Whether a constant is used outside its declaration in a form that matches `how`."""
         uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
         found = (
             not source.dynamic & set(_NAME.findall((use["index"] or "").lower()))
@@ -434,7 +435,7 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
 
 
 def doubt(widths: Iterable[int], message: str) -> str:
-    """A warning that constants of some widths were not looked at, as GHDL says."""
+    """Return a warning that constants of some widths were not examined, with GHDL's reason."""
     return (
         f"warning: GHDL turns constants of {', '.join(map(str, sorted(widths)))} bits into zero if only their "
         f"highest {_WORD} bits are not zero, and cannot tell whether there are any: {message.splitlines()[0]}"

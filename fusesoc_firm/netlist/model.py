@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 
 
 class NetlistError(Exception):
-    """A netlist that is not what the VHDL says; the text is what to tell the user."""
+    """The netlist does not match the VHDL; the text is the message for the user."""
 
 
 class LostMemoryError(NetlistError):
-    """What GHDL made wrong, or crashed at, as it looked for memories."""
+    """GHDL produced a wrong netlist, or crashed, while it inferred memories."""
 
 
 @dataclass(frozen=True)
 class Net:
-    """A net by its number, how many bits it has, and its name, which others may have, too."""
+    """A net: its number, its width in bits, and its name, which need not be unique."""
 
     number: int
     width: int
@@ -46,7 +46,7 @@ class Instance:
     outputs: Sequence[Net] = ()
 
     def error(self, message: str) -> NetlistError:
-        """An error at this instance's place in the VHDL."""
+        """Return an error at this instance's place in the VHDL."""
         return NetlistError(f"{self.location or self.name}: error: {message}")
 
     @property
@@ -55,7 +55,7 @@ class Instance:
         return [int(text.rpartition("=")[2]) for text in self.parameters]
 
     def input(self, index: int) -> Net:
-        """The net at an input. Raises `NetlistError` if nothing drives it."""
+        """Return the net at an input. Raises `NetlistError` if nothing drives it."""
         net = self.inputs[index]
         if net is None:
             raise self.error(f"nothing drives an input of '{self.name}'")
@@ -64,9 +64,9 @@ class Instance:
 
 @dataclass
 class Module:
-    """A module; one without `is_defined` is a component whose inside is elsewhere.
+    """A module; without `is_defined`, it is a component that is defined elsewhere.
 
-    `results` are the nets of its outputs, `arguments` those of its inputs.
+    `results` are the nets of the module's outputs, `arguments` the nets of its inputs.
     """
 
     name: str

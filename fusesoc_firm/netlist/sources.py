@@ -1,11 +1,12 @@
-"""Copies of VHDL with right functions in place of those that GHDL 2.0 synthesises wrongly and no netlist shows.
+"""Copies VHDL with correct functions in place of those whose wrong synthesis by GHDL 2.0 no netlist reveals.
 
 * `integer - signed` becomes `signed - integer`.
-* `resize` of a signed number to fewer bits drops the sign, which numeric_std keeps.
-* A product with an integer has the whole integer, which numeric_std cuts to the vector's length.
-* A quotient, a remainder or a comparison has that integer cut, which numeric_std takes whole.
+* `resize` of a signed number to fewer bits drops the sign; numeric_std keeps it.
+* A product with an integer uses the whole integer; numeric_std truncates the integer to the vector's length.
+* A quotient, remainder or comparison with an integer truncates the integer; numeric_std uses all of it.
 
-Ours are aliases in each architecture and package body: a declaration there hides what a use clause makes visible.
+Our functions are aliases in each architecture and package body, because a declaration there hides names that a use
+clause makes visible.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ _SUBTRACTION = """
     return to_signed(l, r'length) - r;
   end function "-";
 """
-# By the type of the vector, that of the integer, and the operator; the vector is on either side.
+# Indexed by the vector's type, the integer's type and the operator; the vector may be either operand.
 _PRODUCT = """
   function "{0}" (l : {1}; r : {2}) return {1} is
   begin
@@ -97,7 +98,8 @@ _COMPARISON = """
     return ieee.numeric_std."{0}"(l, r);
   end function "{0}";
 """
-# A quotient by an integer that does not fit is zero in numeric_std; as a gate, since GHDL computes little of constants.
+# In numeric_std, a quotient by an integer that does not fit is zero. A gate computes it, since GHDL folds few
+# constants.
 _BY_LARGE = {"/": "l and to_{1}(0, l'length)", "mod": _WIDE, "rem": _WIDE}
 _OPERATORS = {_PRODUCT: ["*"], _QUOTIENT: ["/", "mod", "rem"], _COMPARISON: ["=", "/=", "<", "<=", ">", ">="]}
 _NUMBERS = {"signed": ("integer", "fits"), "unsigned": ("natural", "fits_unsigned")}
@@ -122,7 +124,7 @@ package body numeric is{_FUNCTIONS}end package body numeric;
 """
 _COMMENT = re.compile(r"--[^\n]*")
 _BODY = re.compile(r"\b(?:architecture\s+\w+\s+of\s+\w+|package\s+body\s+\w+)\s+is\b", re.IGNORECASE)
-# One that is named by its package is not hidden.
+# An alias does not hide a function that is called by its full name.
 _FULL_NAME = re.compile(r'\b(?:ieee\s*\.\s*)?numeric_std\s*\.\s*(?=(?:resize|"[^"]+")\s*\()', re.IGNORECASE)
 _TYPES = re.compile(r"\b(?:un)?signed\b", re.IGNORECASE)
 _TAB = 8  # as GHDL counts columns
@@ -141,33 +143,33 @@ def _full(type_: str) -> str:
 
 
 def _padded(text: str) -> str:
-    """So many columns that tabs behind them keep their widths."""
+    """Pad a text to a multiple of the tab width, so that tabs after the text keep their widths."""
     return text + " " * (-len(text) % _TAB)
 
 
 _CONTEXT = _padded(f"library ieee, {LIBRARY};")
 _ALIASES = _padded("".join(_aliases()))
-# A line with what was added, and one with a caret.
+# A line with an addition, and a line with a caret.
 _ADDED = re.compile(rf"^(.*{re.escape(_ALIASES)}.*)\n( *\^)$", re.MULTILINE)
 
 
 @dataclass
 class Copies:
-    """Copies of files in a folder, and where their texts are longer than those of the files."""
+    """Copies of files in a folder, and the positions at which text was added."""
 
     folder: Path
     files: list[str] = field(default_factory=list)
     _added: list[Mapping[int, Sequence[tuple[int, int]]]] = field(default_factory=list)
 
     def write_package(self) -> Path:
-        """The file of the package with our functions, for `LIBRARY`."""
+        """Write the package with our functions, for `LIBRARY`; return its path."""
         self.folder.mkdir()
         package = self.folder / "numeric.vhd"
         package.write_text(_PACKAGE, encoding="latin-1")
         return package
 
     def copy(self, files: Iterable[str]) -> list[str]:
-        """The copies of files, and the files themselves where a copy would be the same."""
+        """Copy files; return the path of each copy, or of the file itself if nothing changes."""
         return [self._copy(file) for file in files]
 
     def _copy(self, file: str) -> str:
@@ -182,7 +184,7 @@ class Copies:
         return str(copy)
 
     def original(self, text: str) -> str:
-        """A text of GHDL with the files' names, and their columns, in place of the copies'."""
+        """Replace the names and columns of copies in GHDL's output with those of the original files."""
         place = re.compile(rf"{re.escape(str(self.folder))}/(\d+)\.vhd(?::(\d+):(\d+))?")
         text = _ADDED.sub(lambda line: _without_added(*line.groups()), place.sub(self._place, text))
         return text.replace(f"{self.folder}/", "")
@@ -192,7 +194,7 @@ class Copies:
         if not found[2]:
             return file
         line, column = int(found[2]), int(found[3])
-        # A place in what was added is where it was added.
+        # A place within an addition is reported as the start of the addition.
         before = [(start, length) for start, length in self._added[int(found[1])].get(line, ()) if start < column]
         for start, length in reversed(before):
             column = max(start, column - length)
@@ -200,18 +202,18 @@ class Copies:
 
 
 def _without_added(line: str, mark: str) -> str:
-    """A line that GHDL shows, and the one below, which points to a column."""
+    """Remove our additions from a line that GHDL shows, and shift the caret in the line below."""
     shorter = line.replace(_CONTEXT, "").replace(_ALIASES, "")
     return f"{shorter}\n{mark[len(line) - len(shorter) :]}"
 
 
 def use_numbers(files: Iterable[str]) -> bool:
-    """Whether any of these files names a type whose functions are wrong."""
+    """Whether any of these files names a type with wrong functions."""
     return any(_TYPES.search(Path(file).read_bytes().decode("latin-1")) for file in files)
 
 
 def _changed(text: str) -> tuple[str, Mapping[int, Sequence[tuple[int, int]]]]:
-    """A text with our functions, and for each longer line the columns of what was added and its lengths."""
+    """Return a text with our functions, and the column and length of each addition by line."""
     code = _COMMENT.sub(lambda comment: " " * len(comment[0]), text)
     added: dict[int, list[tuple[int, int]]] = defaultdict(list)
     parts: list[str] = []

@@ -1,7 +1,7 @@
-"""All VHDL of a build to one Verilog netlist, by GHDL's synthesis.
+"""Translates all VHDL files of a build to one Verilog netlist with GHDL's synthesis.
 
-Nothing is left of an earlier run, the netlist appears only when all went well, and what GHDL merely warns of ends the
-translation where it means that logic is lost.
+Each run removes the results of earlier runs and writes the netlist only if every step succeeds. A GHDL warning that
+means lost logic ends the translation with an error.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _MODULE = r"^[ \t]*module\s+({name})\b"
 _DEFINITION = re.compile(r"^module (\S+)(.*?)^endmodule", re.MULTILINE | re.DOTALL)
 _GENERIC_MAP = re.compile(r"^  \S+ #\(\n(.*?)\)\n +(\S+) \($", re.MULTILINE | re.DOTALL)
 _GENERIC = re.compile(r"^ +\.(\w+)\((.*?)\),?$", re.MULTILINE)
-# GHDL compares with bounds that a number cannot leave, and puts what is in no loop into one vector; a module may have
-# ports that a message has in another ROS version only. A linter is to look at what people wrote.
+# GHDL compares numbers with bounds that they cannot exceed, and packs signals that form no loop into one vector; a
+# module may have ports that its message has in only one ROS version. Linters should check only hand-written code.
 _WAIVED = ("CMPCONST", "UNSIGNED", "UNOPTFLAT", "PINMISSING")
 _HEADER = "\n".join(
     [
@@ -43,11 +43,11 @@ _HEADER = "\n".join(
     ]
 )
 _FOOTER = "".join(f"// verilator lint_on {word}\n" for word in _WAIVED)
-# What GHDL says of logic that is not there afterwards; the words are those of its sources.
+# GHDL's messages about logic that is then missing, worded as in GHDL's sources.
 _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned and has no default")
 
 _CRASH = "GHDL Bug occurred"
-# Where GHDL 2.0 crashes, and what it was given.
+# The places in GHDL 2.0 that crash, and the input that causes each crash.
 _CRASHES = {
     "netlists-builders.adb:929": "\nIs there an integer whose range has one number, such as `range 0 to N - 1` with "
     "N = 1? It has no bits, which GHDL does not expect.",
@@ -59,14 +59,14 @@ _CRASHES = {
 }
 _OF_MEMORIES = "netlists-memories.adb"
 
-# GHDL 2.0 reads and writes where a table was before it grew: an assignment to some bits of a signal may be lost. If the
-# C library overwrites memory that is given back, it crashes instead of making a wrong netlist.
+# GHDL 2.0 accesses a table's old memory after the table has grown, so an assignment to some bits of a signal may be
+# lost. If the C library overwrites freed memory, GHDL crashes instead of writing a wrong netlist.
 _MEMORY = {"MALLOC_PERTURB_": "165"}
 
 _GULP = 1 << 20
 _PAUSE = 0.005
 
-# GHDL's option for that; it loses registers of which it wanted to make memories.
+# GHDL's option that turns off memory inference, which loses some registers.
 _NO_MEMORIES = "-dm"
 _WITHOUT_MEMORIES = (
     "; GHDL loses a register that is written by a dynamic index and read by a constant one, and crashes at some "
@@ -77,11 +77,11 @@ _WITHOUT_MEMORIES = (
 
 @dataclass(frozen=True)
 class Translation:
-    """What to translate: VHDL files by library in any order, the unit on top, `[library.]unit`, and its generics.
+    """A translation: VHDL files by library, in any order; the top unit, `[library.]unit`; and the top unit's generics.
 
-    `verilog` are the sources that may hold the modules of components without an entity; they are linked later.
-    `programs` are those that take the netlist, as far as they are known: nobody waits for it if they are not there. All
-    paths are relative to the current folder.
+    `verilog` lists the sources that may define the modules for components without an entity; a later step links them.
+    `programs` lists the known programs that read the netlist; if they are missing, nothing is translated. All paths are
+    relative to the current folder.
     """
 
     top: str
@@ -94,33 +94,33 @@ class Translation:
     programs: Sequence[str] = ()
 
     def to_json(self) -> str:
-        """A text that `from_json` reads."""
+        """Return a text that `from_json` reads."""
         return json.dumps({item.name: getattr(self, item.name) for item in fields(self)}, indent=2) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> Translation:
-        """The translation in a text of `to_json`."""
+        """Return the translation described by a text from `to_json`."""
         content: dict[str, Any] = json.loads(text)
         return cls(**content)
 
     @property
     def unit(self) -> str:
-        """The unit on top, without its library."""
+        """The top unit, without its library."""
         return self.top.rpartition(".")[2]
 
     @property
     def library(self) -> str:
-        """The library of the unit on top."""
+        """The top unit's library."""
         return self.top.rpartition(".")[0] or "work"
 
 
 def translator() -> list[Path]:
-    """The files whose change may change a netlist, beside its sources."""
+    """Return the files, other than the sources, whose changes may affect a netlist."""
     return sorted(Path(__file__).parent.glob("*.py"))
 
 
 def translate(translation: Translation, folder: Path) -> str:
-    """Write the netlist, with GHDL's libraries in `folder`; the text is what GHDL warns of.
+    """Write the netlist, with GHDL's libraries in `folder`; return GHDL's warnings.
 
     Raises `NetlistError`; then there is no netlist.
     """
@@ -152,7 +152,7 @@ def translate(translation: Translation, folder: Path) -> str:
 
 
 def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
-    """The netlist in Verilog, and what GHDL warns of that is of interest."""
+    """Return the Verilog netlist and GHDL's relevant warnings."""
     text, warnings = ghdl.synthesise("dump")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
@@ -161,7 +161,7 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
         )
     modules = dump.read(text)
     components = _components(modules, ghdl.translation.verilog)
-    # The dump has all but these.
+    # The dump lacks only the generics.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
     doubt = ghdl.check_constants(lost_constants.widths(modules))
     correct(modules)
@@ -172,14 +172,14 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class _Ghdl:
-    """GHDL with the options that all its commands share."""
+    """GHDL with the options common to all its commands."""
 
     translation: Translation
     folder: Path
     copies: Copies
 
     def run(self, command: str, *arguments: str) -> tuple[str, str]:
-        """What it prints on its two streams."""
+        """Run a GHDL command; return its output on both streams."""
         options = [f"--std={self.translation.std}", f"--workdir={self.folder}", f"-P{self.folder}"]
         with (
             tempfile.TemporaryFile() as errors,
@@ -201,9 +201,9 @@ class _Ghdl:
         return self.copies.original(printed), self.copies.original(said)
 
     def check_constants(self, widths: set[int]) -> str:
-        """A warning if GHDL cannot be asked for constants.
+        """Check the constants; return a warning if GHDL cannot evaluate them.
 
-        Raises `NetlistError` if it makes zero of one of these widths, in bits.
+        Raises `NetlistError` if GHDL turns a constant with one of these widths (in bits) into zero.
         """
         if not widths:
             return ""
@@ -224,7 +224,7 @@ class _Ghdl:
         return doubt
 
     def probed(self, copies: lost_constants.Copies) -> str:
-        """What GHDL says of copies, without the probes that it does not understand. Raises `NetlistError`."""
+        """Return GHDL's output for the copies, after dropping the probes that GHDL rejects. Raises `NetlistError`."""
         while True:
             written = copies.write()
             try:
@@ -240,7 +240,7 @@ class _Ghdl:
                     raise
 
     def synthesise(self, language: str) -> tuple[str, str]:
-        """The netlist, and what GHDL says about it."""
+        """Return the netlist and GHDL's messages about it."""
         generics = [f"-g{name}={value}" for name, value in self.translation.generics.items()]
         library = f"--work={self.translation.library}"
         return self.run(
@@ -249,7 +249,7 @@ class _Ghdl:
 
 
 def _gulps(pipe: int) -> bytes:
-    """All that comes through a pipe. GHDL writes a word at a time; to be woken for each takes longer than its work."""
+    """Read a pipe to its end. GHDL writes word by word, and waking up for each would take longer than GHDL's work."""
     with suppress(OSError):
         fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _GULP)
     parts = []
@@ -260,7 +260,7 @@ def _gulps(pipe: int) -> bytes:
 
 
 def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
-    """The components without an entity, each of which must be a module of the Verilog, and gets its name."""
+    """Return the components without an entity; each must match a Verilog module and takes that module's name."""
     found: dict[str, Module] = {}
     for instance in (instance for module in modules.values() for instance in module.instances):
         module = modules.get(instance.kind)
@@ -277,7 +277,7 @@ def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
 
 
 def _generics(netlist: str) -> dict[tuple[str, str], dict[str, str]]:
-    """The generics of instances in GHDL's own Verilog, by the enclosing module and the instance."""
+    """Return the generics of instances in GHDL's own Verilog, by enclosing module and instance."""
     found: dict[tuple[str, str], dict[str, str]] = {}
     for name, text in _DEFINITION.findall(netlist):
         for values, instance in _GENERIC_MAP.findall(text):
@@ -286,7 +286,7 @@ def _generics(netlist: str) -> dict[tuple[str, str], dict[str, str]]:
 
 
 def _module(name: str, verilog: Sequence[str]) -> str | None:
-    """The name of a module as its source spells it; VHDL has forgotten the case."""
+    """Return a module's name as spelt in its source; VHDL does not keep the case."""
     pattern = re.compile(_MODULE.format(name=re.escape(name)), re.MULTILINE | re.IGNORECASE)
     for file in verilog:
         if found := pattern.search(Path(file).read_text(encoding="utf-8", errors="replace")):
@@ -295,7 +295,7 @@ def _module(name: str, verilog: Sequence[str]) -> str | None:
 
 
 def _errors(text: str) -> str:
-    """What GHDL says of an end without success, without its notes and warnings; all if there is nothing else."""
+    """Return GHDL's error messages after a failure; if there are none, all messages."""
     if _CRASH in text:
         what = re.search(r"^raised (.*)", text, re.MULTILINE)
         return (
@@ -307,7 +307,7 @@ def _errors(text: str) -> str:
 
 
 def _other_warnings(text: str) -> str:
-    """What GHDL warns of besides components without an entity."""
+    """Return GHDL's warnings, except those about components without an entity."""
     kept = [
         item
         for item in _messages(text)
@@ -317,7 +317,7 @@ def _other_warnings(text: str) -> str:
 
 
 def _messages(text: str) -> list[list[str]]:
-    """GHDL's messages: each is a line, and may be followed by the source with a caret, or by more about a crash."""
+    """Yield GHDL's messages: each is a line, possibly followed by the source with a caret or by details of a crash."""
     messages: list[list[str]] = []
     for line in text.splitlines():
         if not messages or not line.startswith("  "):

@@ -1,7 +1,8 @@
 """Writes a netlist as Verilog 2001: a wire for each net, and a statement for each gate that means exactly that gate.
 
-Nothing depends on how wide or of what sign Verilog makes an expression: operands are as wide as results, and signs are
-written. Logic is continuous assignments, never `always @*`, which some simulators do not run until an input changes.
+The result does not depend on Verilog's rules for the width and sign of expressions: operands are as wide as results,
+and signs are explicit. Combinational logic uses continuous assignments, not `always @*`, which some simulators do not
+run until an input changes.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from fusesoc_firm.netlist.model import Instance, LostMemoryError, Module, Module
 from fusesoc_firm.text.naming import VERILOG_KEYWORDS
 
 _WORD = 32
-_LEVELS = "01zx"  # by a bit of GHDL's value, and twice that of its mask of levels that are none
+_LEVELS = "01zx"  # indexed by the bit of GHDL's value plus twice the bit of GHDL's mask for levels other than 0 and 1
 
 _UNARY = {"$not": "~{0}", "$neg": "-{0}", "$red_and": "&{0}", "$red_or": "|{0}", "$red_xor": "^{0}"}
 _BINARY = {
@@ -58,45 +59,45 @@ _OTHER = {
 }
 _EXPRESSIONS: Mapping[str, str] = {**_UNARY, **_BINARY, **_OTHER}
 _WIRES = frozenset({"$signal", "$isignal", "$output", "$ioutput", "$port", "$nop", "$enable"})
-_SIGNALS = frozenset({"$signal", "$isignal"})  # their nets have their names, with nothing after it
+_SIGNALS = frozenset({"$signal", "$isignal"})  # their nets have the same names, without a suffix
 _EDGES = {"$posedge": "posedge", "$negedge": "negedge"}
 _MEMORIES = frozenset({"$memory", "$memory_init"})
 _MEMORY_PORTS = frozenset({"$mem_rd", "$mem_rd_sync", "$mem_wr_sync"})
 _REGISTERS = frozenset({"$dff", "$idff", "$adff", "$iadff"})
-# They say something to a prover, and are no hardware.
+# These gates are for formal verification and are not hardware.
 _IGNORED = frozenset({"$assume", "$cover"})
 
-# By the enclosing module and the name of an instance: the generics of a component, in Verilog.
+# The generics of a component, in Verilog, indexed by the enclosing module and the instance's name.
 Generics = Mapping[tuple[str, str], Mapping[str, str]]
 
 
 def write(modules: Modules, generics: Generics) -> str:
-    """The Verilog of all modules that are defined; raises `NetlistError` for what has no meaning in hardware."""
+    """Return the Verilog of all defined modules; raises `NetlistError` for gates without an equivalent in hardware."""
     defined = [module for module in modules.values() if module.is_defined]
     return "\n".join(_Writer(module, modules, generics).text() for module in reversed(defined))
 
 
 def identifier(name: str) -> str:
-    """A name in Verilog, escaped where it is no simple one."""
+    """Return a Verilog identifier, escaped unless the name is a simple identifier."""
     name = "".join(letter if "!" <= letter <= "~" else "_" for letter in name)
     is_simple = name.isidentifier() and name not in VERILOG_KEYWORDS
     return name if is_simple else f"\\{name} "
 
 
 def literal(bits: str) -> str:
-    """A constant of the levels 0, 1, x and z, the highest first."""
+    """Return a constant with the levels 0, 1, x and z, given with the highest bit first."""
     if len(bits) > 1 and set(bits) <= {"0", "1"}:
         return f"{len(bits)}'h{int(bits, 2):x}"
     return f"{len(bits)}'b{bits}"
 
 
 def declaration(width: int) -> str:
-    """What a declaration says of a width, with a blank after it."""
+    """Return the range in a declaration, followed by a blank; empty for one bit."""
     return f"[{width - 1}:0] " if width > 1 else ""
 
 
 def constant(gate: Instance) -> str | None:
-    """The levels of a constant, the highest first; None for what is none."""
+    """Return the levels of a constant, highest bit first; None if the gate is not a constant."""
     width = gate.outputs[0].width if gate.outputs else 0
     match gate.kind:
         case "$const_UB32" | "$const_0":
@@ -140,7 +141,7 @@ def _either(condition: str, value: str, other: str) -> str:
 
 
 def _function(name: str, width: int, inputs: Mapping[str, Net], statements: Iterable[str]) -> Iterator[str]:
-    """The declaration of a function of `width` bits."""
+    """Yield the declaration of a function with a `width`-bit result."""
     yield f"  function {declaration(width)}{name};"
     yield from (f"    input {declaration(net.width)}{item};" for item, net in inputs.items())
     yield from (f"    {statement}" for statement in statements)
@@ -148,7 +149,7 @@ def _function(name: str, width: int, inputs: Mapping[str, Net], statements: Iter
 
 
 def _insertion(function: str, place: str, width: int) -> Iterator[str]:
-    """`data`, of `width` bits, in a place of `source`."""
+    """Yield statements that insert `data` (`width` bits) into `source` at a position."""
     yield "begin"
     yield f"  {function} = source;"
     yield f"  {function}[{place} +: {width}] = data;"
@@ -156,7 +157,7 @@ def _insertion(function: str, place: str, width: int) -> Iterator[str]:
 
 
 def _choice(function: str, width: int, count: int) -> Iterator[str]:
-    """`value0`, or the value whose bit of a `selector` of `width` bits is set; of `count` values."""
+    """Yield a choice among `count` values: the one whose bit in the `width`-bit `selector` is set, or `value0`."""
     yield "case (selector)"
     for bit in range(count - 1):
         yield f"  {literal(_digits(1 << bit, width))}: {function} = value{bit + 1};"
@@ -189,7 +190,7 @@ class _Writer:
         self._name_all()
 
     def _name_all(self) -> None:
-        """GHDL's names for all; where the VHDL has one of them for something else, a number more."""
+        """Use GHDL's names for all nets and instances, with a number appended to names already taken."""
         for gate in self.module.instances:
             if gate.kind in _MEMORIES or not gate.kind.startswith("$"):
                 self.labels[id(gate)] = self._distinct(gate.name)
@@ -207,7 +208,7 @@ class _Writer:
     # The module
 
     def text(self) -> str:
-        """The module."""
+        """Return the module's Verilog."""
         declarations = list(chain.from_iterable(map(self._declarations, self.module.instances)))
         statements = list(chain.from_iterable(map(self._located, self.module.instances)))
         lines = [f"module {identifier(self.module.name)}", *self._ports(), *declarations, *self._outputs(), *statements]
@@ -253,7 +254,7 @@ class _Writer:
                 yield f"  {'reg' if is_register else 'wire'} {declaration(net.width)}{self.names[net.number]};"
 
     def _located(self, gate: Instance) -> Iterator[str]:
-        """The statements of a gate, below its place in the VHDL."""
+        """Yield a gate's statements, below a comment with the gate's place in the VHDL."""
         statements = list(self._statements(gate))
         if statements and gate.location:
             yield f"  // {gate.location}"
@@ -262,7 +263,7 @@ class _Writer:
     # Nets
 
     def value(self, net: Net) -> str:
-        """A net's name, or what it is for ever."""
+        """Return a net's name, or its value if it is constant."""
         if net.number in self.constants:
             return literal(self.constants[net.number])
         gate = self.driver.get(net.number)
@@ -271,7 +272,7 @@ class _Writer:
         return self.names[net.number]
 
     def part(self, net: Net, low: int, width: int) -> str:
-        """Some of a net's bits."""
+        """Return a slice of a net."""
         if net.number in self.constants:
             bits = self.constants[net.number]
             return literal(bits[len(bits) - low - width : len(bits) - low])
@@ -281,7 +282,7 @@ class _Writer:
         return f"{name}[{low}]" if width == 1 else f"{name}[{low + width - 1}:{low}]"
 
     def extended(self, net: Net, width: int) -> str:
-        """A number without sign in a greater width."""
+        """Return a net, extended with zeros to `width` bits."""
         if net.number in self.constants:
             return literal(self.constants[net.number].zfill(width))
         value = self.value(net)
@@ -321,7 +322,7 @@ class _Writer:
         return _EXPRESSIONS[gate.kind].format(*map(self.value, nets), width=gate.outputs[0].width)
 
     def _driven(self, gate: Instance) -> str:
-        """What drives a signal; one that nothing drives keeps its first value."""
+        """Yield the assignment to a signal; a signal without a driver keeps its initial value."""
         has_first = gate.kind in {"$isignal", "$ioutput"}
         return self.value(gate.input(1 if has_first and gate.inputs[0] is None else 0))
 
@@ -402,14 +403,14 @@ class _Writer:
         yield from self._assign(gate, changed)
 
     def _place(self, gate: Instance, index: Net, name: str = "") -> str:
-        """An index with the offset of a gate added, in as many bits as both need."""
+        """Return an index plus the gate's offset, wide enough for the sum."""
         offset = gate.numbers[0]
         width = max(index.width, offset.bit_length()) + 1
         value = f"{{{literal('0' * (width - index.width))}, {name or self.value(index)}}}"
         return f"{value} + {width}'d{offset}" if offset else name or self.value(index)
 
     def _selection(self, gate: Instance) -> Iterator[str]:
-        """A multiplexer with a bit of its selector for each value but one."""
+        """Yield a multiplexer with a selector bit for each value except the first."""
         width, selector = gate.outputs[0].width, gate.input(0)
         nets = [gate.input(index) for index in range(1, len(gate.inputs))]
         name = self._distinct(f"{gate.name}_select")
@@ -487,7 +488,7 @@ class _Writer:
         yield f"      {assignment}"
 
     def _first_value(self, gate: Instance, net: Net) -> str:
-        """The levels of a first value, which may be that of a signal."""
+        """Return the levels of an initial value, which may be a signal's initial value."""
         if net.number in self.constants:
             return self.constants[net.number]
         source = self.driver.get(net.number)
@@ -500,7 +501,7 @@ class _Writer:
         raise gate.error("the first value is not constant")
 
     def _memory_ports(self, memory: Instance) -> list[Instance]:
-        """The ports of a memory, in the order in which they act."""
+        """Return a memory's ports in the order in which they act."""
         found: list[Instance] = []
         port = memory
         while (port := self._next_port(port)) is not memory:
@@ -515,7 +516,7 @@ class _Writer:
         raise port.error("a memory whose ports GHDL did not connect")
 
     def _memory_size(self, memory: Instance) -> tuple[int, int]:
-        """Bits of a word, and words."""
+        """Return the number of bits per word and the number of words."""
         port = self._memory_ports(memory)[0]
         width = port.input(4).width if port.kind == "$mem_wr_sync" else port.outputs[1].width
         return width, memory.outputs[0].width // width
@@ -539,7 +540,7 @@ class _Writer:
             yield from self._clocked(name, edge, group)
 
     def _clocked(self, name: str, edge: str, ports: Sequence[Instance]) -> Iterator[str]:
-        """The ports of a memory that act at the same edge."""
+        """Yield the `always` block for a memory's ports that act at the same edge."""
         yield f"  always @({edge}) begin"
         for number, port in enumerate(ports):
             is_always = self.constants.get(port.input(3).number) == "1"
@@ -548,13 +549,13 @@ class _Writer:
         yield "  end"
 
     def _action(self, name: str, port: Instance, before: Sequence[Instance]) -> str:
-        """What a port does at an edge of its clock."""
+        """Return the statement that a port executes at its clock edge."""
         if port.kind == "$mem_wr_sync":
             return f"{name}[{self.value(port.input(1))}] <= {self.value(port.input(4))};"
         return f"{self.names[port.outputs[1].number]} <= {self._word(name, port, before)};"
 
     def _word(self, name: str, port: Instance, before: Sequence[Instance]) -> str:
-        """The word at a port's address; what ports before it write at the same edge is there already."""
+        """Return the word at a port's address, including data that earlier ports write at the same edge."""
         address = self.value(port.input(1))
         word = f"{name}[{address}]"
         for other in before:
@@ -587,7 +588,7 @@ class _Writer:
         yield "  );"
 
     def _connections(self, gate: Instance, module: Module) -> Iterator[tuple[str, str]]:
-        """Each port of an instance, and what is connected to it."""
+        """Yield each port of an instance and the net connected to the port."""
         for index, port in enumerate(module.inputs):
             yield port.name, self.value(gate.input(index))
         for port, net in zip(module.outputs, gate.outputs, strict=True):

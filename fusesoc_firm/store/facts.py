@@ -1,4 +1,4 @@
-"""The facts that determine the result of a call: each has a kind, a name and the state at its first reading.
+"""The facts that determine the result of a call. Each has a kind, a name and a state, taken when it is first read.
 
     file        the SHA-256 of the content
     part        the size and time of a file that was read in part
@@ -24,12 +24,12 @@ Fact = tuple[str, str, str | None]
 
 
 def facts(kind: str, names: Iterable[str]) -> list[Fact]:
-    """The facts of a kind, in their present state."""
+    """The facts of a kind, in their current state."""
     return [(kind, name, state(kind, name)) for name in names]
 
 
 def state(kind: str, name: str) -> str | None:
-    """The present state of a fact; None if the object is missing. Raises `ValueError` for an impossible name."""
+    """The current state of a fact; None if the object is missing. Raises `ValueError` for an impossible name."""
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)

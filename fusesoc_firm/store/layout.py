@@ -4,13 +4,13 @@
     <root>/v4/<first two digits>/<digest of a call>.call     the facts that determine a call's key, and the key
     <root>/v4/<first two digits>/<key>.lock                  held while an entry is built
 
-Each file but the lock begins with a line with the SHA-256 of the rest. It is put in place by one rename, so it is
-either complete or missing. An entry continues with a line of JSON (the request, names, lengths) and the contents; the
-others are JSON.
+Each file except the lock begins with a line that contains the SHA-256 of the rest. A single rename puts the file in
+place, so the file is either complete or missing. An entry continues with a line of JSON (the request, names, lengths)
+and the contents; the others are JSON.
 
-Anyone who can write to the store can write files with correct digests. So a file in another form counts as damaged,
-just like one with a wrong digest: data of other types, or names that lead out of the folder to which the files are
-written.
+Anyone who can write to the store can write files with correct digests. So a file with unexpected content counts as
+damaged, just like a file with a wrong digest. Unexpected are data of other types, and names that lead out of the folder
+to which the files are written.
 
 This module imports as little of Python's library as possible.
 """
@@ -34,10 +34,10 @@ ENTRY, CALL, LOCK = ".entry", ".call", ".lock"
 KEPT = (ENTRY, CALL)
 """The endings of the files that are kept; the least recently used are removed first."""
 
-# The limits for plain data and for all other files, since each is read at once.
+# The size limits for plain data and for all other files, since each file is read in one piece.
 _MOST_PLAIN_BYTES = 2**24
 _MOST_BYTES = 2**30
-# The limits of file systems.
+# The limits that file systems impose.
 _LONGEST_NAME_BYTES, _LONGEST_PATH_BYTES = 255, 4000
 _DIGITS = frozenset("0123456789abcdef")
 _DIGEST_DIGITS = 64
@@ -173,7 +173,7 @@ def _are_facts(facts: object) -> bool:
 
 
 def _lengths(listed: object) -> dict[str, int] | None:
-    """The length of each file by its path; None if one of them is illegal."""
+    """The length of each file by path; None if a length or a path is illegal."""
     lengths: dict[str, int] = {}
     for item in listed if isinstance(listed, list) else [None]:
         if not isinstance(item, list) or len(item) != _FILE_PARTS or type(item[1]) is not int or item[1] < 0:
@@ -185,7 +185,7 @@ def _lengths(listed: object) -> dict[str, int] | None:
 
 
 def _is_path(path: object) -> bool:
-    """Whether a path leads directly to a file below the folder that it is relative to."""
+    """Whether a relative path leads directly to a file below its base folder."""
     if not isinstance(path, str):
         return False
     try:

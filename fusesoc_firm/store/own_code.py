@@ -19,21 +19,21 @@ IMPORTED = ("chevron", "numpy", "pyyaml", "rosbags")
 # Modules, templates and data. The other folders hold cores and pages, as files or links.
 _COUNTED = (".py", ".mustache", ".yaml", ".csv")
 _LEFT_OUT = ("__pycache__", "demos", "docs", "library")
-# File times are too coarse to tell apart two edits within this period.
+# File times are too coarse to distinguish two edits within this period.
 _NEW_NANOSECONDS = 2 * 10**9
 _STARTED = time.time_ns()
 
 
 def digest(package: Path = PACKAGE) -> str:
-    """The SHA-256 of all our files by name, which is the same for all copies of them."""
+    """The SHA-256 of the names and contents of all our files; every copy of the package has the same digest."""
     return _digest(package, state(package))
 
 
 def state(package: Path = PACKAGE) -> str:
     """A value that changes when one of our files is edited, added or removed.
 
-    It consists of names, sizes and times, so it takes a fraction of the time of `digest`. For a file so new at the
-    start of this process that its time may be unreliable, it uses the content.
+    The value is computed from names, sizes and times, which is many times faster than `digest`. If a file is so new at
+    the start of this process that its time may be unreliable, the file's content is used instead.
     """
     found = []
     for name, entry in _files(str(package)):

@@ -1,8 +1,8 @@
 """Records the files and folders that this process reads, with their state, by Python's audit hooks (PEP 578).
 
-The key must cover everything that a generator reads, or an edit would go unnoticed. Python and its installed packages
-are not recorded, as their versions count; nor is this package, whose files are counted separately; nor are the
-machine's `/dev`, `/etc`, `/proc` and `/sys`. Files that other programs read are not seen.
+The key must cover everything that a generator reads, or an edit would go unnoticed. Four groups are not recorded:
+Python and its installed packages, whose versions are part of the key; this package, whose files are counted separately;
+the machine's `/dev`, `/etc`, `/proc` and `/sys`; and files that other programs read.
 
 If a file is too large to be an input, such as a bag, a reader takes parts and declares this with `in_part`. Each `Part`
 is then an input; a repeated call is a hit as long as the file has the same size and time.
@@ -41,7 +41,7 @@ def _apart() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Part:
-    """The part that was read of the file or folder at `path`, under a name of its own."""
+    """The part of the file or folder at `path` that was read; each part has a separate name."""
 
     path: Path
     name: str
@@ -54,7 +54,7 @@ Input = Path | Part
 
 @dataclass
 class Reads:
-    """The absolute paths that were read, in order, each with its state before the first reading.
+    """The absolute paths that were read, in order, each with the file's state before the first reading.
 
     `parts` are files that were read in part. Files in `apart` and in new temporary folders are not recorded.
     `python_path` lists the places where Python finds packages.
@@ -109,7 +109,7 @@ def in_part(files: Iterable[Path]) -> Iterator[None]:
 
 @cache
 def _install_hook() -> None:
-    """Install the hook once: it stays for the life of the process."""
+    """Install the hook once; it remains for the life of the process."""
     sys.addaudithook(_hook)
 
 

@@ -4,7 +4,7 @@ Nothing below the root is trusted: a name may be a link, a pipe, a device or a f
 parent without following links, files are opened without waiting, and only regular files count. The root itself is the
 user's choice, and may be a link. All names are relative to it.
 
-New files and folders in a group-writable folder belong to the folder's group and are writable for it, regardless of the
+New files and folders in a group-writable folder belong to the folder's group, which may write to them regardless of the
 umask, as in a shared Git repository.
 
 This module imports as little of Python's library as possible.
@@ -21,15 +21,15 @@ from contextlib import contextmanager, suppress
 from fusesoc_firm.text.files import TEMPORARY
 
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-# Opening a pipe must not wait for its other end, and a terminal must not become the controlling one.
+# Opening a pipe must not wait for the other end, and a terminal must not become the controlling terminal.
 _FILE = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
 _RIGHTS = 0o666
-# How often other processes may remove a folder while a file is being written to it.
+# The number of times that other processes may remove a folder while a file is being written to it.
 _TRIES = 100
 
 
 def read(root: str, name: str, most: int) -> bytes | None:
-    """The content of a regular file of at most `most` bytes; None if it is missing, unreadable or anything else."""
+    """Return the content of a regular file of at most `most` bytes; None for any other, missing or unreadable file."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             handle = os.open(os.path.basename(name), os.O_RDONLY | _FILE, dir_fd=folder)
@@ -38,7 +38,7 @@ def read(root: str, name: str, most: int) -> bytes | None:
             if not stat.S_ISREG(status.st_mode) or status.st_size > most:
                 return None
             with open(handle, "rb", closefd=False) as file:
-                # Our files appear whole, so one that is still growing is not ours.
+                # Our files appear whole, so a file that is still growing is not ours.
                 content = file.read(status.st_size + 1)
             return content if len(content) == status.st_size else None
         finally:
@@ -59,7 +59,7 @@ def write_whole(root: str, name: str, data: bytes) -> None:
 def open_lock(root: str, name: str) -> int:
     """Open a file to be locked; creates it if it is missing, and keeps its content.
 
-    Raises `OSError`, also if it is not a regular file.
+    Raises `OSError`, also if the name belongs to another kind of file.
     """
     for _ in range(_TRIES - 1):
         with suppress(FileNotFoundError):
@@ -68,7 +68,7 @@ def open_lock(root: str, name: str) -> int:
 
 
 def state(root: str, name: str) -> os.stat_result | None:
-    """The state of a path, for a link its own; None if it is missing or inaccessible."""
+    """The state of a path, without following a link; None if the path is missing or inaccessible."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             return os.stat(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
@@ -77,7 +77,7 @@ def state(root: str, name: str) -> os.stat_result | None:
 
 
 def listed(root: str, name: str) -> list[tuple[str, os.stat_result]]:
-    """The entries of each folder within a folder, with their states; and anything found in place of a folder."""
+    """The entries of each subfolder, with their states, and any other file found in place of a subfolder."""
     found = []
     for inner, status in _entries(root, name) if _is_folder(root, name) else [(name, state(root, name))]:
         if status is not None:
@@ -97,12 +97,12 @@ def remove(root: str, name: str) -> int:
         with _opened(root, os.path.dirname(name)) as folder:
             return _remove(os.path.basename(name), folder)
     except FileNotFoundError:
-        # Another process removed it first.
+        # Another process removed the file first.
         return 0
 
 
 def _write(root: str, name: str, data: bytes) -> None:
-    # A name that is unique across machines; process ids are unique only on one.
+    # This name is unique across machines; process ids are unique only on one machine.
     temporary = f"{TEMPORARY}{os.urandom(8).hex()}"
     with _opened(root, os.path.dirname(name), is_made=True) as folder:
         try:
@@ -165,7 +165,7 @@ def _entries(root: str, name: str) -> list[tuple[str, os.stat_result]]:
     found = []
     with suppress(OSError), _opened(root, name) as folder:
         for inner in sorted(os.listdir(folder)):
-            # Another process may remove it in between.
+            # Another process may remove the folder in between.
             with suppress(OSError):
                 found.append((f"{name}/{inner}", os.stat(inner, dir_fd=folder, follow_symlinks=False)))
     return found

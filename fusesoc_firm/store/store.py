@@ -1,4 +1,4 @@
-"""A content-addressed store of generated files, so that nothing is generated twice.
+"""A store of generated files, indexed by key, so that nothing is generated twice.
 
 FuseSoC's own generator cache is unsuitable: it ignores the generator's code and templates, keeps partial output after
 an interrupt, and has no lock. Here an entry's key covers everything that determines its content, including this
@@ -7,10 +7,10 @@ package's files.
 Each answered call leaves a note of all facts that determine its key, so that `plugin.recall` can answer it the next
 time without computing the key. `layout` describes the files of the store.
 
-A file is written next to its place and appears there by one rename; it is read whole and checked before use. So no
-reader, on this machine or on another that shares the folder, sees a partial file or is disturbed by its removal. Locks
-only avoid duplicate work: they need not work between machines, and are never trusted. `shared_files` lists what else is
-not trusted.
+A file is written under a temporary name and then renamed; it is read whole and checked before use. So no reader, on
+this machine or on another that shares the folder, sees a partial file or is disturbed when a file is removed. Locks
+only avoid duplicate work: they need not work between machines, and are never trusted. `shared_files` describes how the
+store treats files from other people.
 """
 
 from __future__ import annotations
@@ -43,9 +43,10 @@ _DEFAULT_LIMIT = "1G"
 _UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40}
 # Shrinking leaves a margin, so that the limit is not exceeded again at once.
 _KEPT_OF_LIMIT = 0.8
-# The process that holds a lock may be stopped, or its machine may be gone. This exceeds the time of a generation.
+# The process that holds a lock may be stopped, or its machine may be down. This limit exceeds the time to generate a
+# core.
 _LONGEST_WAIT_SECONDS = 120
-# The age after which a temporary file was left by a killed process; no write takes this long.
+# A temporary file of this age was left by a killed process; no write takes this long.
 _ABANDONED_SECONDS = 3600
 
 
@@ -76,7 +77,7 @@ class StoredFile:
 
 @dataclass(frozen=True)
 class Store:
-    """A store in the folder `root`, created on the first write, which keeps about `limit` bytes at most."""
+    """A store of about `limit` bytes at most, in the folder `root`, which is created on the first write."""
 
     root: Path
     limit: int
@@ -85,7 +86,7 @@ class Store:
         """The files of a key: from the store if they are there undamaged, otherwise from `build`, and then stored.
 
         Files are stored only if the key `is_current` after `build`: otherwise an input changed during the build.
-        Concurrent processes that need the same key wait for the first of them. Exceptions of `build` are passed on. If
+        Concurrent processes that need the same key wait for the first of them. Exceptions from `build` propagate. If
         the store is not writable, the files are built without it, and one line on stderr reports this.
         """
         if (files := self._find(key)) is not None:
@@ -101,7 +102,7 @@ class Store:
 
     def note(self, call: str, note: Mapping[str, object]) -> None:
         """Store a call's note by the call's digest, so that the call can be recalled."""
-        # A failure costs only time.
+        # If this fails, only time is lost.
         with suppress(OSError):
             if self.is_writable():
                 layout.write_json(self._root, place(call, CALL), note)
@@ -125,7 +126,7 @@ class Store:
         for name, status in self._listed():
             is_kept = name.endswith(KEPT)
             is_good = stat.S_ISREG(status.st_mode) and (not is_kept or layout.is_whole(self._root, name))
-            # A file that is gone was removed by another process.
+            # A missing file was removed by another process.
             if not is_good and shared_files.state(self._root, name) is not None:
                 shared_files.remove(self._root, name)
                 damaged.append(self.root / name)
@@ -170,7 +171,7 @@ class Store:
         try:
             yield
         finally:
-            # Remove it while it is held, so that waiting processes notice that the file is a different one.
+            # Remove the lock file while it is locked, so that waiting processes notice that the file has been replaced.
             if is_held:
                 with suppress(OSError):
                     shared_files.remove(self._root, name)
@@ -212,7 +213,7 @@ class Store:
 
 
 def default_store(environment: Mapping[str, str] = os.environ) -> Store:
-    """The store that the environment names. Raises `InputError` if the limit is not a size."""
+    """The store selected by the environment variables. Raises `InputError` if the limit is not a size."""
     limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
         fail(
@@ -239,7 +240,7 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
         "code": code,
         "versions": {name: _version(name) for name in IMPORTED},
         "python": sys.version_info[:2],
-        # A compiled accelerator runs on one kind of machine only.
+        # A compiled accelerator runs on only one kind of machine.
         "machine": platform.machine(),
     }
     return digest_of(parts)
@@ -254,8 +255,8 @@ def _version(package: str) -> str:
 def _locked(root: str, name: str) -> tuple[int, bool]:
     """Open and lock a file; return the handle and whether the lock is held. Raises `OSError`.
 
-    The previous holder may have removed the file in the meantime. A file system without locks, or with locks on each
-    machine only, costs a second build at worst.
+    The previous holder may have removed the file in the meantime. If the file system has no locks, or only locks within
+    one machine, the worst result is a duplicate build.
     """
     end = time.monotonic() + _LONGEST_WAIT_SECONDS
     while True:

@@ -1,4 +1,4 @@
-"""Faults in the user's input, each with its place and what is legal; and warnings of doubtful input.
+"""Reports faults in the user's input, with their places and the legal alternatives, and warns of doubtful input.
 
 Every reader of user input (message definitions, specifications, stimuli) reports through a `Diagnostics` collector and
 continues as far as it can. The collector then raises one `InputError` with all faults of the file. Only the two entry
@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-# In a file of an entirely different kind, each line is a fault.
+# In a file of an entirely different kind, every line would be a fault.
 _MOST_SHOWN = 200
 # The most characters of a line shown around a fault, and the shortest word that is shortened.
 _WIDEST = 200
@@ -48,14 +48,14 @@ class SourceRef:
 
 
 def byte_place(file: str, data: bytes, position: int) -> SourceRef:
-    """The place of a byte in a file that is not a text; its column counts bytes."""
+    """The place of a byte in a binary file; the column counts bytes."""
     line_start = data.rfind(b"\n", 0, position) + 1
     return SourceRef(file, data.count(b"\n", 0, position) + 1, position - line_start + 1)
 
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """A fault or a warning: a sentence, its place (None for input without lines) and, if known, what is legal."""
+    """A fault or a warning: a sentence, a place (None for input without lines) and, if known, the legal values."""
 
     message: str
     source: SourceRef | None = None
@@ -114,7 +114,7 @@ class Diagnostics:
         return tuple(sorted(self.warned, key=_position))
 
     def take(self, error: InputError, source: SourceRef | None) -> None:
-        """Add the faults of another reader; `source`, the place that caused the reading, replaces a missing place."""
+        """Add another reader's faults; `source`, the place that caused the reading, replaces a missing place."""
         for fault in error.diagnostics:
             self.error(fault.message, fault.source or source, fault.hint)
 

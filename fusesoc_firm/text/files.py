@@ -18,7 +18,7 @@ def write_whole(path: str | os.PathLike[str], data: bytes) -> None:
     """Write a temporary file next to the target, then rename it. Raises `OSError`."""
     folder = os.path.dirname(os.fspath(path))
     os.makedirs(folder or ".", exist_ok=True)
-    # A name that is unique across machines; process ids are unique only on one.
+    # This name is unique across machines; process ids are unique only on one machine.
     temporary = os.path.join(folder, f"{TEMPORARY}{os.urandom(8).hex()}")
     try:
         with open(temporary, "xb") as file:
@@ -43,7 +43,7 @@ def write_if_changed(path: str | os.PathLike[str], content: str | bytes) -> bool
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes | None:
-    """The content of a regular file; None if it is missing or unreadable. Does not wait for pipes."""
+    """Return the content of a regular file; None if the file is missing or unreadable. Does not wait for pipes."""
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         try:
@@ -63,9 +63,9 @@ def is_file(path: str | os.PathLike[str]) -> bool:
 
 
 def read_regular(path: str | os.PathLike[str], most: int) -> bytes:
-    """The content of a regular file of at most `most` bytes.
+    """Return the content of a regular file of at most `most` bytes.
 
-    Raises `OSError`, with the reason, for anything else: opening a FIFO would wait for its writer, and a device may
+    Raises `OSError`, with the reason, for other kinds of file: opening a FIFO would wait for a writer, and a device may
     never end.
     """
     with open(path, "rb", opener=_open_at_once) as file:

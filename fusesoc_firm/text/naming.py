@@ -56,7 +56,7 @@ VHDL_PREDEFINED = frozenset(
 
 # The longest name or description, in characters.
 LONGEST_TEXT = 200
-# The longest path, such as of a source file or of a field in a deeply nested message.
+# The longest path, such as the path of a source file or of a field in a deeply nested message.
 LONGEST_PATH = 4096
 
 PREFIX_RULE = "lower-case letters, digits and single '_' between them, a letter first, at most 100"
@@ -69,7 +69,7 @@ _UNDERSCORES = re.compile(r"_{2,}")
 
 
 def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None:
-    """Why `text` cannot be a name or a description, and what is legal; None if it can.
+    """Return the reason that `text` cannot be a name or a description, and what is legal; None if `text` is valid.
 
     The text appears in comments, strings, labels and messages, so it must be one printable line. It must not contain
     control characters, Unicode line ends, lone surrogates, or characters that change the writing direction.
@@ -85,8 +85,8 @@ def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None
 def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "field") -> str:
     """Join the parts with `_` to one legal identifier.
 
-    It has no `__`, no `_` at its ends and no leading digit. A word in `avoid` (in lower case) gets the suffix; by
-    default, these are the keywords of VHDL and Verilog.
+    The identifier has no `__`, no `_` at either end and no leading digit. A word in `avoid` (in lower case) gets the
+    suffix; by default, `avoid` holds the keywords of VHDL and Verilog.
     """
     joined = _UNDERSCORES.sub("_", _ILLEGAL.sub("_", "_".join(parts))).strip("_")
     if not joined or joined[0].isdigit():

@@ -9,9 +9,9 @@ from fusesoc_firm.text.diagnostics import fail
 
 
 def check_output(path: Path, endings: Sequence[str] = ()) -> None:
-    """Raise `InputError` if the file cannot be written, or if its name has none of the `endings`, if any are given.
+    """Raise `InputError` if the file cannot be written or, if `endings` are given, its name has none of them.
 
-    Its folder must exist, since a missing one is usually a misspelling.
+    The file's folder must exist, since a missing folder is usually a misspelling.
     """
     if endings and path.suffix not in endings:
         fail(
@@ -24,7 +24,7 @@ def check_output(path: Path, endings: Sequence[str] = ()) -> None:
 
 
 def shown(path: Path) -> str:
-    """The path relative to the current folder if it is below, otherwise unchanged."""
+    """Return a path below the current folder relative to that folder, and any other path unchanged."""
     here = Path.cwd().resolve()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
 
@@ -44,7 +44,7 @@ def make_folder(path: Path) -> None:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file of the user, and create its parent folders. Raises `InputError`."""
+    """Write a file for the user, and create any missing parent folders. Raises `InputError`."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.encode() if isinstance(content, str) else content)

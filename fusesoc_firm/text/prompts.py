@@ -24,7 +24,7 @@ class Question:
 
     `words` complete an answer; if the question `is_choice`, only they are legal. An empty answer means `default`, which
     is empty if the answer is optional; if the question `is_required` and has no default, an empty answer is a fault.
-    `check` returns the fault of an answer.
+    `check` returns the fault in an answer.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Question:
     check: Callable[[str], str | None] = lambda _: None
 
     def fault(self, answer: str) -> str | None:
-        """The fault of an answer, or None."""
+        """The fault in an answer, or None."""
         if not answer:
             return f"'{self.name}' is needed: {self.meaning}" if self.is_required and not self.default else None
         if self.is_choice and answer not in self.words:
@@ -54,7 +54,7 @@ class Asker(Protocol):
     """A source of answers."""
 
     def ask(self, question: Question) -> str:
-        """The answer without surrounding blanks, or the question's default."""
+        """Return the answer without surrounding blanks, or the question's default."""
 
     def tell(self, text: str) -> None:
         """Show a text."""
@@ -68,7 +68,7 @@ class PipeAsker:
         self._output = output
 
     def ask(self, question: Question) -> str:
-        """The answer in the next line. Raises `InputError` for an invalid or missing answer."""
+        """Return the answer in the next line. Raises `InputError` for an invalid or missing answer."""
         line, text = next(self._answers, (0, ""))
         if not line:
             fail(f"the answers end before '{question.name}': {question.meaning}")
@@ -119,7 +119,7 @@ class TerminalAsker:
 
 
 def asker() -> Asker:
-    """The asker that fits the standard input."""
+    """Return the asker that suits the standard input."""
     if sys.stdin.isatty() and sys.stdout.isatty():
         return TerminalAsker()
     return PipeAsker(sys.stdin, sys.stdout)

@@ -1,7 +1,7 @@
 """Quotes users' text for the language of the generated file.
 
-Names, descriptions, file names and constants of messages may contain any printable character. A template gives the kind
-of each text, `{{comment block}}` or `{{string topic}}`, and its ending gives the language.
+Names, descriptions, file names and constants of messages may contain any printable character. A template specifies the
+kind of each text, `{{comment block}}` or `{{string topic}}`; the template's ending determines the language.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SECOND_QUESTION_MARK = re.compile(r"(?<=[?])[?]")
 
 
 def comment(text: str) -> str:
-    """`text` as printable ASCII for a comment that ends with its line, in any language.
+    """Return `text` as printable ASCII for a single-line comment in any language.
 
     VHDL-93 is Latin-1, and GHDL rejects UTF-8 even in comments. A backslash at the end of a line, which C also spells
     `??/`, would extend the comment to the next line.
@@ -34,7 +34,7 @@ def comment(text: str) -> str:
 
 
 def lines_of(text: str) -> list[str]:
-    """The lines of a text that is data, each with its newline; unlike in `splitlines`, only newlines end a line."""
+    """Split data into lines, each with its newline; unlike with `splitlines`, only a newline ends a line."""
     return [f"{line}\n" for line in text.removesuffix("\n").split("\n")]
 
 
@@ -77,7 +77,7 @@ def _tcl_character(character: str) -> str:
 
 
 def yaml_scalar(text: str) -> str:
-    """A YAML scalar on one line that reads back as the string `text`, never as a number or a list."""
+    """Return a single-line YAML scalar that reads back as the string `text`, never as a number or a list."""
     return _yaml(text, text).removesuffix("\n...")
 
 
@@ -88,7 +88,7 @@ def yaml_list(texts: Iterable[str]) -> str:
 
 
 def _yaml(value: str | list[str], text: str) -> str:
-    # PyYAML folds newlines. It also writes a NEL unescaped but reads it as a blank, unless everything is escaped.
+    # PyYAML folds newlines. Unless everything is escaped, PyYAML also writes a NEL unescaped but reads it as a blank.
     is_plain = text.isprintable()
     style = None if is_plain else '"'
     shown = yaml.safe_dump(value, default_style=style, default_flow_style=True, allow_unicode=is_plain, width=10**6)

@@ -1,14 +1,14 @@
-"""Renders strict mustache templates: a template and plain data give text, or an error where mustache would guess.
+"""Renders strict mustache templates: where mustache would guess, rendering fails with an error.
 
 Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks up missing keys in
 outer scopes. In hardware descriptions each of these is a fault that compiles. So chevron only parses the templates, and
 this module expands the tree by these rules:
 
-* `{{x}}` prints a string or an integer unchanged. A bool or None has no standard spelling and is an error.
+* `{{x}}` prints a string or an integer unchanged. A bool or None is an error, since neither has a standard spelling.
 * `{{comment x}}` prints a user's text, quoted for this purpose in the language given by the ending of the template's
   name; `quoting` defines the kinds of each language. A partial is in the language of the including template.
 * `{{x-1}}` and `{{x+1}}` print an integer minus or plus a number: `std_logic_vector({{width-1}} downto 0)`.
-* A key is looked up only in the innermost scope; `../x` is the `x` of the scope around it. The key must exist, even in
+* A key is looked up only in the innermost scope; `../x` is `x` in the enclosing scope. The key must exist, even in
   an omitted section.
 * `{{#x}}` takes a bool (the section or nothing, same scope), a list (the section once per item), or a mapping or None
   (the section in the mapping's scope, or nothing). `{{^x}}` is the section for false, an empty list or None.
@@ -66,7 +66,7 @@ class TracedLine:
 _RECORDS: list[dict[str, Rendering]] = []
 # Private-use characters, which no template contains, enclose the place of a line.
 _MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
-# A line that is removed as a whole, whatever its tag expands to.
+# A line that is removed as a whole, regardless of the tag's expansion.
 _STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
 # The start of a column, and the least number of characters before it.
 _COLUMN = re.compile("\ue002(\\d*)\ue003")
@@ -163,7 +163,7 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
     traced: list[TracedLine] = []
     place = (f"{name}.mustache", 1, "")
     for line, text in zip(lines, texts, strict=True):
-        # Values may have several lines, and blank lines have no mark: both belong to the line above.
+        # The later lines of a multi-line value, and blank lines, have no mark: they belong to the line above.
         if found := _MARK.search(line):
             place = (found["file"], int(found["line"]), found["scope"])
         traced.append(TracedLine(text, *place))
@@ -177,7 +177,7 @@ def template_text(name: str, templates: Path = TEMPLATES) -> str:
 
 @dataclass(frozen=True)
 class _Expansion:
-    """One walk over a parsed template; `quotes` are those of its language."""
+    """One walk over a parsed template; `quotes` holds the quoting functions of the template's language."""
 
     templates: Path
     quotes: Mapping[str, Quote]
@@ -240,7 +240,7 @@ class _TracedExpansion(_Expansion):
 
 
 def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
-    """The scopes in which a section's body is expanded, each with whether its text is used."""
+    """Yield the scopes in which a section's body is expanded, and for each whether the text is used."""
     if section.is_inverted:
         yield scope, not _is_there(value)
     elif section.is_question or isinstance(value, bool):
@@ -302,7 +302,7 @@ def _indented(text: str, indentation: str) -> str:
 
 
 def _in_columns(text: str) -> str:
-    """Align the columns of a text; each run of lines with columns is aligned on its own."""
+    """Align the columns of a text; each run of lines with columns is aligned independently."""
     if not _COLUMN.search(text):
         return text
     lines: list[str] = []
@@ -405,7 +405,7 @@ def _value(key: str) -> _Node:
 
 
 def _take_indentation(nodes: list[_Node]) -> str:
-    """Remove and return the indentation of the last line of `nodes`, if the line contains nothing else."""
+    """Remove and return the indentation of the last line in `nodes` if that line is otherwise empty."""
     match nodes:
         case [*before, _Literal(text)] if not (before and isinstance(before[-1], _Value) and "\n" not in text):
             rest, newline, line = text.rpartition("\n")

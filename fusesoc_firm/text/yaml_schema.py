@@ -1,6 +1,7 @@
 """Describes the grammar of a YAML file as a JSON Schema, with which editors check and complete it.
 
-It covers the same rules as the file's sections (`yaml_sections`). Unknown names are only found by reading the file.
+The schema covers the same rules as the file's sections (`yaml_sections`). Unknown names are only found by reading the
+file.
 """
 
 from __future__ import annotations

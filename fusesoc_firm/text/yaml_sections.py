@@ -34,7 +34,7 @@ class Section:
     places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def place(self, field: str) -> SourceRef:
-        """The place of the value of a field's key, or that of the section if the key is missing."""
+        """The place of the value of a field's key, or the place of the section if the key is missing."""
         return self.places.get(field, self.source)
 
 
@@ -42,10 +42,10 @@ class Section:
 class Key:
     """The grammar of a key.
 
-    `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list); `type` is the type of the
-    last two. `aliases` are other spellings of the key. `choices` lists all legal values, if possible. A required key
-    may be omitted if another key has a certain value: `unless`. `only_of` limits the key to one kind of item, if its
-    section describes several kinds. A text must comply with the `rule`.
+    `form` is "text", "integer", "texts" (one or a list), "section" or "sections" (a list); `type` is the type of a
+    "section" or of each of the "sections". `aliases` are other spellings of the key. `choices` lists all legal values,
+    if possible. A required key may be omitted if another key has a certain value: `unless`. `only_of` limits the key to
+    one kind of item, if its section describes several kinds. A text must satisfy the `rule`.
     """
 
     meaning: str
@@ -178,7 +178,7 @@ class _Reader:
 
     def _integer(self, node: yaml.Node, entry: Key, name: str) -> int | None:
         if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:int":
-            # The user may have put the integer tag on any text.
+            # The user may have added the integer tag to any text.
             with suppress(ValueError):
                 return integer(node.value)
         self._error(f"'{name}' must be an integer, not {kind(node)}", node, entry.meaning)
@@ -197,7 +197,7 @@ class _Reader:
 
 
 def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:
-    """The names of the keys that are required beside the given ones."""
+    """The names of the keys that are required in addition to the given keys."""
     words = {name: value.value for name, value in given.items()}
     return [name for name, (_, entry) in known.items() if entry.is_needed(words)]
 
@@ -226,7 +226,7 @@ def _empty(section: type[S], source: SourceRef) -> S:
 
 
 def _words_of_keys(section: type[Section]) -> str:
-    """The keys that a section requires, or those that it may have if it requires none."""
+    """The keys that a section requires or, if it requires none, the keys that it may have."""
     keys = keys_of(section)
     required = [name for name, (_, entry) in keys.items() if entry.is_required]
     return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"

@@ -1,7 +1,6 @@
 """YAML with source positions.
 
-PyYAML's nodes hold marks; here they become `SourceRef`s, and values keep their places: a `Text` is a string with its
-place.
+The marks in PyYAML's nodes become `SourceRef`s, and values keep their places: a `Text` is a string with a place.
 
 The bytes, levels and nodes of a file are limited before anything is built from it, since a few lines of aliases can
 expand beyond any memory.
@@ -66,7 +65,7 @@ class _Composer(yaml.composer.Composer, yaml.resolver.Resolver):
         self.check_event, self.peek_event, self.get_event = parser.check_event, parser.peek_event, parser.get_event
         self._bounds = bounds
         self._nodes = self._level = 0
-        # The number of nodes within each anchor.
+        # The number of nodes under each anchor.
         self._sizes: dict[str, int] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
@@ -111,7 +110,7 @@ class YamlText:
     is_cut: bool = False
 
     def source(self, node: yaml.Node) -> SourceRef:
-        """The place of a node; a node of several lines is shown by its first."""
+        """The place of a node; for a multi-line node, the first line is shown."""
         start, end = node.start_mark, node.end_mark
         text = self.lines[start.line] if start.line < len(self.lines) else ""
         last = end.column if end.line == start.line else len(text.rstrip())
@@ -192,7 +191,7 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
 
 
 def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
-    """The indentations of a line and of the blocks open above it; empty if it fits one of these."""
+    """The indentations of a line and of the blocks open above it; empty if the line matches one of those blocks."""
     indent = len(lines[number]) - len(lines[number].lstrip(" "))
     # The first word of each open block by its indentation, the outermost first.
     open_blocks: dict[int, str] = {}
@@ -207,7 +206,7 @@ def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
 
 
 def _block_begins(line: str) -> Iterator[tuple[int, str]]:
-    """The column, from 0, and the word of each block that may begin in a line: several after the dash of an item."""
+    """The column, from 0, and the first word of each block that may begin in a line: several after an item's dash."""
     position = 0
     while found := _BLOCK_BEGIN.match(line, position):
         yield found.start(1), found[1]
@@ -265,12 +264,12 @@ def data_of(root: yaml.Node | None) -> Any:
     try:
         return None if root is None else yaml.SafeLoader("").construct_document(root)
     except (ValueError, TypeError, LookupError, OverflowError) as error:
-        # Such as a number with no digits or with thousands, an invalid date, or a list as a key.
+        # Causes include a number without digits or with thousands of digits, an invalid date, and a list as a key.
         raise yaml.YAMLError(str(error)) from error
 
 
 def yaml_dump(data: Any) -> str:
-    """Data as readable YAML, with its order kept."""
+    """Write data as readable YAML, in the given order."""
     return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=120)
 
 
