@@ -4,8 +4,9 @@
         for recorded in bag.messages(topics):
             ...
 
-The formats are ROS 1, and ROS 2 as sqlite3 or MCAP, with or without compression. Only the index is held in memory.
-Payloads are returned as recorded, without decoding. `definitions_in` returns the definitions that a bag contains.
+The formats are ROS 1 bags, and ROS 2 bags as sqlite3 or MCAP, with or without compression. Only a bag's index is held
+in memory. Payloads are returned as recorded, without decoding. `definitions_in` returns the definitions that a bag
+contains.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ BAGS = "a bag is a .bag of ROS 1, or a folder, .mcap or .db3 of ROS 2"
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _METADATA = "metadata.yaml"
 _ROS1_MAGIC = b"#ROSBAG"
-# What rosbags reports of a damaged bag, and the remedy.
+# The errors that rosbags reports for a damaged bag, and the remedy for each.
 _REMEDIES = {
     "not indexed": "it was not closed: rosbag reindex {path}",
     "index looks damaged": "it is cut off: rosbag reindex {path}",
@@ -64,7 +65,7 @@ class Form(Enum):
 class Stream(NamedTuple):
     """The messages of one topic and one type, with the signature and definition that the bag gives for the type.
 
-    Signature and definition are empty if the bag does not contain them. The definition is a joint text (see
+    The signature and the definition are empty if the bag does not contain them. The definition is a joint text (see
     `message/joint.py`).
     """
 
@@ -123,21 +124,21 @@ class BagDefinitions:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a bag, judged by its name or, for a folder, by its contents."""
+    """Whether a path is a bag, judged by the file's name or the folder's contents."""
     if path.is_dir():
         return (path / _METADATA).is_file() or any(file.suffix in _SUFFIXES[1:] for file in path.iterdir())
     return path.suffix in _SUFFIXES and path.is_file()
 
 
 def bag_files(path: Path) -> list[Path]:
-    """The files of a bag: those in its folder (ROS 2), or the file itself."""
+    """The files of a bag: all files in its folder (ROS 2), or the file itself."""
     return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
 def definitions_in(path: Path) -> BagDefinitions:
-    """The definitions of messages in a bag, of which only the index is read. Raises `InputError`.
+    """Return the message definitions in a bag; reads only the bag's index. Raises `InputError`.
 
-    Types without a definition in ROS's own language are omitted.
+    Types without a definition in ROS's `.msg` language are omitted.
     """
     files = bag_files(path)
     with in_part(files):
@@ -157,7 +158,7 @@ def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> Ba
     with open_bag(path) as bag:
         for stream in bag.streams:
             if stream.definition:
-                with suppress(InputError):  # a type that no specification can name
+                with suppress(InputError):  # a type whose name is not allowed in a specification
                     for name, text in separate_texts(parse_name(stream.type), stream.definition).items():
                         texts.setdefault(name, {})[text] = None
         return BagDefinitions(bag.form.ros, {name: tuple(found) for name, found in texts.items()})
@@ -191,7 +192,7 @@ def _readers(path: Path) -> list[Reader]:
 
 
 def _check_journals(path: Path) -> None:
-    """Raise `ValueError` if SQLite has not written all messages to the file yet: rosbags would miss them."""
+    """Raise `ValueError` if SQLite has not yet written all messages to the file: rosbags would miss the others."""
     for file in path.glob("*.db3") if path.is_dir() else [path]:
         journal = file.with_name(f"{file.name}-wal")
         if journal.exists() and journal.stat().st_size:

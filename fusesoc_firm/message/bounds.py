@@ -1,7 +1,7 @@
 """Limits the size of messages, checked on the definitions before any further work.
 
-Nesting multiplies: a few lines of text can define a huge message. Real messages stay far below the limits: the largest
-of 5,900 that were counted have 17 levels, 1,982 fields and 6,049 bytes.
+Because of nesting, a few lines of text can define a huge message. Real messages stay far below the limits: among 5,900
+messages, the maxima are 17 levels, 1,982 fields and 6,049 bytes.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ _COUNT_BYTES = 4
 class Extent:
     """The size of a message with all nested messages expanded.
 
-    `levels` is 1 for a message without nested messages. `fields` includes those of nested messages; an array counts
-    once. `nodes` also counts each element of a fixed array, unless the elements are numbers. `bytes` is the size on the
-    wire with empty strings and one element in each variable array, without padding.
+    `levels` is 1 for a message without nested messages. `fields` includes the fields of nested messages; an array
+    counts once. `nodes` also counts each element of a fixed array, unless the elements are numbers. `bytes` is the size
+    on the wire with empty strings and one element in each variable array, without padding.
     """
 
     levels: int = 0
@@ -48,7 +48,7 @@ class Extent:
     bytes: int = 0
 
     def joined(self, other: Extent) -> Extent:
-        """The extent of both, side by side."""
+        """The extent of both messages, one after the other."""
         return Extent(
             max(self.levels, other.levels),
             self.fields + other.fields,
@@ -57,7 +57,7 @@ class Extent:
         )
 
 
-# The limits, each with its name in messages.
+# The limits, each with its name in error messages.
 _BOUNDS = {
     "levels": (MOST_LEVELS, "levels of messages within messages"),
     "fields": (MOST_FIELDS, "fields, with those of all messages within"),
@@ -69,8 +69,8 @@ _BOUNDS = {
 def check_extents(definitions: Definitions, known: MutableMapping[MessageName, Extent]) -> None:
     """Raise `InputError` for the first message that is too large, at the field that exceeds the limit.
 
-    `definitions` lists each message after its nested messages. `known` holds the extents of messages checked earlier;
-    the new extents are added to it.
+    `definitions` lists each message after its nested messages. `known` holds the extents of previously checked
+    messages, and receives the new extents.
     """
     for name, definition in definitions.items():
         if name not in known:

@@ -1,4 +1,4 @@
-"""The rules of `.msg` files in ROS 1 and ROS 2: one table each, so that the parser needs no special cases.
+"""The rules for `.msg` files in ROS 1 and ROS 2: one table each, so that the parser needs no special cases.
 
 ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few places where FIRM
 accepts more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fusesoc_firm.message.model import MessageName
 from fusesoc_firm.text.naming import LONGEST_TEXT
 
-LARGEST_SIZE = 2**32 - 1  # counts of elements and characters are uint32 on the wire
+LARGEST_SIZE = 2**32 - 1  # element and character counts are uint32 on the wire
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class NameRule:
 
 @dataclass(frozen=True)
 class Dialect:
-    """The rules of one version. `integer_ranges` holds the smallest and largest legal values."""
+    """The rules of one ROS version. `integer_ranges` holds the smallest and largest legal values."""
 
     title: str
     package_name: NameRule
@@ -62,10 +62,10 @@ class Dialect:
     has_defaults: bool
     has_integer_prefixes: bool
     has_quoted_strings: bool
-    # A string constant of ROS 1 takes the rest of the line, including `#`.
+    # A ROS 1 string constant takes the rest of the line, including `#`.
     has_comments_behind_strings: bool
     smallest_array: int
-    # The text between a service's name and `Request`; and whether `pkg/msg/Type` is a type.
+    # The text between a service's name and `Request`, and whether `pkg/msg/Type` is a type.
     joint: str
     has_long_types: bool
 
@@ -94,7 +94,7 @@ _LOWER_SNAKE = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
 _LOWER_SNAKE_TEXT = "lower-case letters, digits and single '_' between them and starts with a letter"
 _UPPER_SNAKE = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
 _UPPER_SNAKE_TEXT = "upper-case letters, digits and single '_' between them and starts with a letter"
-# The suffixes are those of the messages that ROS 2 derives from services and actions.
+# The suffixes end the names of messages that ROS 2 derives from services and actions.
 _UPPER_CAMEL = re.compile(
     r"[A-Z][A-Za-z0-9]*(?:_(?:Request|Response|Event|Goal|Result|Feedback|FeedbackMessage|SendGoal|GetResult))*"
 )

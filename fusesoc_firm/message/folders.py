@@ -25,13 +25,13 @@ InterfaceFiles = dict[InterfaceKind, dict[MessageName, list[Path]]]
 
 
 def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_SUFFIXES) -> InterfaceFiles:
-    """All files below a folder, by kind and name; a name with several files has all of them.
+    """All interface files below a folder, by kind and name; a name maps to all files that define it.
 
     The suffix of a file determines its kind.
 
-    A file belongs to the package of the nearest `package.xml` above it. Without one, it belongs to the folder above
-    `msg/`, `srv/` or `action/` or, in a flat layout, to its own folder. Hidden folders (`.git`) and folders with a
-    build tool's ignore marker are skipped.
+    A file belongs to the package of the nearest `package.xml` in its parent folders. Without a `package.xml`, the
+    package is the folder above `msg/`, `srv/` or `action/` or, in a flat layout, the file's folder. Hidden folders
+    (`.git`) and folders with a build tool's ignore marker are skipped.
     """
     found: InterfaceFiles = {kind: {} for kind in _KINDS}
     packages: dict[Path, str] = {}
@@ -44,12 +44,12 @@ def interface_files(folder: Path, suffixes: Mapping[str, InterfaceKind] = _ROS_S
 
 
 def ros1_folders(environment: Mapping[str, str]) -> list[Path]:
-    """The folders of a sourced ROS 1 in its order of precedence; missing ones are skipped, as in ROS."""
+    """The folders of a sourced ROS 1, in ROS's order of precedence; missing folders are skipped, as in ROS."""
     return [path for path in _entries(environment.get("ROS_PACKAGE_PATH", "")) if path.is_dir()]
 
 
 def ros2_folders(environment: Mapping[str, str]) -> list[Path]:
-    """The folders of a sourced ROS 2 in its order of precedence; missing ones are skipped."""
+    """The folders of a sourced ROS 2, in ROS's order of precedence; missing folders are skipped."""
     prefixes = _entries(environment.get("AMENT_PREFIX_PATH", ""))
     return [share for prefix in prefixes if (share := prefix / "share").is_dir()]
 

@@ -1,6 +1,6 @@
 """Converts a message with its nested messages to one text, as in bags and ROS 1 connections, and back.
 
-Lines of 80 `=` separate the definitions; each except the first begins with `MSG: ` and its name.
+Lines of 80 `=` separate the definitions. Each definition except the first begins with `MSG: ` and the message's name.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def separate_texts(name: MessageName, text: str) -> dict[MessageName, str]:
 
 
 def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | None:
-    """The signature of a message defined by a joint text; None if the text is faulty or incomplete."""
+    """The signature of the message that a joint text defines; None if the text is faulty or incomplete."""
     faults = Diagnostics()
     parse = ros.parse
     try:
@@ -50,7 +50,7 @@ def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | No
 
 
 def _inner_first(definitions: Definitions) -> Iterable[MessageName]:
-    """The names, each after those of its nested messages. Raises `CycleError`."""
+    """The names, each after the names of its nested messages. Raises `CycleError`."""
     within = {
         name: [nested for field in definition.fields if (nested := nested_message(field.type))]
         for name, definition in definitions.items()

@@ -1,6 +1,6 @@
 """Finds definitions: in the user's folders first, then in a sourced ROS, then in the distributions of rosbags.
 
-A library reads and parses each definition once, when it is requested. It reads no environment variable itself, so the
+A library reads and parses each definition once, on request. The library itself reads no environment variables, so the
 same arguments and files give the same definitions.
 """
 
@@ -26,7 +26,7 @@ from fusesoc_firm.store.reads import Input, Part
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, byte_place, fail, nearest
 from fusesoc_firm.text.files import read_regular
 
-# Where users name additional places.
+# The means by which users name additional places.
 _FURTHER = "; further places: 'paths' of the specification or core, --path"
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
@@ -44,13 +44,13 @@ class _Source:
 
 
 class MessageLibrary:
-    """All messages that one middleware knows, including those of services and actions.
+    """All messages that one middleware knows, including the messages of services and actions.
 
     `paths` are folders and bags in order of precedence. `environment` is a mapping like `os.environ`; None ignores an
     installed ROS. `store` names the distribution of last precedence (`noetic`, `jazzy`, ...). A message is taken from
-    the first place that has it; within a place, a `.msg` file takes precedence over messages derived from a `.srv` or
-    `.action` file. Raises `InputError` for a folder that is missing or holds no file of any middleware, and for a bag
-    without definitions.
+    the first place that contains it; within a place, a `.msg` file takes precedence over messages derived from a `.srv`
+    or `.action` file. Raises `InputError` for a folder that is missing or holds no file of any middleware, and for a
+    bag without definitions.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class MessageLibrary:
         return self._store.text(name).encode()
 
     def files(self, names: Iterable[MessageName]) -> list[Input]:
-        """The files of these messages, in the order of names; messages of a distribution have none.
+        """The files of these messages, in the order of names; messages in a distribution have no files.
 
         For a bag, only the part that defines the message counts.
         """
@@ -161,7 +161,7 @@ class MessageLibrary:
 
     @cached_property
     def _has_events(self) -> bool:
-        # Only for services: loading the distribution takes time, which messages of ROS 1 need not spend.
+        # Only for services: loading the distribution takes time, which ROS 1 messages do not need to spend.
         return self.ros is ROS2 and (EVENT_INFO in self._messages or EVENT_INFO in self._store.names)
 
     def _is_message(self, name: MessageName) -> bool:
@@ -184,7 +184,7 @@ class MessageLibrary:
         self._places = [*places, *self._places]
 
     def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> dict[MessageName, _Source]:
-        """The definitions in a bag; if `path` is not a bag, it must serve the library of another middleware."""
+        """The definitions in a bag; a `path` that is not a bag must serve another middleware's library."""
         # Imported only for bags: rosbags' readers are slow to import.
         from fusesoc_firm.message.bag_reader import definitions_in, is_bag
 
@@ -212,7 +212,7 @@ class MessageLibrary:
         self._sources |= {name: _Source(tuple(paths)) for name, paths in files[InterfaceKind.MESSAGE].items()}
 
     def _parse(self, name: MessageName) -> None:
-        """Parse the definition of a message into `_parsed`, with all other messages of the same file."""
+        """Parse the definition of a message, and all other messages in the same file, into `_parsed`."""
         faults = Diagnostics()
         source = self._sources.get(name)
         interface = source.interface if source else None
@@ -230,7 +230,7 @@ class MessageLibrary:
             else:
                 found = {name: self.ros.parse(text, name, self.ros, file, faults)}
         for each in interface.messages if interface else (name,):
-            # One of a service's messages may have its own `.msg` file, which takes precedence.
+            # A service's message may also have a separate `.msg` file, which takes precedence.
             if self._sources.get(each) is source:
                 self._parsed[each] = (found.get(each), faults)
 
@@ -276,7 +276,7 @@ class MessageLibrary:
         return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}{_FURTHER}"
 
     def _nearest(self, name: MessageName) -> str:
-        """The likeliest meaning: the same type in another package, a misspelt primitive, or a similar name."""
+        """The most likely meaning: the same type in another package, a misspelt primitive, or a similar name."""
         same_type = [known for known in self.names() if known.name == name.name]
         if same_type:
             return str(same_type[0])
@@ -325,7 +325,7 @@ def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, stor
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
-    """The text of the files; adds a fault if one cannot be read, differs from the first, or is not UTF-8."""
+    """The text of the files; adds a fault if a file cannot be read, differs from the first, or is not UTF-8."""
     contents = [_content(path, faults) for path in paths]
     if faults.found:
         return ""

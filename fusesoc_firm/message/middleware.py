@@ -18,7 +18,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 class Store(Protocol):
-    """Definitions that need no file of the user; `title` names the store."""
+    """Definitions that need no user files; `title` names the store."""
 
     title: str
 
@@ -43,7 +43,7 @@ class Parse(Protocol):
 
 
 class Signature(Protocol):
-    """Computes a word that is equal on both ends of a topic if they use the same message."""
+    """Computes a word that is equal at both ends of a topic if both use the same message."""
 
     def __call__(
         self,
@@ -56,13 +56,13 @@ class Signature(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Middleware:
-    """All properties of a middleware. Each has one value, which is compared by identity.
+    """All properties of a middleware. Each middleware has one value, which is compared by identity.
 
     `title` is its name in comments and messages, `number` its number in options and reports, and `words` are its names
-    in users' files. `suffixes` are those of the files that define its messages, without the dot. `folders` returns the
-    places of these files in an environment. `store` returns the definitions of one of `distributions`, or of the
-    default for None; it raises `InputError` for any other name. `builtin_types` lists, for hints, the types that are
-    not messages. `aliases` maps former names of messages to present ones: both are the same message.
+    in users' files. `suffixes` are the suffixes of the files that define its messages, without the dot. `folders`
+    returns the places of these files in an environment. `store` returns the definitions of one of `distributions`, or
+    of the default for None; it raises `InputError` for any other name. `builtin_types` lists, for hints, the types that
+    are not messages. `aliases` maps former names of messages to current names; both mean the same message.
     """
 
     number: int
@@ -84,11 +84,11 @@ class Middleware:
         return self.title
 
     def __hash__(self) -> int:
-        """The same in every process, so that the order of sets is, too."""
+        """Return a hash that is the same in every process, so that the order of sets is the same, too."""
         return self.number
 
     def __reduce__(self) -> tuple[Callable[[int], Middleware], tuple[int]]:
-        """Unpickle to the value of the receiving process."""
+        """Unpickle to the receiving process's value."""
         return middleware_of, (self.number,)
 
 

@@ -1,7 +1,7 @@
 """The message model, the first stage: a definition as its author wrote it.
 
-Wire layout (`frame`) and hardware (`converter`) are unknown here. All values are frozen, so a definition can be a
-dictionary key and can be shared.
+This module knows neither the wire layout (`frame`) nor the hardware (`converter`). All values are frozen, so a
+definition can be a dictionary key and can be shared.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Text with its position, so that an error can point at any part of a line."""
+"""Text with a position, so that an error can point to any part of a line."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Piece:
         return self.part(0, len(before)).strip(), self.part(len(before) + len(found)).strip()
 
     def split_word(self) -> tuple[Piece, Piece]:
-        """The first word and the rest, stripped."""
+        """Return the first word and the rest, stripped."""
         blanks = _BLANKS.search(self.text)
         return self.partition(blanks.group()) if blanks else (self, self.part(len(self.text)))
 

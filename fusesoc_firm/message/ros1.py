@@ -1,4 +1,4 @@
-"""ROS 1: its serialisation is little-endian, without alignment and prefix (dissertation, section 3.3)."""
+"""ROS 1: the serialisation is little-endian, without alignment or prefix (dissertation, section 3.3)."""
 
 from functools import partial
 from types import MappingProxyType

@@ -49,7 +49,7 @@ _ROS2_ACTION_EVENTS: _Wrappers = {
 
 @dataclass(frozen=True)
 class Interface:
-    """A service or an action. `has_events` adds ROS 2's service events, which contain an `EVENT_INFO`."""
+    """A service or an action. `has_events` adds ROS 2's service events, which contain `EVENT_INFO`."""
 
     name: MessageName
     kind: InterfaceKind
@@ -62,7 +62,7 @@ class Interface:
 
     @property
     def messages(self) -> tuple[MessageName, ...]:
-        """The names of its messages; those that its file defines come first."""
+        """The names of the messages; the messages that the file defines come first."""
         return self._sections + tuple(self._suffixed(suffix) for suffix in self._wrappers)
 
     @property
@@ -73,11 +73,11 @@ class Interface:
 
     @property
     def has_signature(self) -> bool:
-        """Whether its version of ROS defines a signature: ROS 2 has no hashes before events."""
+        """Whether the ROS version defines a signature: ROS 2 distributions without service events have no hashes."""
         return self.ros is ROS1 or self.has_events
 
     def parse(self, text: str, file: str, diagnostics: Diagnostics) -> dict[MessageName, MessageDefinition]:
-        """Parse the text of its file into messages; faults are added to `diagnostics`, and valid parts are returned."""
+        """Parse the file's text into messages; faults are added to `diagnostics`, and valid parts are returned."""
         sections = parse_sections(text, self._sections, self.ros, file, diagnostics)
         wrappers = [self._wrapper(suffix, wrapper, file) for suffix, wrapper in self._wrappers.items()]
         return {message.name: replace(message, kind=self.kind) for message in (*sections, *wrappers)}

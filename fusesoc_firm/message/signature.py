@@ -57,11 +57,11 @@ def signature(name: MessageName, definitions: Definitions, kind: InterfaceKind =
 
 
 def md5(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The MD5 sum of a message, service or action of ROS 1: 32 hexadecimal digits.
+    """The MD5 sum of a ROS 1 message, service or action: 32 hexadecimal digits.
 
     `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
-    KeyError). An action has no sum of its own; the sum of its `...Action` message, which contains the other six,
-    replaces it.
+    KeyError). ROS 1 defines no sum for an action; the sum of the `...Action` message, which contains the other six
+    messages, replaces it.
     """
 
     @cache
@@ -90,7 +90,7 @@ def _md5_of(text: str) -> str:
 
 
 def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The hash of a message, service or action of ROS 2: `RIHS01_` and 64 hexadecimal digits.
+    """The hash of a ROS 2 message, service or action: `RIHS01_` and 64 hexadecimal digits.
 
     `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
     KeyError).

@@ -1,4 +1,4 @@
-"""The definitions in rosbags: those of every ROS distribution, so that common messages do not require ROS."""
+"""The definitions in rosbags, which cover every ROS distribution, so that common messages do not require ROS."""
 
 from __future__ import annotations
 

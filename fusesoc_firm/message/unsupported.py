@@ -1,7 +1,7 @@
-"""Features of other definition languages that `.msg` lacks, each with its name and the equivalent in `.msg`.
+"""Features of other definition languages that `.msg` lacks, each with a name and the equivalent in `.msg`.
 
-docs/explanation/frames.md gives each a place in a Frame. None of them is legal in ROS 1 or ROS 2: both reference
-parsers refuse each form, and a word is looked up only if no message can have, or has, that name.
+docs/explanation/frames.md describes how a Frame could represent each feature. No feature is legal in ROS 1 or ROS 2:
+both reference parsers reject every form, and a word is looked up only if no message has, or can have, that name.
 """
 
 from __future__ import annotations

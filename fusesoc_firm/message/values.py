@@ -1,4 +1,4 @@
-"""Parses the values of constants and defaults, and checks them against the range of their type."""
+"""Parses the values of constants and defaults, and checks them against the ranges of their types."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def _integer(text: str, kind: PrimitiveType, dialect: Dialect) -> int:
 
 def _whole_number(text: str, dialect: Dialect) -> int:
     try:
-        return int(text)  # decimal first: both references read `010` as ten
+        return int(text)  # decimal first: both reference parsers read `010` as ten
     except ValueError:
         if not dialect.has_integer_prefixes:
             raise

@@ -19,7 +19,7 @@ class WireType:
 
     @property
     def bits(self) -> int:
-        """The bits of an element at a converter's port: a bool has one bit there although it is a byte on the wire."""
+        """The width of an element at a converter's port: a bool has one bit at the port, but one byte on the wire."""
         return 1 if self.name == "bool" else 8 * self.size
 
 
@@ -54,7 +54,7 @@ class WireRules:
     `scalars` maps each primitive with one value to its wire type; `compounds` lists the named parts of a primitive that
     is sent as several values (ROS 1's `time`). `max_alignment` is 1 if nothing is aligned; alignment offsets count from
     the end of `prefix`. `empty_bytes` is the serialised form of a message without fields. `string_terminator` is the
-    number of zeros that end a string and are part of its count (a wstring has none).
+    number of zeros that end a string and are included in the count (a wstring has none).
     """
 
     scalars: MappingProxyType[str, WireType]

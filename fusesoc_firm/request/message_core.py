@@ -1,8 +1,8 @@
 """Generates cores that carry message definitions for other cores: the generator `firm_messages`.
 
-A generator is given only the requesting core's folder. But FuseSoC runs the generators of a core after those of its
-dependencies, each in a folder of its own, side by side. So a message core has its definitions generated, that is,
-copied, and a core that lists it in `messages` finds them next to its own folder (`plugin.run`).
+A generator is given only the requesting core's folder. But FuseSoC runs a core's generators after the generators of its
+dependencies, each in a separate adjacent folder. So the generator copies a message core's definitions, and a core that
+lists the message core in `messages` finds the copies in an adjacent folder (`plugin.run`).
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from fusesoc_firm.text.diagnostics import SourceRef, fail
 
 
 def folders(request: Request) -> list[Path]:
-    """The folders with a core's messages: its own, then those of the cores that it lists."""
+    """The folders with a core's messages: the core's own folders, then the folders of the cores that it lists."""
     paths = request.parameters["paths"] or []
     assert isinstance(paths, list)
     return [*(request.files_root / path for path in paths), *request.message_folders.of(request.listed("messages"))]
 
 
 def load(request: Request) -> LoadedRequest:
-    """The definitions as a core, one folder per package, including those of the listed cores."""
+    """Load the definitions as a core, with one folder per package, including the definitions of the listed cores."""
     found = list(_files(request))
     # The messages are not parsed.
     return LoadedRequest(request, [path for _, path in found], lambda: _core(request, found), list)

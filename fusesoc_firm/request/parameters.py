@@ -1,4 +1,4 @@
-"""Defines the parameters of the generators, and checks those that a core gives.
+"""Defines the parameters of the generators, and checks the parameters that a core gives.
 
 A fault is reported at its place in the requesting `.core` file.
 """
@@ -23,10 +23,10 @@ _TYPES: dict[str, tuple[type, str]] = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter: `type` and `meaning` appear in the generator's usage text, `bounds` are its limits, both legal.
+    """A parameter: `type` and `meaning` appear in the generator's usage text, `bounds` are the inclusive limits.
 
     `rule` describes the legal texts and tests a text. A parameter that is neither given nor required has its `default`.
-    It may replace others (`replaces`): these are then neither required nor allowed.
+    A parameter may replace others (`replaces`); the replaced parameters are then neither required nor allowed.
     """
 
     name: str
@@ -79,7 +79,7 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
 
 
 def _fault(parameter: Parameter, value: object) -> str:
-    """What `value` should be but is not, or ""."""
+    """Return what `value` should be; "" if the value is valid."""
     expected, words = _TYPES[parameter.type]
     # Exact types, since in Python a bool is an integer.
     if type(value) is not expected or (isinstance(value, list) and not all(type(item) is str for item in value)):

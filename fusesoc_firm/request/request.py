@@ -1,6 +1,6 @@
-"""The data between FuseSoC's generator call and the stages: a request goes in, a generated core comes out.
+"""The data between FuseSoC's generator call and the stages, which convert a request to a generated core.
 
-It is independent of the stages, so `converter` and `system` can return what `plugin` writes.
+This module is independent of the stages, so `converter` and `system` can return the values that `plugin` writes.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class MessageFolders:
         self._find = find
 
     def of(self, cores: Mapping[str, SourceRef | None]) -> list[Path]:
-        """The folders of some cores, each with its place. Raises `InputError` for an unknown one."""
+        """The folders of some cores, each with its place. Raises `InputError` for an unknown core."""
         for name, source in cores.items():
             if name not in self.found:
                 self.found[name] = self._find({name: source})
@@ -87,8 +87,8 @@ class Request:
 class GeneratedFile:
     """A file of a generated core.
 
-    `file_type` is FuseSoC's (`vhdlSource-93`, `user`, ...), `logical_name` the VHDL library, and `copyto` the file's
-    place in the tool's work folder; "" omits them. An include file is read by other files.
+    `file_type` is FuseSoC's name for the type (`vhdlSource-93`, `user`, ...), `logical_name` the VHDL library, and
+    `copyto` the file's place in the tool's work folder; "" omits the attribute. An include file is read by other files.
     """
 
     content: str | bytes
@@ -131,7 +131,7 @@ def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
 
 
 def _checked(path: str) -> str:
-    """`path`, unless a part exceeds the limit of file systems: entity names are joined from several names."""
+    """Return `path` unless a part exceeds the file systems' limit: entity names combine several names."""
     for part in path.split("/"):
         if (size := len(part.encode())) > _LONGEST_FILE_NAME:
             fail(f"the file '{part[:40]}...' would have a name of {size} bytes; file systems take {_LONGEST_FILE_NAME}")

@@ -31,7 +31,7 @@ class RequestingCore:
 
     @property
     def generator(self) -> str:
-        """The generator that is called; "" if it was not found."""
+        """The name of the called generator; "" if it was not found."""
         section = self.core.section("generate").get(self.called, {}) if self.core else {}
         return str(section.get("generator", ""))
 
@@ -40,15 +40,15 @@ class RequestingCore:
         return self._place(0)
 
     def key(self, parameter: str) -> SourceRef | None:
-        """The place of a parameter's name, otherwise of the instance's."""
+        """The place of a parameter's name or, if unknown, of the instance's name."""
         return self._place(0, "parameters", parameter) or self.instance()
 
     def value(self, parameter: str) -> SourceRef | None:
-        """The place of a parameter's value, otherwise of the instance's name."""
+        """The place of a parameter's value or, if unknown, of the instance's name."""
         return self._place(1, "parameters", parameter) or self.instance()
 
     def items(self, parameter: str) -> list[SourceRef]:
-        """The place of each item of a list; empty if it was not found."""
+        """The place of each item in a list; empty if the list was not found."""
         found = self._item("parameters", parameter)
         if self.core is None or not found or not isinstance(found[1], yaml.SequenceNode):
             return []

@@ -34,7 +34,7 @@ _PACKAGE_FOLDERS = ("site-packages", "dist-packages")
 
 @cache
 def _apart() -> tuple[str, ...]:
-    """Folders that count separately. `sysconfig` reads files, so this must be called before the hook calls it."""
+    """Folders that count separately. `sysconfig` reads files, so call this function before the hook needs it."""
     paths = sysconfig.get_paths()
     return (*_MACHINE, str(PACKAGE), *(paths[name] for name in _PATHS_OF_PYTHON), sys.executable)
 

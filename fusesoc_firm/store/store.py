@@ -83,7 +83,7 @@ class Store:
     limit: int
 
     def obtain(self, key: Key, build: Callable[[], Files], is_current: Callable[[], bool] = lambda: True) -> Entry:
-        """The files of a key: from the store if they are there undamaged, otherwise from `build`, and then stored.
+        """Return the files of a key: undamaged files from the store, or else the files from `build`, which are stored.
 
         Files are stored only if the key `is_current` after `build`: otherwise an input changed during the build.
         Concurrent processes that need the same key wait for the first of them. Exceptions from `build` propagate. If

@@ -1,7 +1,7 @@
 """Makes Ctrl-C work in our commands, however the process was started.
 
-A script's shell makes background commands (`make test &`) ignore SIGINT, and so do some CI runners. All programs below
-inherit this, and Python keeps it.
+A script's shell makes background commands (`make test &`) ignore SIGINT, and so do some CI runners. All child programs
+inherit this setting, and Python keeps it.
 """
 
 from __future__ import annotations

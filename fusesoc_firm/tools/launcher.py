@@ -1,12 +1,12 @@
 """Starts the programs of a build for Edalize, like `firm tool`.
 
-Edalize's makefiles put the launcher before each program. It finds a program on the path or as YoWASP's package from
-PyPI, reports how to install a missing one, and records each program that ran in the build's manifest. It removes the
-output of a failed program: otherwise make would accept it when started again, such as the layout that nextpnr writes
-before it finds that the clock is too slow.
+Edalize's makefiles put the launcher before each program. The launcher finds a program on the path or as YoWASP's
+package from PyPI, reports how to install a missing program, and records in the build's manifest each program that ran.
+It removes the output of a failed program, such as the layout that nextpnr writes before it finds that the clock is too
+slow. Otherwise make would accept this output when started again.
 
-`generators/launcher.mk` is the GNUmakefile of a build. Unless another launcher is set, it uses the `firm_launcher.sh`
-next to it, which starts this module for the first run of each program in a build.
+`generators/launcher.mk` is the GNUmakefile of a build. Unless another launcher is set, the makefile uses the adjacent
+`firm_launcher.sh`, which starts this module for the first run of each program in a build.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NOTED = "FIRM_NOTED"
 
 
 def launch(program: str, arguments: Sequence[str]) -> int:
-    """Run a program to its end, and return its exit status. Raises `InputError` if it is not installed."""
+    """Run a program until it ends, and return the exit status. Raises `InputError` if it is not installed."""
     path = find(program)
     if path is None:
         fail(f"the program '{program}' is not installed", hint=ways(program))
@@ -47,7 +47,7 @@ def launch(program: str, arguments: Sequence[str]) -> int:
 
 
 def _run(command: Sequence[str]) -> int:
-    """Run a command and return its exit status; if this process is terminated, as by make, so is the command."""
+    """Run a command and return the exit status; if this process is terminated, as by make, so is the command."""
     program: subprocess.Popen[bytes] | None = None
     is_wanted = True
 
@@ -76,13 +76,13 @@ def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
 
 
 def starts_everything() -> bool:
-    """Whether this package starts the build's programs, not a launcher that may find them elsewhere."""
+    """Whether this package starts the build's programs, rather than a launcher that may find them elsewhere."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
     return not words or words[-1] == "tool"
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The same as `firm tool`, without loading other commands, since a build starts a dozen programs."""
+    """Run `firm tool` without loading the other commands, since a build starts a dozen programs."""
     accept_interrupts()
     noted = os.environ.pop(_NOTED, "")
     try:

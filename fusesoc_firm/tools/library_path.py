@@ -1,9 +1,10 @@
 """The paths of this package's FuseSoC libraries: one of reusable cores and generators, one of demo systems.
 
 In a wheel the folders hold the files; in a checkout they contain relative links to `cores`, `generators` and `specs`.
-Either way they hold nothing else: FuseSoC takes every `.core` below a library's folder, so a project that adds one
-never finds remains of a build or a virtual environment in the checkout. `FUSESOC_IGNORE` next to them keeps them out of
-all other libraries, such as that of a project whose folder contains its virtual environment.
+In both cases they hold nothing else, because FuseSoC takes every `.core` file below a library's folder: a project that
+adds one of these libraries never finds the remains of a build or a virtual environment in the checkout. The adjacent
+`FUSESOC_IGNORE` keeps the folders out of all other libraries, such as the library of a project whose folder contains a
+virtual environment.
 """
 
 from __future__ import annotations

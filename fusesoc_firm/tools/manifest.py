@@ -1,7 +1,7 @@
-"""The manifest of a build: the tools that took part in it, stored next to their outputs.
+"""The manifest of a build: the tools that took part in the build, stored next to the tools' outputs.
 
-Every program that has run is added, so an output that is not rebuilt keeps its tools in the list. The file contains no
-dates and no paths, so it is the same wherever the same tools make the same build.
+Every program that has run is added, so the tools of an output that is not rebuilt remain in the list. The file contains
+no dates and no paths, so the same tools and the same build give the same manifest on every machine.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _PACKAGES = ("edalize", "fusesoc", "fusesoc-firm")
 
 
 def note(program: str, folder: Path) -> None:
-    """Record a program that has run in a folder, with the packages that started it, in the folder's manifest.
+    """Record in a folder's manifest a program that has run in this folder, and the packages that started the program.
 
     Unknown programs, such as mkdir, are not recorded. Several programs may be recorded at the same time.
     """

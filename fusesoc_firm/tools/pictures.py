@@ -15,7 +15,7 @@ TEXTS = ("svg", "dot")
 
 
 def check_picture(path: Path | None, form: str | None) -> None:
-    """Raise `InputError` if `path` is not writable, or if its ending contradicts `form`."""
+    """Raise `InputError` if `path` is not writable, or if the file's ending contradicts `form`."""
     if path is None:
         return
     check_output(path, ENDINGS)
@@ -27,7 +27,7 @@ def check_picture(path: Path | None, form: str | None) -> None:
 
 
 def draw(dot: str, path: Path | None, form: str | None) -> None:
-    """Write a graph in DOT as a picture to `path`, or print it in `form`, by default SVG. Raises `InputError`."""
+    """Write a DOT graph as a picture to `path`, or print it in `form`, by default SVG. Raises `InputError`."""
     if path:
         write(path, picture(dot, path.suffix.removeprefix(".")))
     else:
@@ -35,7 +35,7 @@ def draw(dot: str, path: Path | None, form: str | None) -> None:
 
 
 def picture(dot: str, form: str) -> bytes:
-    """A graph in DOT as `svg`, `png`, `pdf` or `dot`. Raises `InputError` if Graphviz is missing."""
+    """Convert a DOT graph to `svg`, `png`, `pdf` or `dot`. Raises `InputError` if Graphviz is missing."""
     if form == "dot":
         return dot.encode()
     try:

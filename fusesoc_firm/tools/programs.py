@@ -1,7 +1,7 @@
 """The programs and Python packages that a build uses: how to find, install and identify each.
 
-A program is found on the path or, as a PyPI package, next to the interpreter. Its facts contain no path, so they are
-the same wherever the same program is installed.
+A program is found on the path or, as a PyPI package, next to the interpreter. The facts of a program contain no path,
+so they are the same wherever the same program is installed.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ class Program:
 
     debian: str = ""
     pypi: str = ""
-    # In words, for programs without a package.
+    # Installation instructions, for programs without a package.
     maker: str = ""
     version: str = "--version"
-    # Its name in the PyPI package, if not yowasp-<name>.
+    # The program's name in the PyPI package, if not yowasp-<name>.
     pypi_name: str = ""
-    # Programs that it starts itself.
+    # Programs that this program starts.
     starts: tuple[str, ...] = ()
 
 
@@ -55,10 +55,10 @@ PROGRAMS: Mapping[str, Program] = {
     "verilator": Program("verilator"),
     "vivado": Program(maker="Vivado, from AMD's site; its settings64.sh puts it into PATH", version="-version"),
     "vvp": Program("iverilog", version="-V"),
-    # Edalize drives it with Tcl, which YoWASP's build does not support.
+    # Edalize controls the program with Tcl, which YoWASP's build does not support.
     "yosys": Program("yosys", version="-V"),
 }
-# The programs that Edalize's tools start, except those that only load or inspect.
+# The programs that Edalize's tools start, except programs that only load or inspect.
 _STARTED: Mapping[str, tuple[str, ...]] = {
     "ecppack": ("ecppack",),
     "gowinpack": ("gowin_pack",),
@@ -76,7 +76,7 @@ def find(program: str) -> Path | None:
     beside = Path(sys.executable).parent
     if found := shutil.which(program):
         return Path(found)
-    # PyPI packages are next to the interpreter, even if its environment is not active.
+    # Programs from PyPI packages are next to the interpreter, even if the virtual environment is not active.
     path = os.pathsep.join([os.environ.get("PATH", os.defpath), str(beside)])
     names = [known.pypi_name or f"yowasp-{program}"] if known.pypi else []
     found = next(filter(None, (shutil.which(name, path=path) for name in names)), None)
@@ -119,7 +119,7 @@ def explanation(programs: Iterable[str]) -> str:
 
 
 def facts_of(program: str, path: Path) -> dict[str, str]:
-    """The identity of a program: the version that it prints, and the SHA-256 of its file or of its package."""
+    """The identity of a program: the version that it prints, and the SHA-256 of the program's file or package."""
     known = PROGRAMS.get(program, Program())
     if package := _package(known, path):
         # A script contains the environment's path, and the program takes seconds to print its version.
@@ -138,7 +138,7 @@ def installed_programs() -> Iterator[tuple[str, Path]]:
 
 
 def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """The versions of these Python packages; for our own, also a digest of its files, which change between versions."""
+    """The versions of these Python packages; for our own, also a digest of the files, which change between versions."""
     found = {name: {"version": metadata.version(name)} for name in names}
     if _OWN in found:
         from fusesoc_firm.store.own_code import digest
@@ -163,7 +163,7 @@ def _package(known: Program, path: Path) -> str:
 
 
 def _version(path: Path, option: str) -> str:
-    """The first line with a digit; some programs print a title before their version."""
+    """Return the first line with a digit; some programs print a title before the version."""
     done = subprocess.run(
         [path, option],
         stdin=subprocess.DEVNULL,

@@ -1,6 +1,6 @@
 """The supported simulators, as Edalize names them: one row each.
 
-A new simulator needs a row here, and one in `programs.PROGRAMS` for each program that it starts.
+A new simulator needs a row here, and a row in `programs.PROGRAMS` for each program that it starts.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 class Live:
     """How to build a simulator that another program starts, and how to start it (docs/reference/transports.md).
 
-    `parameter` precedes `NAME=value` on its command line. If FuseSoC's build produces nothing, the makefile's target
-    `made_by` does. The start command is the line of the makefile's target `run` that begins with `started_by`, or else
-    the program `V<toplevel>`.
+    `parameter` precedes `NAME=value` on the simulator's command line. If FuseSoC's build produces nothing, the
+    makefile's target `made_by` does. The start command is the line of the makefile's target `run` that begins with
+    `started_by`, or else the program `V<toplevel>`.
     """
 
     parameter: str
@@ -25,10 +25,11 @@ class Live:
 
 @dataclass(frozen=True)
 class Simulator:
-    """A simulator: its title, its differences from the others, and the programs that it starts.
+    """A simulator: the title, the differences from other simulators, and the programs that it starts.
 
-    If it does not read VHDL, it gets a netlist in Verilog, which GHDL makes. `options` are those of its flow in
-    Edalize, and `system_verilog` those that SystemVerilog needs. C++ functions need GHDL's own interface (VHPIDIRECT).
+    A simulator that does not read VHDL gets a Verilog netlist from GHDL. `options` are the options of the simulator's
+    flow in Edalize, and `system_verilog` the additional options for SystemVerilog. C++ functions need GHDL's native
+    interface (VHPIDIRECT).
     """
 
     title: str
@@ -73,12 +74,12 @@ SIMULATORS: dict[str, Simulator] = {
 
 
 def default_simulator(*, has_verilog: bool = False, is_live: bool = False) -> str:
-    """The first simulator that can simulate a system, with accelerators in Verilog or without."""
+    """The first simulator that can simulate a system with or without Verilog accelerators."""
     return next(iter(fitting(has_verilog=has_verilog, is_live=is_live)))
 
 
 def fitting(*, has_verilog: bool = False, is_live: bool = False) -> dict[str, Simulator]:
-    """The simulators that can simulate a system, with accelerators in Verilog or without: none reads both languages."""
+    """The simulators that can simulate a system with or without Verilog accelerators; none reads both languages."""
     return {
         name: item
         for name, item in SIMULATORS.items()

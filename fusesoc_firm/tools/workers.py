@@ -26,7 +26,7 @@ Result = TypeVar("Result")
 _CONNECT_SECONDS = 10
 # Protocols without authentication.
 _OPEN_PROTOCOLS = ("", "tcp", "ws")
-# Tasks submitted per worker, so that none is idle between tasks.
+# Tasks submitted per worker, so that no worker is idle between tasks.
 _AHEAD = 4
 
 
@@ -56,9 +56,9 @@ def _finished(pending: dict[Future[Result], Task]) -> Iterator[tuple[Task, Resul
 
 @contextmanager
 def local_workers(jobs: int | None = None) -> Iterator[Workers]:
-    """Processes of this machine, `jobs` or one per core."""
+    """Start processes on this machine: `jobs` of them, or one per processor core."""
     count = jobs or len(os.sched_getaffinity(0))
-    # Spawned: a copy of a process with threads (such as a progress bar's) may hang.
+    # Processes are spawned: a forked copy of a process with threads, such as a progress bar's thread, may hang.
     context = multiprocessing.get_context("spawn")
     executor = ProcessPoolExecutor(count, mp_context=context, initializer=_leave_interrupts_to_the_parent)
     try:
@@ -71,13 +71,13 @@ def local_workers(jobs: int | None = None) -> Iterator[Workers]:
 def cluster_workers(address: str) -> Iterator[Workers]:
     """The workers of the Dask cluster whose scheduler is at `address`, such as tls://10.0.0.1:8786.
 
-    Each end of a connection runs code from the other. With tls:// they authenticate each other by the certificates in
-    Dask's own configuration; without, a warning is printed unless the scheduler is on this machine.
+    Each end of a connection runs code from the other end. With tls://, both ends authenticate each other by the
+    certificates in Dask's configuration. Without tls://, a warning is printed unless the scheduler is on this machine.
 
-    Raises `InputError` if the cluster does not respond, has no workers or unsuitable ones, or is lost.
+    Raises `InputError` if the cluster does not respond, has no suitable workers, or is lost.
     """
     try:
-        # Its type hints are incomplete.
+        # Dask's type hints are incomplete.
         distributed: Any = import_module("distributed")
     except ImportError:
         fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
@@ -127,7 +127,7 @@ def _security(distributed: Any, address: str) -> Any:
 
 
 def _is_here(place: str) -> bool:
-    """Whether the host in `host:port` is this machine's loopback."""
+    """Whether the host in `host:port` is a loopback address."""
     host = place.rpartition(":")[0].strip("[]")
     try:
         return host == "localhost" or ip_address(host).is_loopback
@@ -149,7 +149,7 @@ def _connected(distributed: Any, address: str, security: Any) -> Any:
 
 
 def _check_versions(client: Any, address: str) -> None:
-    """Raise `InputError` unless the workers have our versions: results must be the same on all machines."""
+    """Raise `InputError` unless the workers have our package versions: results must be the same on all machines."""
     found = client.run(_version, on_error="return")
     for worker, version in sorted(found.items()):
         if version != __version__:
