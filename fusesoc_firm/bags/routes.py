@@ -30,7 +30,7 @@ class Route:
 
 
 def renamed(topics: Iterable[AnyTopic], names: Mapping[str, str]) -> list[AnyTopic]:
-    """The topics, with the topics of some blocks renamed to `names`."""
+    """Return the topics, with the topics of some blocks renamed to `names`."""
     return [replace(item, given_name=names.get(item.block, item.given_name)) for item in topics]
 
 
@@ -40,8 +40,8 @@ def routes_of(
     """The route of each stream that has one; either all streams of a topic have a route, or none.
 
     A topic goes to all subscribers with the same topic name. A subscriber whose name is not in the bag takes the only
-    topic of its type, if it is the only such subscriber. `signatures` are those of the system's messages, as far as
-    known. Raises `InputError` with every topic that does not fit.
+    topic of its type, if it is the only such subscriber. `signatures` holds the known signatures of the system's
+    messages. Raises `InputError` with every topic that does not fit.
     """
     return _Routing(bag, subscribers, signatures or {}).routes()
 
@@ -141,7 +141,7 @@ def _meant(topic: Topic) -> MessageName:
 
 
 def _present(name: MessageName, ros: Middleware) -> MessageName:
-    """The present name of a message that may have been renamed."""
+    """The current name of a message that may have been renamed."""
     return ros.aliases.get(name, name)
 
 

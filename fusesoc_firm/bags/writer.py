@@ -1,4 +1,4 @@
-"""Writes bags: each appears when it is complete, and the same messages give the same bytes."""
+"""Writes bags: each bag appears when it is complete, and the same messages give the same bytes."""
 
 from __future__ import annotations
 
@@ -110,9 +110,9 @@ def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterat
 
 
 def _put(made: Path, path: Path) -> None:
-    """Move a bag to its place."""
+    """Move a bag to its destination."""
     if path.suffix in _FILES and made.is_dir():
-        # A ROS 2 bag as a single file: the folder also contains metadata, which the file contains, too.
+        # A ROS 2 bag as a single file: the file also contains the metadata of the folder.
         made = made / f"{path.name}{path.suffix}"
     if path.is_dir():
         shutil.rmtree(path)

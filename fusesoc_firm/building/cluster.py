@@ -1,4 +1,4 @@
-"""Runs builds on the machines of a Dask cluster that share the folder: each is a `firm build` there."""
+"""Runs builds on the machines of a Dask cluster that share the folder: each build is a `firm build` on one machine."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.pool import SHOWN_LINES, Outcome
 from fusesoc_firm.tools.workers import Workers
 
-# The environment variables that workers need; they know the paths of their own programs.
+# The environment variables that workers need; each worker knows the paths of the programs on its machine.
 _PREFIXES = ("FUSESOC", "EDALIZE", "ROS_", "AMENT_")
 _POLL_SECONDS = 0.2
 
 
 @dataclass(frozen=True)
 class _Task:
-    """A build, with the arguments of `firm build`, and a file that exists as long as the build is wanted."""
+    """A build: the arguments of `firm build`, and a file that exists as long as the build is wanted."""
 
     build: Build
     arguments: tuple[str, ...]
@@ -47,7 +47,7 @@ def build_on(workers: Workers, plan: Plan, arguments: Sequence[str]) -> Iterator
     tasks = [_Task(build, tuple(arguments), Path.cwd(), environment, wanted) for build in plan.builds]
     try:
         for task, result in workers.run(_build, tasks):
-            # Its output ends with the last lines of its log.
+            # The output of `firm build` ends with the last lines of the log.
             lines = () if result.status == 0 else tuple(result.output.splitlines()[-SHOWN_LINES:])
             yield Outcome(task.build, result.status == 0, result.seconds, lines)
     finally:

@@ -1,6 +1,6 @@
-"""The cores in FuseSoC's libraries: their parts, and those that an edit affects.
+"""The cores in FuseSoC's libraries: the parts of each core, and the cores that an edit affects.
 
-A core is read for all its targets and flags together, so that nothing that any build uses is missing.
+A core is read for all targets and flags together, so that everything that any build uses is included.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ GRAPH_TEMPLATE = "dot/cores.dot"
 class ProjectCore:
     """A core: its name, its files with the `.core` file first, its dependencies, and its generator calls.
 
-    `names` are those by which others can depend on it, and `depends` are such names: vendor, library and name.
+    `names` are the names by which other cores can depend on this core, and `depends` the names of its dependencies.
+    Each name consists of vendor, library and name.
     """
 
     vlnv: str
@@ -56,7 +57,7 @@ def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
 
 
 def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
-    """The cores that are touched, or depend on such a core, each with the reason, in the order of `cores`.
+    """The cores that are touched or depend on a touched core, each with the reason, in the order of `cores`.
 
     `touches` returns the part of a core that is touched, or None.
     """
@@ -76,7 +77,7 @@ def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str 
 def changed_files(revision: str, folder: Path) -> list[Path]:
     """The absolute paths of the repository's files that differ from a revision, including new and removed ones.
 
-    The repository is the one around `folder`. Raises `InputError` if the repository or the revision is missing.
+    The repository is the one that contains `folder`. Raises `InputError` if the repository or the revision is missing.
     """
     root = Path(_git(folder, "rev-parse", "--show-toplevel").rstrip("\n"))
     # Resolved to a commit, so that a leading dash cannot be read as an option.
@@ -128,7 +129,7 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
 
 
 def configuration() -> Any:
-    """FuseSoC's configuration in the current folder, as its own command reads it."""
+    """FuseSoC's configuration in the current folder, as the command `fusesoc` reads it."""
     from fusesoc.config import Config
 
     return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)
@@ -185,7 +186,7 @@ def _core(vlnv: str, path: Path) -> ProjectCore:
 
 
 def _calls(vlnv: str, core: CoreFile) -> Iterator[GeneratorCall]:
-    """Yield the call of each instance, and another one for each target that changes its parameters."""
+    """Yield the call of each instance, and another call for each target that changes the instance's parameters."""
     known = core.section("generate")
     changes: list[tuple[str, dict[str, Any]]] = [(name, {}) for name in known]
     for target in core.section("targets").values():

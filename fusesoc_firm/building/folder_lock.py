@@ -1,14 +1,14 @@
-"""A lock on a folder of the build root, for one build at a time, on this machine and all that share the folder.
+"""A lock that admits one build at a time to a folder of the build root, on all machines that share the folder.
 
-FuseSoC and the tools that it starts assume exclusive use of a work root. The lock is a file next to it, put in place by
-a hard link. Linking either succeeds or fails, even on network folders, where system locks (`text/file_lock.py`) may
-cover only one machine. The file names the owner. An owner on this machine is gone when its process is; one on another
-machine is gone when it has not touched the file for a while. Only changes of the file's time count, so clocks are not
-compared.
+FuseSoC and the tools that it starts assume exclusive use of a work root. The lock is a file next to the work root, put
+in place by a hard link. Linking is atomic even on network folders, where system locks (`text/file_lock.py`) may cover
+only one machine. The file names the owner. An owner on this machine is gone when its process has ended; an owner on
+another machine is gone when it has not touched the file for a while. Only changes to the file's time count, so clocks
+are not compared.
 
-A lock whose owner is gone is removed under a system lock, so that only one waiting process removes it. If the system
-lock does not work between machines, two of them might remove it at the same instant; one owner then loses its lock, and
-`beat` reports this.
+If a lock's owner is gone, the lock is removed under a system lock, so that only one waiting process removes it. If the
+system lock does not work between machines, two machines might remove the file at the same instant; one owner then loses
+its lock, and `beat` reports this.
 """
 
 from __future__ import annotations
@@ -51,11 +51,11 @@ class FolderLock:
 
     path: Path
     _mine: Owner | None = field(default=None, init=False)
-    # The owner being waited for, the time of its file, and since when both are unchanged.
+    # The owner being waited for, the time of the lock file, and the time since which both are unchanged.
     _watched: tuple[Owner, int, float] | None = field(default=None, init=False)
 
     def acquire(self) -> Owner | None:
-        """Take the lock and return None, or return its present owner at once. Raises `OSError`."""
+        """Take the lock and return None, or return the current owner at once. Raises `OSError`."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         mine = Owner(secrets.token_hex(8), _machine(), os.getpid(), _started(os.getpid()), socket.gethostname())
         new = self.path.with_name(f"{self.path.name}.{mine.token}")

@@ -16,7 +16,7 @@ from fusesoc_firm.building.plan import Build, Plan
 from fusesoc_firm.building.process import build_in_this_process, last_lines
 
 _POLL_SECONDS = 0.2
-# Between the request to end and the kill.
+# The time between the request to end and the kill.
 _PATIENCE_SECONDS = 5.0
 _END_POLL_SECONDS = 0.02
 SHOWN_LINES = 20
@@ -124,7 +124,7 @@ def _end(items: list[_Running]) -> None:
 
 
 def _signal(process: BaseProcess, number: signal.Signals) -> bool:
-    """Signal a build and all its processes; False if none is left."""
+    """Signal a build and all its processes; return False if no process is left."""
     assert process.pid
     try:
         os.killpg(process.pid, number)

@@ -1,7 +1,7 @@
 """Runs one build in a process of its own: FuseSoC's `run`, with all output in a log.
 
-The process is a copy of one in which FuseSoC has already read its libraries. It leads a process group that contains all
-programs it starts, so that they can be ended together; they also end when the parent process does.
+The process is a copy of one in which FuseSoC has already read its libraries. The process leads a process group that
+contains all programs it starts, so that they can be ended together; they also end when the parent process ends.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Answer = Callable[[list[str]], bool]
 def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], alive: tuple[int, int]) -> None:
     """Run a build with the options of `fusesoc run`, and exit with its status.
 
-    `alive` is a pipe that ends when the parent does, once its other end is closed here.
+    `alive` is a pipe that ends when the parent ends, once this process has closed the pipe's other end.
     """
     os.setsid()
     os.close(alive[1])
@@ -40,7 +40,7 @@ def build_in_this_process(fusesoc: Any, build: Build, options: tuple[str, ...], 
 
 
 def save_time(answer: Answer) -> None:
-    """Save FuseSoC two costs for each generated core: a process for its generator, and recompiling a schema.
+    """Save FuseSoC two costs for each generated core: a generator process, and recompiling a schema.
 
     This applies to the process and its copies. It affects only the time: if FuseSoC lacks the names that are replaced
     here, builds take longer.
@@ -51,7 +51,7 @@ def save_time(answer: Answer) -> None:
         edalizer.Launcher = _answering(edalizer.Launcher, answer)
     if hasattr(edalizer, "Core2Parser"):
         edalizer.Core2Parser = cache(edalizer.Core2Parser)
-        # The same call as FuseSoC's, so that copies of the process inherit the result.
+        # This repeats FuseSoC's call, so that copies of the process inherit the result.
         edalizer.Core2Parser(False, allow_additional_properties=False)
 
 

@@ -1,4 +1,4 @@
-"""`firm build`: FuseSoC for many cores and targets at once."""
+"""`firm build`: runs FuseSoC for many cores and targets at once."""
 
 from __future__ import annotations
 

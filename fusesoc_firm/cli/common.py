@@ -1,4 +1,4 @@
-"""The common part of the commands of `firm`: their declarations, and the loading and writing that most of them need."""
+"""Shared parts of the `firm` commands: declarations, and the loading and writing that most commands need."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def add_definitions(parser: argparse.ArgumentParser) -> None:
 
 
 def add_sources(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that tell where message definitions are."""
+    """Add the arguments that locate message definitions."""
     parser.add_argument(
         "--path",
         type=Path,
@@ -82,7 +82,7 @@ def library_of(arguments: argparse.Namespace, ros: int) -> MessageLibrary:
 def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> LoadedSystem:
     """Load the system of the specification in the arguments, and print its warnings.
 
-    Unless it `needs_sources`, those of its accelerators may be missing.
+    Unless `needs_sources`, the sources of the system's accelerators may be missing.
     """
     from fusesoc_firm.system.message_sources import load_beside
 

@@ -61,7 +61,7 @@ def _live(arguments: argparse.Namespace) -> None:
     description = describe(loaded)
     options = run_options(arguments, arguments.remappings, description, arguments.ros)
     if arguments.trace:
-        # It is opened only after the simulator is built.
+        # The file is opened only after the simulator is built.
         check_output(arguments.trace)
     if arguments.transport:
         opener = at_address(arguments.transport)
@@ -83,7 +83,7 @@ def _draw_trace(arguments: argparse.Namespace) -> None:
 
 
 def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
-    """Convert a table of steps to a table of ways beside it; return the path of the latter."""
+    """Convert a table of steps to an adjacent table of routes; return the path of the table of routes."""
     from fusesoc_firm.node.cpp_trace import write_ways
     from fusesoc_firm.node.description import describe
 

@@ -1,4 +1,4 @@
-"""`firm message`: definitions of messages, their converters, and the verification of these."""
+"""`firm message`: message definitions, their converters, and the verification of the converters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`firm graph`, `firm affected` and `firm lock`: the dependencies between a project's cores, and their inputs."""
+"""`firm graph`, `firm affected` and `firm lock`: the dependencies between a project's cores, and the cores' inputs."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def add_simulator(commands: Any) -> None:
 
 
 def add_simulator_options(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of commands that simulate a system live; `built_simulator` reads them, with `spec`."""
+    """Add the arguments of commands that simulate a system live; `built_simulator` reads these arguments and `spec`."""
     tools, default = [*fitting(is_live=True)], default_simulator(is_live=True)
     parser.add_argument("--tool", choices=tools, default=default, help="default: %(default)s")
     parser.add_argument(

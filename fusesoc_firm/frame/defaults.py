@@ -15,7 +15,7 @@ from fusesoc_firm.message.model import Scalar
 
 
 def default_bytes(node: Fixed) -> bytes:
-    """The bytes of a `Fixed` with all fields at their defaults; fields without one, padding and prefix are zero.
+    """The bytes of a `Fixed` with all fields at their defaults; fields without a default, padding and prefix are zero.
 
     Every element of an array of messages has the defaults of its members.
     """
@@ -35,7 +35,7 @@ def default_elements(leaf: FrameField) -> Iterator[tuple[int, bytes]]:
 
 
 def default_payload(frame: Frame) -> bytes:
-    """The payload of a message of fixed size with all fields at their defaults."""
+    """The payload of a fixed-size message with all fields at their defaults."""
     payload = b"".join(default_bytes(node) for node in frame.nodes if isinstance(node, Fixed))
     return frame.prefix + payload[len(frame.prefix) :]
 
@@ -60,7 +60,7 @@ def encode_used(frame: Frame, message: MessageValue) -> bytes:
 
 
 def completed(frame: Frame, message: MessageValue) -> MessageValue:
-    """The message with missing unused fields added: by their defaults, or as zero or empty."""
+    """Return the message with missing unused fields added: with their defaults, or as zero or empty."""
     filled: MessageValue = _filled(_as_sent(frame.nodes, message, 0), message)
     return filled
 

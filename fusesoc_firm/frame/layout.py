@@ -55,7 +55,7 @@ def frame_of(name: MessageName, definitions: Definitions) -> Frame:
 
 @dataclass
 class _Types:
-    """Properties of types. Each is computed once, since types nest and may occur many times."""
+    """Properties of types. Each property is computed once, since types nest and may occur many times."""
 
     rules: WireRules
     definitions: Definitions
@@ -65,7 +65,7 @@ class _Types:
     def has_fixed_size(self, type_: FieldType) -> bool:
         match type_:
             case ArrayType(element, length):
-                # An array of no strings takes no bytes.
+                # An array without elements takes no bytes.
                 return length == 0 or self.has_fixed_size(element)
             case MessageType(name):
                 if name not in self._fixed:
@@ -86,7 +86,7 @@ class _Types:
     def steady(self, element: ElementType, position: Position, member: Field) -> Position:
         """The smallest set of positions that holds the start of every array element if the first begins at `position`.
 
-        An element starts where the array does, or where the previous element ends.
+        An element starts at the start of the array, or at the end of the previous element.
         """
         while (known := position.joined(self.behind(element, position, member))) != position:
             position = known
@@ -103,7 +103,7 @@ class _Leaf:
     runs: list[Run] = field(default_factory=list)
 
     def add(self, run: Run) -> None:
-        """Add a run, merged with the last one if they are adjacent."""
+        """Add a run, merged with the last run if both are adjacent."""
         last = self.runs[-1] if self.runs else None
         if last and last.offset + last.count * self.type.size == run.offset:
             self.runs[-1] = Run(last.offset, last.count + run.count)
@@ -212,7 +212,7 @@ class _Walk:
     def data(self, kind: DataKind, element: WireType, path: Path, bound: int | None, member: Field) -> None:
         rules = self.types.rules
         terminator = rules.string_terminator if kind is DataKind.STRING else 0
-        # The default of an array of strings belongs to its loop.
+        # The default of a string array belongs to the loop.
         default = None if _is_array_of_texts(member.type) else member.default
         self.align(COUNT_BYTES)
         behind_count = self.position.advanced(COUNT_BYTES)

@@ -36,7 +36,7 @@ class Repeat:
     """Repeat `body` for each element of `part`.
 
     `stride` is the size of each element after the first, at any position: only the padding of the first element depends
-    on the position. It is None if the elements differ because they contain counts of their own.
+    on the position. `stride` is None if the elements differ in size because they contain counts.
     """
 
     part: Data | Loop
@@ -58,24 +58,24 @@ class Length:
 
     @property
     def is_computed(self) -> bool:
-        """Whether the counts of the message's own parts suffice, since no loop's element contains a count."""
+        """Whether the counts of the message's top-level parts suffice, since no loop's element contains a count."""
         return all(term.stride is not None for term in self.terms if isinstance(term, Repeat))
 
     @property
     def minimum(self) -> int:
-        """The bytes of a message whose variable parts are empty."""
+        """The number of bytes in a message with empty variable parts."""
         shortest = _Walk(_shortest).behind(self.terms, 0)
         assert shortest is not None
         return self.prefix + shortest
 
     @property
     def maximum(self) -> int | None:
-        """The bytes of a message whose variable parts are at their bounds; None if a part is unbounded."""
+        """The number of bytes in a message with all variable parts at their bounds; None if a part is unbounded."""
         longest = _Walk(_longest).behind(self.terms, 0)
         return None if longest is None else self.prefix + longest
 
     def of(self, message: MessageValue) -> int:
-        """The bytes of a message. Raises `CodecError` for a part without value and default."""
+        """The number of bytes in a message. Raises `CodecError` for a part without a value or default."""
         size = _Walk(_elements_of).behind(self.terms, 0, _Scope(message, 0))
         assert size is not None
         return self.prefix + size
@@ -88,7 +88,7 @@ def length_of(frame: Frame) -> Length:
 
 
 def sent_length_of(frame: Frame) -> Length:
-    """The length of a payload as a publisher sends it: unused parts have their defaults or are empty."""
+    """The length of the payload that a publisher sends: unused parts have their defaults or are empty."""
     prefix = len(frame.prefix)
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes, is_sent=True)]))
 
@@ -119,7 +119,7 @@ def _gap(node: Data) -> Term:
 
 
 def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
-    """The terms of a part with a constant value; None is an element without a value."""
+    """The terms of a part with a constant value; None means an element without a value."""
     if isinstance(node, Data):
         size = node.element.size
         count = len(value or ()) if node.kind is DataKind.ARRAY else len(units_of(node, value or "")) // size
@@ -153,7 +153,7 @@ def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:
 def _stride(body: tuple[Term, ...]) -> int | None:
     """The size of every element after the first.
 
-    After its widest padding, an element is aligned to the largest of its alignments. It therefore ends at a position
+    After the widest padding, an element is aligned to its largest alignment. The element therefore ends at a position
     from which all following elements are padded alike.
     """
     if any(isinstance(term, Repeat) for term in body):
@@ -174,7 +174,7 @@ class _Walk:
     _grown: dict[tuple[int, int], int | None] = field(default_factory=dict)
 
     def behind(self, terms: Sequence[Term], position: int, value: Any = None) -> int | None:
-        """The position after `terms`; None if it is unlimited."""
+        """The position after `terms`; None if the length is unlimited."""
         for term in terms:
             match term:
                 case Bytes(count):

@@ -29,7 +29,7 @@ COUNT_BYTES = 4
 
 @dataclass(frozen=True)
 class Step:
-    """One name on the path from a message to a field; `count` is None unless it is an array of fixed size.
+    """One name on the path from a message to a field; `count` is None except for a fixed-size array.
 
     A `Loop` does not set `count`: a path within a loop describes one of its elements.
     """
@@ -51,11 +51,11 @@ class Run:
 
 @dataclass(frozen=True)
 class FrameField:
-    """A leaf of the message: all its elements have the same wire type.
+    """A leaf of the message; all elements of a leaf have the same wire type.
 
-    `path` leads from the message to the leaf. Each fixed array on it multiplies the elements, which are numbered in
-    wire order. `runs` gives their positions. If a `Pad` separates the elements, each `Fixed` has a field with this path
-    for its own elements, and `first` is the number of the first of them.
+    `path` leads from the message to the leaf. Each fixed array on the path multiplies the elements, which are numbered
+    in wire order. `runs` gives the positions of the elements. If a `Pad` separates the elements, each `Fixed` has a
+    field with this path for the elements in that `Fixed`, and `first` is the number of the first such element.
     """
 
     path: Path
@@ -146,8 +146,8 @@ class Data:
 class Loop:
     """An array of messages or strings: `body`, repeated for each element.
 
-    `count` is the size of a fixed array, which is not sent. If it is None, a count (uint32) of at most `bound` comes
-    first. Paths in the body begin with the loop's own path.
+    `count` is the size of a fixed array, which is not sent. If `count` is None, a count (uint32) of at most `bound`
+    precedes the elements. Paths in the body begin with the loop's own path.
     """
 
     path: Path
@@ -173,8 +173,8 @@ NameTree = dict[str, "NameTree"]
 class Frame:
     """The layout of a message.
 
-    `prefix` holds the constant bytes before the first field, of which a receiver compares the first `checked_prefix`. A
-    sender may append up to `trailing_bytes` bytes after the last field.
+    `prefix` holds the constant bytes before the first field; a receiver compares only the first `checked_prefix` bytes.
+    A sender may append up to `trailing_bytes` bytes after the last field.
     """
 
     message: MessageName
@@ -186,27 +186,27 @@ class Frame:
 
     @property
     def is_fixed_size(self) -> bool:
-        """Whether the whole payload is one `Fixed`, so that its offsets are those in the payload."""
+        """Whether the whole payload is one `Fixed`, so that offsets in the `Fixed` are offsets in the payload."""
         return all(isinstance(node, Fixed) for node in self.nodes)
 
     @property
     def fields(self) -> tuple[FrameField, ...]:
-        """The leaves of a message of fixed size."""
+        """The leaves of a fixed-size message."""
         return tuple(leaf for node in self._fixed_nodes() for leaf in node.fields)
 
     @property
     def payload_bytes(self) -> int:
-        """The number of bytes in the payload of a message of fixed size."""
+        """The number of bytes in the payload of a fixed-size message."""
         return sum(node.size for node in self._fixed_nodes())
 
     @property
     def frame_bytes(self) -> int:
-        """The number of bytes in the frame of a message of fixed size, including id and length."""
+        """The number of bytes in the frame of a fixed-size message, including id and length."""
         return ID_BYTES + LENGTH_BYTES + self.payload_bytes
 
     @cached_property
     def names(self) -> NameTree:
-        """The name of every field, with the names below it; a field without values is omitted."""
+        """The name of every field, with the names of nested fields; a field without values is omitted."""
         tree: NameTree = {}
         for node in all_nodes(self.nodes):
             for part in node.fields if isinstance(node, Fixed) else () if isinstance(node, Pad) else (node,):

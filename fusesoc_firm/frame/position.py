@@ -1,4 +1,4 @@
-"""Positions in a payload that are known only by their residues modulo the largest alignment."""
+"""Positions in a payload, of which only the residues modulo the largest alignment are known."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Position:
-    """A position whose possible values modulo `modulus` are `residues`; alignments divide `modulus`."""
+    """A position with the possible values `residues` modulo `modulus`; every alignment divides `modulus`."""
 
     modulus: int
     residues: frozenset[int]
@@ -26,13 +26,13 @@ class Position:
         return self._of({residue + -residue % alignment for residue in self.residues})
 
     def repeated(self, size: int, most: int | None) -> Position:
-        """The position after 0 to `most` values of `size` bytes; None means any number of them."""
+        """The position after 0 to `most` values of `size` bytes; None means any number of values."""
         # After `modulus` values the residues repeat.
         largest = self.modulus if most is None else min(most, self.modulus)
         return self._of({residue + number * size for residue in self.residues for number in range(largest + 1)})
 
     def joined(self, other: Position) -> Position:
-        """The position if either of the two is possible."""
+        """The position if both of these positions are possible."""
         return self._of(self.residues | other.residues)
 
     def _of(self, residues: set[int] | frozenset[int]) -> Position:

@@ -50,7 +50,7 @@ def used_part(message: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
 
 
 def _part(value: Any, leaves: Collection[Names]) -> Any:
-    """The part of a value that leads to the leaves; all elements of an array are treated alike."""
+    """The part of a value on the paths to the leaves; all elements of an array are treated alike."""
     if () in leaves:
         return value
     if not isinstance(value, Mapping):
@@ -98,7 +98,7 @@ def _uses(node: Node) -> Iterator[bool]:
 
 
 def _leaves(node: Node) -> Iterator[tuple[Names, bool]]:
-    """The names of a node's own leaves; an array of empty messages is a leaf."""
+    """The names of the leaves in a node, without nested nodes; an array of empty messages is a leaf."""
     if isinstance(node, Fixed):
         yield from ((leaf.names, leaf.is_used) for leaf in node.fields)
     elif not isinstance(node, Pad) and not (

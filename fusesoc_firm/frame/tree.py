@@ -1,4 +1,4 @@
-"""Shows a message as a tree: every field with its type, its bits and its position in the payload."""
+"""Shows a message as a tree: every field with its type, its width in bits and its position in the payload."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class CodecError(ValueError):
 class SignallingNan(float):
     """A signalling NaN of a float32; conversion to a double, Python's float, would make it quiet.
 
-    It prints and calculates like any NaN; `bits` are those on the wire.
+    The value prints and calculates like any NaN; `bits` are the bits on the wire.
     """
 
     bits: int
@@ -44,7 +44,7 @@ class SignallingNan(float):
 
 
 def packed(code: str, values: Sequence[Any]) -> bytes:
-    """The numbers as bytes in sequence; `code` is that of `struct`. Raises `struct`'s errors."""
+    """Pack numbers into bytes, in sequence; `code` is a `struct` format code. Raises `struct`'s errors."""
     data = struct.pack(f"<{len(values)}{code}", *values)
     if code != "f" or SignallingNan not in {*map(type, values)}:
         return data
@@ -54,7 +54,7 @@ def packed(code: str, values: Sequence[Any]) -> bytes:
 
 
 def unpacked(code: str, data: bytes) -> Sequence[Any]:
-    """The numbers in `data`, so that `packed` returns the same bytes."""
+    """Unpack the numbers in `data`, so that `packed` returns the same bytes."""
     numbers = struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data)
     if code != "f" or struct.pack(f"<{len(numbers)}f", *numbers) == data:
         return numbers
@@ -68,7 +68,7 @@ def _is_signalling(word: int) -> bool:
 
 
 def shown(value: object) -> str:
-    """The value for an error's text; long values are shortened."""
+    """The value as shown in error messages; long values are shortened."""
     return _repr.repr(value)
 
 
@@ -78,7 +78,7 @@ def dotted(names: tuple[str, ...]) -> str:
 
 
 def part_of(value: Any, part: Data | Loop, depth: int) -> Any:
-    """The part of `value` for `part`, or its default; `depth` is the number of names above `value`."""
+    """The value of `part` within `value`, or the part's default; `depth` is the number of names above `value`."""
     for step in part.path[depth:]:
         value = _member(value, step.name)
         if value is _MISSING:
@@ -117,7 +117,7 @@ def reject_unknown(frame: Frame, message: MessageValue) -> None:
 
 
 def units_of(data: Data, text: object) -> BytesLike:
-    """The text as sent, without count and terminator. Raises `CodecError` if it is not a text."""
+    """The units of a text as sent, without count or terminator. Raises `CodecError` if the value is not a text."""
     if not isinstance(text, str):
         raise CodecError(f"'{dotted(data.names)}' takes a {data.kind.value}, not {shown(text)}")
     try:

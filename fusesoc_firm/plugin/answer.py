@@ -4,9 +4,9 @@ FuseSoC starts a generator in an empty folder with one argument, a YAML file wit
 core's folder and the parameters. Afterwards it loads every `.core` in the folder, so that file is written last. FuseSoC
 shows the generator's output to the user unchanged.
 
-A call is derived once (`Generator.load`): its inputs give the store's key and, after a miss, the core is generated from
-the same value. Every fact that determines the result is recorded in its state before use. If one of these facts has
-changed at the end, an input was edited meanwhile, and nothing is stored.
+A call is derived once (`Generator.load`): the inputs determine the store's key and, after a miss, the core is generated
+from the same derived data. The state of every fact that determines the result is recorded before use. If one of these
+facts has changed at the end, an input was edited meanwhile, and nothing is stored.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class _NotStoredError(Exception):
 class Basis:
     """The basis of a result: `reads` of everything that determines its key, and `further` facts, first our own code.
 
-    Each is in its state before use. `run` is the run of FuseSoC.
+    Each fact has the state before its use. `run` is the run of FuseSoC.
     """
 
     run: str
@@ -216,7 +216,7 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
 
 
 def _check_locked(loaded: LoadedRequest) -> bool:
-    """Check a request against its lock files, and return whether it has any. Raises `InputError` for differences."""
+    """Check a request against the lock files; return whether there are any. Raises `InputError` for differences."""
     request = loaded.request
     places: list[Path] = []
     if name := request.parameters.get("locked"):

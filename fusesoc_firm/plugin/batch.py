@@ -2,7 +2,7 @@
 
     python -m fusesoc_firm.plugin.batch GENERATOR < calls.json
 
-Such a process handles the calls of one generator, so it imports that generator's modules only once. Calls that fail are
+This process handles the calls of one generator, so it imports that generator's modules only once. Calls that fail are
 skipped: FuseSoC's own call then generates the core or reports the faults.
 """
 
@@ -33,8 +33,8 @@ _OF_CORES = "messages"
 def prepare(calls: Iterable[GeneratorCall], jobs: int) -> Steps[None, None, None]:
     """Process the calls in at most `jobs` processes; yield once for each call that was generated, found or skipped.
 
-    On exit, all processes are ended. Meanwhile this process imports the modules needed to find such calls in the store,
-    so that its copies need not.
+    On exit, all processes are ended. Meanwhile this process imports the modules needed to look calls up in the store,
+    so that its copies need not import them.
     """
     ours = _ours(calls)
     for generator in dict.fromkeys(call.generator for call in ours):
@@ -102,7 +102,7 @@ def main() -> None:
 
 
 def _load(call: GeneratorCall) -> None:
-    """Import the modules that look such a call up in the store, for copies of this process."""
+    """Import the modules that look a call up in the store, for copies of this process."""
     with suppress(InputError):
         GENERATORS[call.generator].load(_request(call))
 

@@ -1,8 +1,8 @@
 """The lock file of a system: the message definitions, cores and tools that it uses, so that other builds use the same.
 
-A core's own files are its author's to change and are not locked; everything from elsewhere is. `firm` checks a core as
-a whole against its lock (`check_lock`); a generator checks its own request (`check_request`), since it sees neither the
-other cores nor the programs of a target.
+A core's author may change the core's files, so they are not locked; everything from elsewhere is locked. `firm` checks
+a core as a whole against its lock (`check_lock`); a generator checks its own request (`check_request`), since it sees
+neither the other cores nor the programs of a target.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def lock_path(core: ProjectCore) -> Path:
 def lock_of(
     core: ProjectCore, depends: Iterable[ProjectCore], generated: Mapping[str, Sequence[LoadedRequest]]
 ) -> Lock:
-    """The definitions, cores and tools that a core uses now: its own, and those of the cores that it `depends` on.
+    """The definitions, cores and tools that a core now uses, directly or through the cores that it `depends` on.
 
     `generated` holds the derived requests of each core by its name. A message that two cores take from different places
     is listed for each.

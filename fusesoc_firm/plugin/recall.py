@@ -1,14 +1,14 @@
 """Repeats the result of an earlier generator call if no fact that determined it has changed.
 
 The store's key covers everything that determines a result. But to compute it, a specification must be read and a system
-derived, which takes longer than everything else if nothing has changed. So an answered call leaves a note in the store:
-the key, and the facts that determine it (`store.facts`). One kind of fact depends on the run of FuseSoC:
+derived, which takes longer than everything else if nothing has changed. So each answered call leaves a note in the
+store: the key, and the facts that determine it (`store.facts`). One kind of fact depends on the run of FuseSoC:
 
     messages    a message core in use: the folders that this run generated for it
 
 The note is named by the digest of the call, as FuseSoC writes it, with the versions of Python and of the packages that
-we import. If each fact has its recorded state, the key would be the same, so the entry is the result. If one has
-changed, or anything is unusual, this module does nothing, and the key is computed. So it affects only the time.
+we import. If each fact has its recorded state, the key would be the same, so the entry is the result. If a fact has
+changed, or anything is unusual, this module does nothing, and the key is computed. So the module affects only the time.
 
 It runs before all other modules of this package, and imports almost nothing.
 """
@@ -91,14 +91,14 @@ def hold(noted: Iterable[facts.Fact], run: str) -> bool:
 
 
 def state(kind: str, name: str, run: str) -> str | None:
-    """The present state of a fact; None if the object is missing or of another kind."""
+    """The current state of a fact; None if the object is missing or of another kind."""
     try:
         if kind == "messages":
             generated, core = json.loads(name)
             return json.dumps(message_folders(generated, core, run))
         return facts.state(kind, name)
     except (OSError, ValueError, TypeError, RecursionError):
-        # A note from others may contain anything, and one of our files may be changing at this moment.
+        # A note written by others may contain anything, and one of our files may be changing at this moment.
         return None
 
 

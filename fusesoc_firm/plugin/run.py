@@ -3,8 +3,8 @@
 Each generator call is a process of its own. FuseSoC makes the calls of a run one after another, in adjacent folders
 below `generator_cache`, which may still contain folders of earlier runs. So the data that a call leaves there names its
 run.
-* The messages of a core: their generator marks its folder, and the generators of other cores find it.
-* The design units of a core: a tool keeps one unit of each name, and a later one silently replaces an earlier one. So
+* The messages of a core: the messages' generator marks its folder, and the generators of other cores find that folder.
+* The design units of a core: a tool keeps one unit of each name, and a later unit silently replaces an earlier one. So
   each call compares its units with those of previous calls. Other targets generate elsewhere.
 
 A hit waits for this module, so it imports as little as possible.
@@ -84,7 +84,7 @@ def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
-    """The first unit that differs from one of the same name and run in the folders next to `folder`."""
+    """The first unit that differs from a unit of the same name and run in a folder next to `folder`."""
     for core, others in _others(folder, run):
         for unit, digest in others.items():
             if units.get(unit, digest) != digest:

@@ -1,8 +1,9 @@
 """Explains generated lines: the lines of the template, specification and messages that they come from.
 
 Rendering a file again gives the template's line and the scope in its context. The lines of the specification and of
-messages are found by names. Blocks are those named on the line or, if there are none, in the innermost scope with some.
-Fields are those of these blocks' messages or, in a file about a message, of this message.
+messages are found by names. The blocks considered are named on the line or, if the line names no block, in the
+innermost scope that names any. The fields considered belong to these blocks' messages or, in a file about a message, to
+that message.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ Message = tuple[MessageName, Definitions]
 
 _WORD = re.compile(r"[A-Za-z]\w*")
 _STEP = re.compile(r"([^.\[\]]+)(?:\[(\d+)\])?")
-# The part between a block's name and a field's in the name of a signal.
+# The text between a block's name and a field's name in a signal's name.
 _SIDE = re.compile(r"(?:in|out)\d*_")
 
 
@@ -45,7 +46,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Names:
-    """The places of the names on a line: blocks, and the fields and constants of each block's messages and of all."""
+    """The places of the names on a line: blocks, and fields and constants, both by block and for all messages."""
 
     blocks: Mapping[str, SourceRef]
     fields: Mapping[str, Mapping[str, SourceRef]]
@@ -91,7 +92,7 @@ def rendering_of(
 ) -> Rendering:
     """The template and context of the file `name` in a generated core with these `inputs`.
 
-    Raises `InputError` if no template generated it, or not this `text`.
+    Raises `InputError` if no template generated the file, or if the file does not contain this `text`.
     """
     with recorded() as renderings:
         core = generate()

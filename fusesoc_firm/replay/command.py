@@ -35,7 +35,7 @@ _SHOWN = 100
 class Source:
     """The part of a bag to replay: at most `limit` messages.
 
-    It begins `start` seconds after the bag's beginning, and lasts `duration` seconds.
+    The part begins `start` seconds after the bag's beginning, and lasts `duration` seconds.
     """
 
     path: Path
@@ -52,7 +52,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Target:
-    """The bag for the responses. Its format is `form`, or is implied by the name, or is that of the source."""
+    """The bag for the responses. The format is `form` or, if omitted, is implied by the name or the source's format."""
 
     path: Path
     form: Form | None = None
@@ -114,7 +114,7 @@ def replay(
 
 @dataclass
 class _Replay:
-    """A replay in progress: the messages played of each stream, and those sent by each block."""
+    """A replay in progress: the messages played from each stream, and the messages sent by each block."""
 
     bag: Bag
     routes: Mapping[Stream, Route]

@@ -1,4 +1,4 @@
-"""A system that receives one message at a time: its simulated hardware with its software.
+"""A system that receives one message at a time: the simulated hardware and the software.
 
 Each message is sent when the hardware has come to rest after the previous one. So the cause of each response is known,
 and the same messages give the same responses in the same cycles.
@@ -40,7 +40,7 @@ class Cause:
 class Sent:
     """A message that left the system, and its cause: the last earlier message whose route leads to it.
 
-    `last_cycle` is that of its last beat; None if software sent it.
+    `last_cycle` is the cycle of the message's last beat; None if software sent the message.
     """
 
     topic: Topic
@@ -144,7 +144,7 @@ class SystemRun:
         self._postpone(len(payload))
 
     def _postpone(self, size: int) -> None:
-        """Extend the deadline after progress, with `size` bytes still to come."""
+        """Extend the deadline after progress, with `size` bytes remaining."""
         self._deadline = max(self._deadline, self.simulator.cycle + _QUIETS * self.quiet + _CYCLES_A_BYTE * size)
 
     def _give(self, source: End, message: Message, cause: Cause) -> None:
@@ -209,7 +209,7 @@ class SystemRun:
 
 
 def published(system: DerivedSystem) -> list[Topic]:
-    """The topics that leave a system: those of the hardware, except to its own software, and those of the software."""
+    """The topics that leave a system, from its software or from its hardware, except topics between the two."""
     here = _software_here(system)
     converters = [item for item in system.publishers if not item.software or item.software.block not in here]
     return [*converters, *system.software.publishers]

@@ -122,7 +122,7 @@ class LoadedRequest:
 
 
 def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
-    """The files to write for FuseSoC, by path. The `.core` is last: once it exists, the others must, too.
+    """The files to write for FuseSoC, by path. The `.core` file is last: once it exists, all others must exist, too.
 
     Raises `InputError` for a name that is too long for a file.
     """

@@ -87,7 +87,7 @@ def run(library: MessageLibrary, names: Iterable[MessageName], settings: Setting
 
 @dataclass
 class _Tasks:
-    """Makes a task of the first message of each layout, and keeps the others with the same layout."""
+    """Creates a task for the first message with each layout, and keeps the other messages with the same layout."""
 
     library: MessageLibrary
     settings: Settings

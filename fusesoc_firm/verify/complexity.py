@@ -35,7 +35,7 @@ class Statistics:
     """The figures of a message.
 
     `fields` counts the leaves with all messages unfolded, an array counting once. `types` counts the distinct types
-    among all fields, including messages and the elements of arrays. `depth` is 1 for a message without nested ones.
+    among all fields, including messages and the elements of arrays. `depth` is 1 for a message without nested messages.
     """
 
     level: Level
@@ -59,7 +59,7 @@ def _element(type_: FieldType) -> FieldType:
 
 
 def _nested(name: MessageName, definitions: Definitions) -> Iterator[MessageName]:
-    """Yield the message of each field that holds one."""
+    """Yield the message type of each field that contains a message."""
     for field in definitions[name].fields:
         element = _element(field.type)
         if isinstance(element, MessageType):

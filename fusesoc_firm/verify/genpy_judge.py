@@ -1,4 +1,4 @@
-"""The reference of ROS 1: genpy in a server process (`genpy_server` gives the reason)."""
+"""The reference for ROS 1: genpy in a server process (`genpy_server` gives the reason)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def is_installed() -> bool:
 
 
 def version() -> str:
-    """Return its version; empty if it is not installed."""
+    """Return genpy's version; empty if genpy is not installed."""
     server = _server()
     return server.version if server else ""
 
@@ -75,7 +75,7 @@ class _Server:
 
 @cache
 def _server() -> _Server | None:
-    """Return this process's server, under the first Python that has genpy; on Debian, that is the system's."""
+    """Return this process's server, run by the first Python that has genpy; on Debian, the system's Python."""
     pythons = dict.fromkeys(filter(None, (sys.executable, shutil.which("python3"), "/usr/bin/python3")))
     for python in pythons:
         try:

@@ -1,11 +1,12 @@
-"""Serialises messages of ROS 1 with genpy, in a separate program because genpy belongs to the system's Python.
+"""Serialises ROS 1 messages with genpy, in a separate program because genpy belongs to the system's Python.
 
-It uses only genpy, its parser genmsg and the standard library. Requests arrive on the standard input as pickles of
-(type, text of each definition, values). Results go to the standard output as pickles of (True, payloads) or (False,
-reason). The first result is genpy's version. The program ends with its input.
+The program uses only genpy, genpy's parser genmsg and the standard library. Requests arrive on the standard input as
+pickles of (type, text of each definition, values). Results go to the standard output as pickles of (True, payloads) or
+(False, reason). The first result is genpy's version. The program ends when its input ends.
 
 `genpy.dynamic.generate_dynamic` would make the classes of all nested messages, which takes seven times as long. Only
-the method of the outermost class serialises, so only that class is made; the others' values are plain objects.
+the method of the outermost class serialises, so only that class is created; the values of the other messages are plain
+objects.
 """
 # mypy: ignore-errors
 # ruff: noqa: ANN001, ANN202 - genpy has no types, and no other module may be imported here

@@ -24,7 +24,7 @@ _QUIET = 100
 class Gate:
     """A handshake with a gate in it.
 
-    `valid` and `ready` are those of its source and its sink; `assignments` connect both to the other side.
+    `valid` comes from the source and `ready` from the sink; `assignments` connect both to the other side.
     """
 
     name: str
@@ -37,7 +37,7 @@ def loop_text(frame: Frame, width: int) -> str:
     """Return the bench of a message's converters: entity `ENTITY` with the generics `SEED` and `STALL_PERCENT`."""
     ports = message_ports(frame, width)
     found = gates(ports, segment_count(frame), has_msg_valid=not frame.is_fixed_size)
-    # The fields of a message of fixed size are its only segment.
+    # The fields of a fixed-size message form a single segment.
     fields = ports if frame.is_fixed_size else ()
     names = {port.name for port in ports}
     apart = {name for port in ports if port.is_reverse for name in _gated_names(port, names)}

@@ -23,13 +23,13 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.verify.definitions import NoJudgementError, joint_text
 
 TITLE = "mcap-ros2-support"
-# It reads `char` as in ROS 1.
+# The package reads `char` as in ROS 1.
 _PLAIN = {"byte": "uint8", "char": "uint8"}
 
 
 @cache
 def version() -> str:
-    """Return its version; empty if it is not installed."""
+    """Return the package's version; empty if the package is not installed."""
     try:
         return metadata.version(TITLE)
     except metadata.PackageNotFoundError:
@@ -61,7 +61,7 @@ def check(
 
 
 def _renamed(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
-    """Rename messages so that the package accepts them: those of actions hold a `_`, which only ROS itself may use."""
+    """Rename messages so that the package accepts them: action messages contain a `_`, which only ROS may use."""
     names = {name: MessageName("renamed", f"M{number}") for number, name in enumerate(definitions)}
     return {
         names[name]: replace(

@@ -48,7 +48,7 @@ class Report:
 
     @property
     def failures(self) -> list[Entry]:
-        """The failed messages, those that were simulated themselves first."""
+        """The failed messages; messages that were themselves simulated come first."""
         failed = [entry for entry in self.entries if entry.result.verdict is Verdict.FAIL]
         return sorted(failed, key=lambda entry: entry.same_as is not None)
 
@@ -129,7 +129,7 @@ def as_html(report: Report) -> str:
 
 
 def _groups(entries: Sequence[Entry], versions_of_ros: Sequence[Middleware]) -> list[tuple[str, list[Entry]]]:
-    """Return the rows of the table of totals: all messages and each level, for each version of ROS."""
+    """Return the rows of the totals table: all messages and each level, for each ROS version."""
     rows = []
     for ros in versions_of_ros:
         mine = [entry for entry in entries if entry.ros is ros]
@@ -172,7 +172,7 @@ class Histogram:
 
 
 def histogram(values: Sequence[int], first: int, step: int, most: int) -> Histogram:
-    """Return the histogram of values from `first` to `most`, no wider than they need."""
+    """Return the histogram of values from `first` to `most`, no wider than the values need."""
     inside = [value for value in values if value <= most]
     counts = Counter((value - first) // step for value in inside)
     return Histogram(
@@ -181,7 +181,7 @@ def histogram(values: Sequence[int], first: int, step: int, most: int) -> Histog
 
 
 def _figures(entries: Sequence[Entry], ros: Middleware) -> list[dict[str, Any]]:
-    """Return figures 5.8 to 5.10 of the dissertation, for one version of ROS."""
+    """Return figures 5.8 to 5.10 of the dissertation for one ROS version."""
     known = [entry.statistics for entry in entries if entry.ros is ros and entry.statistics]
     figures = (
         ("Fields, all messages within unfolded", histogram([each.fields for each in known], 0, 10, 249)),

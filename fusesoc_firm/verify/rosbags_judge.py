@@ -1,4 +1,4 @@
-"""A reference for both versions of ROS: rosbags serialises any definition that its parser can read."""
+"""A reference for both ROS versions: rosbags serialises any definition that its parser can read."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from fusesoc_firm.message.model import (
 from fusesoc_firm.verify.definitions import NoJudgementError, plain_text
 
 TITLE = "rosbags"
-# rosbags lacks `time` and `duration`: the messages of ROS 2, which have the same bits, replace them.
+# rosbags lacks `time` and `duration`: the ROS 2 messages, which have the same bits, replace them.
 _TIMES = {"time": MessageName("builtin_interfaces", "Time"), "duration": MessageName("builtin_interfaces", "Duration")}
 _TIME_TEXT = "int32 sec\nuint32 nanosec\n"
 _LARGEST_INT8, _LARGEST_INT32 = 2**7 - 1, 2**31 - 1
 
 
 def version() -> str:
-    """Return its version."""
+    """Return the version of rosbags."""
     return metadata.version(TITLE)
 
 
@@ -51,7 +51,7 @@ def serialise(name: MessageName, definitions: Definitions, values: Sequence[Mess
 
 
 class _Store:
-    """A type store that is kept, since rosbags compiles a serialiser for every type that it gets."""
+    """A type store that is kept, since rosbags compiles a serialiser for every type that it receives."""
 
     def __init__(self) -> None:
         self._store = get_typestore(Stores.EMPTY)

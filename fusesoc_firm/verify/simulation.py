@@ -79,7 +79,7 @@ def simulate(folder: Path, sources: Sequence[str], library: Path, seed: int, tim
 
 
 def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes]) -> None:
-    """Write the host's files (docs/reference/simulation-host.md): stimulus k causes answer k, and nothing else."""
+    """Write the host's files (docs/reference/simulation-host.md): stimulus k causes response k and nothing else."""
     sent = (f"> stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(stimuli))
     expected = (f"< @{number} answer to stimulus {number}\n{_hex_lines(frame)}" for number, frame in enumerate(answers))
     (folder / STIMULUS_FILE).write_text("".join(sent), encoding="ascii")

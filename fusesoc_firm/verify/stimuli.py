@@ -30,11 +30,11 @@ _EXTREME_FLOATS = (0.0, -0.0, float("inf"), float("-inf"), float("nan"))
 _LARGEST = {"float32": 3.4028234663852886e38, "float64": 1.7976931348623157e308}
 _SMALLEST = {"float32": 1.401298464324817e-45, "float64": 5e-324}
 _LETTERS = "ab_/ Z9"
-# Two, three and four bytes of UTF-8; the last but one takes two units of UTF-16.
+# Two, three and four bytes in UTF-8; the second-to-last character takes two UTF-16 units.
 _WIDE_LETTERS = "\x00é€語🤖\u200b"
 _LONGEST_TEXT = 12
 # The variable parts of a message share this number of values, so that a stimulus stays at some kilobytes. Bounds beyond
-# a part's share are not reached, and arrays within arrays are short.
+# a part's share are not reached, and nested arrays are short.
 _MOST_VALUES = 1000
 
 
@@ -47,9 +47,10 @@ def kinds(count: int) -> Iterator[str]:
 class Stimuli:
     """Draws values.
 
-    A variable part has no element in an empty value, one in a value of `ONE`, and 1 to `longest` in a typical one. In
-    an extreme value, variable parts are at their bounds, or have 0 to `longest` elements if unbounded. Its numbers are
-    the ends of their ranges, NaN or infinite, and its texts hold characters of up to four bytes.
+    A variable part has no elements in an empty value, one element in a value of kind `ONE`, and 1 to `longest` elements
+    in a typical value. In an extreme value, variable parts are at their bounds, or have 0 to `longest` elements if
+    unbounded. The numbers in an extreme value are the limits of their ranges, NaN or infinite, and the texts contain
+    characters of up to four bytes.
     """
 
     definitions: Definitions
@@ -88,7 +89,7 @@ class Stimuli:
         raise AssertionError(type_)
 
     def _size(self, type_: FieldType) -> int:
-        """Return the number of values in it if every variable part holds one element."""
+        """Return the number of values in a message in which every variable part holds one element."""
         match type_:
             case SequenceType(element):
                 return self._size(element)
@@ -101,7 +102,7 @@ class Stimuli:
         return 1
 
     def _parts(self, name: MessageName) -> int:
-        """Return the number of variable parts of a message; those of an array's elements count once."""
+        """Return the number of variable parts in a message; the parts of an array's elements count once."""
         if name not in self._part_counts:
             types = [field.type for field in self.definitions[name].fields]
             elements = [type_.element if isinstance(type_, ArrayType | SequenceType) else type_ for type_ in types]

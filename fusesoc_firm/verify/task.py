@@ -50,7 +50,7 @@ class Task:
 
     @property
     def ros(self) -> Middleware:
-        """The version of ROS that the message belongs to."""
+        """The ROS version that the message belongs to."""
         return self.definitions[self.name].ros
 
     def chance(self) -> random.Random:
@@ -155,8 +155,8 @@ def _stimulus(frame: Frame, payload: bytes, chance: random.Random) -> bytes:
 def _answer(frame: Frame, payload: bytes, sent: bytes) -> bytes:
     """Return the expected response: the reference's bytes.
 
-    For a message of variable size, the length is that of the frame sent: the publisher must send the length before it
-    can know of bytes after the last field. It sends zeros for these.
+    For a variable-size message, the length equals the length in the received frame: the publisher must send the length
+    before it can detect bytes after the last field. It sends zeros for these bytes.
     """
     trailing = 0 if frame.is_fixed_size else len(sent) - len(pack_frame(SUBSCRIBER_ID, payload))
     return pack_frame(PUBLISHER_ID, payload + bytes(trailing))
