@@ -98,7 +98,7 @@ class _Routing:
         return name is not None and _present(name, self.bag.form.ros) == _meant(subscriber)
 
     def _check_versions(self, takers: Mapping[str, Sequence[Topic]]) -> None:
-        """Add a fault for each topic whose message the system takes only in the other version of ROS."""
+        """Add a fault for each topic whose message the system takes only in the other ROS version."""
         ros = self.bag.form.ros
         for stream in self.bag.streams:
             fitting = [item for item in self.subscribers if self._is_of(stream, item)]
@@ -121,7 +121,7 @@ class _Routing:
         return ""
 
     def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
-        """The bag's signatures of a message: the given one and, since some writers err, that of its definition."""
+        """The bag's signatures for a message: the recorded one and, since some writers err, the definition's."""
         said = [stream.signature] if _is_signature(stream.signature) else []
         if stream.definition and (defined := signature_of_text(message, stream.definition, self.bag.form.ros)):
             said.append(defined)

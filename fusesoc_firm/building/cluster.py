@@ -39,7 +39,7 @@ class _Result:
 
 
 def build_on(workers: Workers, plan: Plan, arguments: Sequence[str]) -> Iterator[Outcome]:
-    """Yield each build's outcome as it finishes, of `firm build` with these arguments. All builds end on exit."""
+    """Run `firm build` with these arguments for each build; yield each outcome when ready. All builds end on exit."""
     wanted = plan.build_root / f".firm_build.{token_hex(8)}"
     plan.build_root.mkdir(parents=True, exist_ok=True)
     wanted.touch()

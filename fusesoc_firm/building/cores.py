@@ -44,7 +44,7 @@ def project_cores() -> list[ProjectCore]:
 
 
 def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
-    """A core, and all others that one of its targets depends on, sorted by name.
+    """A core and all cores that any of its targets depends on, sorted by name.
 
     Raises `InputError` if the core or one of its dependencies is missing.
     """

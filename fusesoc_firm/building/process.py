@@ -1,4 +1,4 @@
-"""Runs one build in a process of its own: FuseSoC's `run`, with all output in a log.
+"""Runs one build in a separate process: FuseSoC's `run`, with all output in a log.
 
 The process is a copy of one in which FuseSoC has already read its libraries. The process leads a process group that
 contains all programs it starts, so that they can be ended together; they also end when the parent process ends.

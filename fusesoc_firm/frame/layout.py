@@ -84,7 +84,7 @@ class _Types:
         return self._ends[key]
 
     def steady(self, element: ElementType, position: Position, member: Field) -> Position:
-        """The smallest set of positions that holds the start of every array element if the first begins at `position`.
+        """The smallest set of positions that includes the start of every array element if the first is at `position`.
 
         An element starts at the start of the array, or at the end of the previous element.
         """

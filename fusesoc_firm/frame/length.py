@@ -198,7 +198,7 @@ class _Walk:
             first = self.behind(term.body, position)
             return None if first is None else first + (len(elements) - 1) * term.stride
         if isinstance(elements, range):
-            # Parts nest, so without this cache each would be walked many times for every walk of its parent.
+            # Parts nest, so without this cache every walk of a parent part would walk each nested part many times.
             key = id(term), position % _PERIOD
             if key not in self._grown:
                 self._grown[key] = self._growth_alike(term, key[1], len(elements))

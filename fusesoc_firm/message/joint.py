@@ -50,7 +50,7 @@ def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | No
 
 
 def _inner_first(definitions: Definitions) -> Iterable[MessageName]:
-    """The names, each after the names of its nested messages. Raises `CycleError`."""
+    """The names, each after the names of that message's nested messages. Raises `CycleError`."""
     within = {
         name: [nested for field in definition.fields if (nested := nested_message(field.type))]
         for name, definition in definitions.items()

@@ -66,7 +66,7 @@ class MessageLibrary:
         self._sources: dict[MessageName, _Source] = {}
         self._interfaces: dict[Interface, Path] = {}
         self._messages: set[MessageName] = set()
-        # The definition or None, and the faults of its text: a faulty file is reported on every request.
+        # The definition or None, and the faults in the text: a faulty file is reported on every request.
         self._parsed: dict[MessageName, tuple[MessageDefinition | None, Diagnostics]] = {}
         self._extents: dict[MessageName, Extent] = {}
         self._put_before(dict.fromkeys(paths), self.ros.folders(environment) if environment is not None else [])
@@ -131,7 +131,7 @@ class MessageLibrary:
     def joint_closure(
         self, names: Iterable[MessageName], source: SourceRef | None = None
     ) -> dict[MessageName, MessageDefinition]:
-        """Like `closure`, for several messages, such as those of a service."""
+        """Like `closure`, for several messages, such as the messages of a service."""
         diagnostics = Diagnostics()
         closure: dict[MessageName, MessageDefinition] = {}
         for name in names:

@@ -1,9 +1,9 @@
 """Computes signatures, which two ends of a topic compare: ROS 1's MD5 sum and ROS 2's RIHS01 hash.
 
 The MD5 sum follows genmsg 0.6.0 (`compute_md5_text`). It covers the constants, with their values as written, then the
-fields; a nested message is replaced by its own sum. The hash follows REP-2011 and REP-2016 (`RIHS01`): SHA-256 of the
-JSON of a type description, which lists the fields of the type and of all nested types, without constants and default
-values.
+fields; the sum of a nested message replaces the message. The hash follows REP-2011 and REP-2016 (`RIHS01`): SHA-256 of
+the JSON of a type description, which lists the fields of the type and of all nested types, without constants and
+default values.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """One run of FuseSoC: writes a generated core, and the data that the run's calls leave for each other.
 
-Each generator call is a process of its own. FuseSoC makes the calls of a run one after another, in adjacent folders
+Each generator call is a separate process. FuseSoC makes the calls of a run one after another, in adjacent folders
 below `generator_cache`, which may still contain folders of earlier runs. So the data that a call leaves there names its
 run.
 * The messages of a core: the messages' generator marks its folder, and the generators of other cores find that folder.
@@ -93,7 +93,7 @@ def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
 
 
 def _others(folder: str, run: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield core and units of all calls of the run except that of `folder`, in the order of the folders' names."""
+    """Yield the core and units of each call in the run, except the call in `folder`, in order of folder name."""
     generated = os.path.dirname(folder)
     if os.path.basename(generated) != _GENERATED:
         return

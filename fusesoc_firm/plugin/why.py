@@ -92,7 +92,7 @@ def rendering_of(
 ) -> Rendering:
     """The template and context of the file `name` in a generated core with these `inputs`.
 
-    Raises `InputError` if no template generated the file, or if the file does not contain this `text`.
+    Raises `InputError` if no template generated the file, or if the generated text differs from `text`.
     """
     with recorded() as renderings:
         core = generate()

@@ -52,7 +52,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Target:
-    """The bag for the responses. The format is `form` or, if omitted, is implied by the name or the source's format."""
+    """The bag for the responses. The format is `form`, or else the one that the name implies, or else the source's."""
 
     path: Path
     form: Form | None = None

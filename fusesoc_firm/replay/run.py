@@ -30,7 +30,7 @@ _CYCLES_A_BYTE = 64
 
 @dataclass
 class Cause:
-    """A message that was sent to the system: its stamp (ns), and the cycle of its first beat into the hardware."""
+    """A message that was sent to the system: the stamp (ns), and the cycle of the first beat into the hardware."""
 
     stamp: int
     first_cycle: int | None = None
@@ -49,7 +49,7 @@ class Sent:
     last_cycle: int | None
 
     def latency(self, clock_hz: Fraction) -> int:
-        """The time in ns from the cause's first beat to the response's last; 0 if one of them bypassed the hardware."""
+        """The time in ns from the cause's first beat to the response's last; 0 if either bypassed the hardware."""
         if self.last_cycle is None or self.cause.first_cycle is None:
             return 0
         return round((self.last_cycle - self.cause.first_cycle) * 10**9 / clock_hz)

@@ -9,7 +9,7 @@ place, so the file is either complete or missing. An entry continues with a line
 and the contents; the others are JSON.
 
 Anyone who can write to the store can write files with correct digests. So a file with unexpected content counts as
-damaged, just like a file with a wrong digest. Unexpected are data of other types, and names that lead out of the folder
+damaged, just like a file with a wrong digest. Examples are data of other types, and names that lead out of the folder
 to which the files are written.
 
 This module imports as little of Python's library as possible.

@@ -13,11 +13,12 @@ this module expands the tree by these rules:
 * `{{#x}}` takes a bool (the section or nothing, same scope), a list (the section once per item), or a mapping or None
   (the section in the mapping's scope, or nothing). `{{^x}}` is the section for false, an empty list or None.
 * `{{#x?}}` is a section in the same scope, once, unless `x` is false, "", an empty list or None.
-* A list holds mappings, each the scope of its iteration, or strings and integers, which `{{.}}` prints. Within it, the
-  bools `@first` and `@last` mark the first and the last iteration.
+* A list holds mappings, each the scope of its iteration, or strings and integers, which `{{.}}` prints. Within the
+  section, the bools `@first` and `@last` mark the first and the last iteration.
 * `{{|}}` begins a column: in adjacent lines, the text after it is aligned. `{{|20}}` begins it after at least 20
   characters. `{{|!}}` in a line separates it from the lines before.
-* `{{> name}}` includes `partials/name.mustache`; alone on a line, its indentation applies to every included line.
+* `{{> name}}` includes `partials/name.mustache`; if the tag is alone on a line, the tag's indentation applies to every
+  included line.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Typed sections of a YAML file: each dataclass field defines its key's name, form and meaning in one place.
 
-`read` converts a node to a section and reports every fault, with its place and what is legal. It continues after a
-fault: it always returns a section, with empty values for unreadable ones, and marks it as not sound. So all faults of a
-file are reported at once, and callers can distinguish faults from their consequences.
+`read` converts a node to a section and reports every fault, with its place and what is legal. After a fault, `read`
+continues: it always returns a section, with empty values in place of unreadable values, and marks a faulty section as
+not sound. So all faults in a file are reported at once, and callers can distinguish faults from their consequences.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def simulation_programs(simulator: str) -> tuple[str, ...]:
 
 
 def ways(program: str) -> str:
-    """The ways to install a missing program."""
+    """The commands or instructions for installing a missing program."""
     known = PROGRAMS.get(program, Program())
     found = [f"apt-get install --no-install-recommends {known.debian}"] if known.debian else []
     found += [f"pip install {known.pypi}"] if known.pypi else []
@@ -112,7 +112,7 @@ def ways(program: str) -> str:
 
 
 def explanation(programs: Iterable[str]) -> str:
-    """The ways to install missing programs, one line each."""
+    """Instructions for installing missing programs, one line each."""
     names = list(programs)
     lines = (f"      = {name}: {ways(name)}" for name in names)
     return "\n".join([f"error: not installed: {' '.join(names)}", *lines])

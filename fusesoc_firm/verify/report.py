@@ -27,7 +27,7 @@ _LEVELS = {
     Level.ARRAYS: "3 Arrays",
     Level.VARIABLE_SUBMESSAGES: "4 VariableSubmessages",
 }
-# Pixels of a figure, and of the labels below and to the left of its bars.
+# The size in pixels of a figure, and of the labels below and to the left of the bars.
 _WIDTH, _HEIGHT, _MARGIN, _LABELS = 560, 200, 40, 34
 
 
@@ -54,14 +54,14 @@ class Report:
 
 
 def make_report(entries: Iterable[Entry], settings: Settings, seconds: float) -> Report:
-    """Return a report with its entries sorted by name and the versions of the references."""
+    """Return a report with the entries sorted by name, and the versions of the references."""
     ordered = tuple(sorted(entries, key=lambda entry: (entry.ros.number, entry.name)))
     tools = {"fusesoc-firm": __version__, "GHDL": ghdl_version(), "Python": platform.python_version(), **versions()}
     return Report(ordered, settings, round(seconds, 1), tools)
 
 
 def write_report(report: Report, path: Path) -> Path:
-    """Write the report to `path`, and as HTML beside it; return the path of the HTML."""
+    """Write the report to `path`, and an HTML version next to it; return the path of the HTML file."""
     write(path, json.dumps(as_data(report), indent=1, ensure_ascii=False) + "\n")
     beside = path.with_suffix(".html")
     write(beside, as_html(report))

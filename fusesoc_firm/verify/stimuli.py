@@ -1,4 +1,4 @@
-"""Draws values for any message from its definition: empty, typical and extreme ones, and ones with single elements."""
+"""Draws values for any message from its definition: empty, typical and extreme values, and single elements."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ _LETTERS = "ab_/ Z9"
 # Two, three and four bytes in UTF-8; the second-to-last character takes two UTF-16 units.
 _WIDE_LETTERS = "\x00é€語🤖\u200b"
 _LONGEST_TEXT = 12
-# The variable parts of a message share this number of values, so that a stimulus stays at some kilobytes. Bounds beyond
-# a part's share are not reached, and nested arrays are short.
+# The variable parts of a message share this number of values, so that a stimulus does not exceed a few kilobytes.
+# Bounds beyond a part's share are not reached, and nested arrays are short.
 _MOST_VALUES = 1000
 
 
@@ -132,7 +132,7 @@ class Stimuli:
         return self.chance.randint(fewest, max(1, min(self.longest, most, self.longest if bound is None else bound)))
 
     def _text(self, type_: StringType, kind: str, most: int) -> str:
-        """Return a text; the bound of a `string` counts bytes, that of a `wstring` UTF-16 units."""
+        """Return a text; the bound of a `string` counts bytes, and the bound of a `wstring` counts UTF-16 units."""
         if kind == EMPTY:
             return ""
         if type_.bound is None and kind != ONE:
