@@ -99,7 +99,7 @@ class MessageLibrary:
         return next((interface for interface in named if interface in self._interfaces), None)
 
     def get(self, name: MessageName, source: SourceRef | None = None) -> MessageDefinition:
-        """The definition of a message requested at `source`; raises `InputError` with all faults of its file."""
+        """The definition of a message requested at `source`; raises `InputError` with all faults in the file."""
         diagnostics = Diagnostics()
         definition = self.find(name, diagnostics, source)
         diagnostics.raise_if_any()

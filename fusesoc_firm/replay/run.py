@@ -209,7 +209,7 @@ class SystemRun:
 
 
 def published(system: DerivedSystem) -> list[Topic]:
-    """The topics that leave a system, from its software or from its hardware, except topics between the two."""
+    """The topics that leave a system: the software's, and those of the hardware that software here does not use."""
     here = _software_here(system)
     converters = [item for item in system.publishers if not item.software or item.software.block not in here]
     return [*converters, *system.software.publishers]

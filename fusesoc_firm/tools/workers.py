@@ -1,4 +1,4 @@
-"""Runs tasks in processes of this machine, or on the workers of a Dask cluster."""
+"""Runs tasks in processes on this machine, or on the workers of a Dask cluster."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _SERVER = Path(__file__).with_name("genpy_server.py")
 
 
 def is_installed() -> bool:
-    """Return whether any Python of this machine has genpy."""
+    """Return whether any Python on this machine has genpy."""
     return _server() is not None
 
 

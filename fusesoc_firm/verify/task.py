@@ -60,7 +60,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Result:
-    """The verdict on a message. `payload_bytes` has one item per stimulus; `cycles` is from first beat in to last out.
+    """The verdict on a message. `payload_bytes` has one item per stimulus; `cycles` runs from first to last beat.
 
     `files` is the content of the work folder by name, if the task keeps it and the message did not pass.
     """
