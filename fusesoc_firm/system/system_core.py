@@ -84,7 +84,7 @@ class LoadedSystem:
         return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
 
     def definitions(self) -> list[tuple[MessageLibrary, Definitions]]:
-        """The library of each message, including software's, with the message's definition and all nested definitions."""
+        """The library of each message, including software's messages, with its definition and nested definitions."""
         types = self.system.software.types
         sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
         frames = dict.fromkeys((*self.system.frames, *sides))

@@ -167,7 +167,7 @@ class Wiring:
                     self._check_sink(block, side)
 
     def _check_sink(self, block: Block, side: MessageSide) -> None:
-        """Check that a sink is driven; publishers send defaults for missing fields, but accelerators need all fields."""
+        """Check that a sink is driven; publishers send defaults for missing fields, accelerators need all fields."""
         driven = self.driven.get(End(str(block.name), side.prefix), {})
         missing = sorted(dotted(name) for name in _names(side.frame) - driven.keys())
         if not driven:

@@ -111,7 +111,7 @@ class _Wizard:
             self._connect_blocks()
 
     def _ask_paths(self) -> None:
-        """Ask for the folders and cores that contain a new specification's messages, which also serve as completions."""
+        """Ask for the folders and cores of a new specification's messages; the messages also serve as completions."""
         entry = _key(Specification, "paths")
         question = Question("paths", entry.meaning, check=self._fault_of_path)
         if found := self._texts(question):
