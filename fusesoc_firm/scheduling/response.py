@@ -26,7 +26,7 @@ from fusesoc_firm.scheduling.tasks import Task
 
 # The number of deadlines that the processor-demand test examines; a straight line bounds the demand of later ones.
 _MOST_DEADLINES = 500_000
-# The maximum number of steps in a fixed-point iteration; an iteration that has not converged by then counts as divergent.
+# The maximum number of steps in a fixed-point iteration; one that has not converged by then counts as divergent.
 _MOST_STEPS = 10_000
 
 
@@ -156,8 +156,8 @@ def lst_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) ->
     """A bound under LST at any load, by counting as under EDF.
 
     The slack of a waiting task shrinks in every cycle, so a task that arrives late enough never has less slack. While a
-    task is being sent, its slack is constant and that of the others shrinks. This extends the window in which others
-    count.
+    task is being sent, its slack is constant and the slack of other tasks shrinks, which extends the window in which
+    other tasks count.
     """
     wait = overheads.acceptance + overheads.blocking
     own = _interrupted_service(task, overheads)
