@@ -94,7 +94,7 @@ def test_a_unit_in_two_ways_is_refused_naming_both_cores(project: Project, right
     for _ in range(3):
         said = project.refuse()
         assert "right.core:4:" in said
-        assert f"me:p:right-pose:1.0 and me:p:left-pose:1.0 define the design unit '{unit}' in two ways" in said
+        assert f"me:p:right-pose:1.0 and me:p:left-pose:1.0 define the design unit '{unit}' differently" in said
         assert "name: left" in said
 
 
