@@ -125,7 +125,7 @@ class Queue(ABC):
     @property
     @abstractmethod
     def empty(self) -> Bools:
-        """Whether the queue has no item, not even a root that is on its way."""
+        """Whether the queue has no item, not even a root that is not yet available."""
 
     @property
     @abstractmethod
@@ -333,7 +333,7 @@ class Engine(Scheduler):
         advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
 
         choose = finished | ~(self._running | beat)
-        # If the task can be preempted after a beat, it need not wait for a root that is on its way.
+        # If the task can be preempted after a beat, it need not wait for a root that is not yet available.
         gives_way = ~queue.first_valid if self._is_preemptive and self._rules.shortest_run == 1 else empty
         take_root = choose & queue.first_valid
         take_b = choose & gives_way & self._b_valid

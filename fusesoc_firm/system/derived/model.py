@@ -214,7 +214,7 @@ class Software:
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock other than the system's: its `frequency` in Hz, and the `ratio` of its edges to those of clk."""
+    """A clock other than the system's: its `frequency` in Hz, and the `ratio` of its edges to clk's edges."""
 
     name: str
     frequency: Fraction

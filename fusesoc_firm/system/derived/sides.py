@@ -32,7 +32,7 @@ class SidePort:
 class Handshake:
     """A pair of `valid` and `ready`; `part` is the part to which the pair belongs, empty for the message itself.
 
-    If there is a `segment_valid`, it has `segments` bits and goes low together with `ready`.
+    If there is a `segment_valid`, it has `segments` bits, which go low together with `ready`.
     """
 
     part: str
