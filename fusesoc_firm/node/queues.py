@@ -130,7 +130,7 @@ class SubscriberQueues(Generic[Item]):
         overflow: Overflow = Overflow.DROP_OLDEST,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Create queues of `capacity` frames each; without a `policy`, least recently used; `clock` gives ns."""
+        """Create queues of `capacity` frames each; the default `policy` is least recently used; `clock` returns ns."""
         if subscribers < 1 or capacity < 1:
             raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 and more")
         self._policy = policy or LeastRecentlyUsed(subscribers)

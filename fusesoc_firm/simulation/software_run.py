@@ -89,7 +89,7 @@ def _elsewhere(system: DerivedSystem, sides: Callable[[AcceleratorType], Iterabl
 
 
 def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> None:
-    """Raise `InputError` if stimuli or model contain no message for a topic that software waits for."""
+    """Raise `InputError` if stimuli or model contain no message for a topic that software requires."""
     faults = Diagnostics()
     sent = {stimulus.subscriber.block for stimulus in stimuli}
     for topic, end in sent_elsewhere(system).items():

@@ -91,7 +91,7 @@ def _definition(module: ast.Module, name: str) -> ast.stmt | None:
 
 
 def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
-    """All statements in a module's own scope, including conditional ones."""
+    """All statements in a module's scope, including conditional statements."""
     for statement in body:
         yield statement
         for block in ("body", "orelse", "finalbody"):
