@@ -76,8 +76,8 @@ _HEADINGS = {
 }
 _METHODS = {
     "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the
-        cells LUT1 to LUT6, and inverters except those of resets, which a slice contains. FF are FDRE, FDSE, FDCE and
-        FDPE. A design with a latch fails. The dissertation's values are LUT/FF by Vivado for an UltraScale+.""",
+        cells LUT1 to LUT6, and inverters except inverters of resets, which a slice contains. FF are FDRE, FDSE, FDCE
+        and FDPE. A design with a latch fails. The dissertation's values are LUT/FF by Vivado for an UltraScale+.""",
     "manager": "Measured as in [Area](converters.md#area).",
     "timing": f"""The clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
         (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. With another seed, the

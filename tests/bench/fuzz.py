@@ -38,8 +38,8 @@ _LENGTH_BYTES = 4
 _COLUMNS = ("subscriber", "ROS", "bits", "broken", "good", "delivered", "frame_error", "cycles", "result")
 _NOTE = f"""
     Broken frames are truncated or too long, have wrong lengths, counts or other bytes, belong to another message, or
-    combine these faults. 'frame_error' counts its cycles. Every stream stalls in {STALL_PERCENT} % of the cycles. The
-    seed is """
+    combine these faults. The column frame_error gives the number of cycles in which that signal is high. Every stream
+    stalls in {STALL_PERCENT} % of the cycles. The seed is """
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ _NOTE = f"""
     geometry_msgs/Point. Times are from the call that publishes to the callback. Verilator simulates quat2euler at 8
     bits. All queues hold 1,000 messages. The echo is a node of a few lines that answers in its callback; the same
     peer sends to both alternately. 'to echo' is the quotient of the medians. 'out of order' includes wrong values.
-    The bar allows no lost message and none out of order.
+    To pass, no message may be lost or out of order.
     """
 _WAYS = [("/QuaternionToEuler_sub", "/QuaternionToEuler_pub"), ("/echo_sub", "/echo_pub")]
 # Angles are right to this, in rad.

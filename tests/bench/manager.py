@@ -46,8 +46,9 @@ _NOTES = {
         preemptive scheduler. The dissertation's value is the sum of table 3.3.""",
     _SCHEDULERS_TITLE: f"""Times have {schedulers.TIME_BITS} bits; periods and transfer times are
         {schedulers.SHORTEST_TIME} to {schedulers.LONGEST_TIME} cycles. LUTs as RAM count for a bar. The dissertation's
-        values are those of table 4.1.""",
-    _COMBINED_TITLE: "The times are those of the schedulers above. The dissertation's values are those of table 4.5.",
+        values are from table 4.1.""",
+    _COMBINED_TITLE: """The times are the same as for the schedulers above. The dissertation's values are from
+        table 4.5.""",
 }
 
 

@@ -31,7 +31,7 @@ DISTRIBUTIONS = ("noetic", "humble")
 _ANGLES = f"{QUATERNIONS:,} quaternions to angles"
 _COLUMNS = ("bag", "simulator", "messages", "build, s", "replay, s", "found", "bar", "result")
 _NOTE = """
-    The angles are compared with those of Python's math, modulo a turn. The other bags contain messages of rosbags'
+    The angles are compared with results from Python's math, modulo a turn. The other bags contain messages of rosbags'
     type store of the distribution, which rosbags has serialised. Each of their systems forwards messages of 18 types.
     The recorded messages must have the same bytes, padding included, the same stamps and the same order. Seconds are
     wall-clock time under any other load of the machine.
