@@ -1,6 +1,6 @@
 """FIRM's configuration file: the messages of a project and the names of their interfaces (dissertation, listing 5.1).
 
-This module is the single source of the file's grammar. An interface is a converter under a name that its user chooses.
+This module is the single source of the file's grammar. An interface is a converter under a user-chosen name.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Project(Section):
 
 @dataclass(frozen=True)
 class MessageInterfaces(Section):
-    """A message and its wanted converters."""
+    """A message and the converters requested for it."""
 
     type: Text = key("the middleware that defines the message", is_required=True, choices=tuple(MIDDLEWARES))
     name: Text = key("the message's type, such as sensor_msgs/Image", is_required=True)
@@ -55,7 +55,7 @@ class ConfigFile(Section):
 
 
 def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
-    """The configuration in a file, with all its faults noted.
+    """Read the configuration in a file and note all faults in it.
 
     Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """

@@ -1,7 +1,7 @@
 """Frame -> template configuration: plain dictionaries that fill in the VHDL templates.
 
-All numbers that a converter needs are computed here (dissertation, listing 5.4). A template has no arithmetic, and its
-only conditions test whether something is present.
+All numbers that a converter needs are computed here (dissertation, listing 5.4). Templates do no arithmetic; a
+condition in a template only tests whether a value is present.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PUBLISHER_TEMPLATE = "vhdl/publisher.vhd"
 _LARGEST_FRAME = (2**31 - 1) // 8 - 3
 # The position encodes 2**3 states that are not beats; while a message waits, the next beat is the first one.
 _STATE_BITS = 3
-# Bytes of a literal on one line.
+# The number of bytes of a literal on each line.
 _ROW = 16
 _ROWS = re.compile(rb"\x00{%d,}|.(?:(?!\x00{%d}).){0,%d}" % (_ROW + 1, _ROW + 1, _ROW - 1), re.DOTALL)
 
@@ -66,7 +66,7 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
 
 
 def _states(last_position: int) -> Context:
-    """The values of the position that are not beats; they share the shortest prefix of ones that no beat has.
+    """The position values that do not represent beats; they share the shortest prefix of ones that no beat has.
 
     Below this prefix, bit 2 tells whether the frame has ended; bits 1 and 0 hold a code.
     """
@@ -108,10 +108,10 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
 
 
 def _first_position(stream: Stream) -> int:
-    """A publisher's first position; at 8 bits, it aligns the payload's first byte to a multiple of four.
+    """A publisher's first position; on an 8-bit stream, it aligns the payload's first byte to a multiple of four.
 
-    Then four payload bytes share a LUT of the multiplexer, and the constant bytes before them need none. This saves a
-    third of the LUTs.
+    Four payload bytes then share a LUT of the multiplexer, and the constant bytes before them need no LUT. This saves
+    a third of the LUTs.
     """
     return -(ID_BYTES + LENGTH_BYTES) % 4 if stream.lanes == 1 else 0
 
@@ -148,8 +148,8 @@ def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Contex
 def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
     """The beats that carry the length, with the bytes of each legal length in them.
 
-    The legal lengths are the payload's own length and, where writers append bytes, a few larger ones. Bit k of `match`
-    is high while the length can still be the payload's own length plus k.
+    The legal lengths are the payload's length and, where writers append bytes, a few larger values. Bit k of `match` is
+    high while the received length can still be the payload's length plus k.
     """
     places = range(stream.length_start, stream.length_start + LENGTH_BYTES)
     beats = sorted({stream.beat(byte) for byte in places})
@@ -167,7 +167,7 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
 
 
 def _length_checks(length: int, beat: int, stream: Stream) -> list[Context]:
-    """The checks of a length's bytes on a beat; a byte that is present and differs rules the length out."""
+    """The checks of a length's bytes on a beat; a present byte that differs rules the length out."""
     return [
         _byte_check(stream, stream.length_start + index, byte)
         for index, byte in enumerate(length.to_bytes(LENGTH_BYTES, "little"))
@@ -239,8 +239,8 @@ def _literal(data: bytes) -> str:
 def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:
     """The parts of the payload that no port drives, with the bytes that a publisher sends there.
 
-    These bytes are the prefix, the defaults of unused fields, and zeros elsewhere. They are split into rows; a long run
-    of zeros is a single part.
+    These bytes are the prefix, the defaults of unused fields, and zeros elsewhere. The bytes are split into rows; a
+    long run of zeros is a single part.
     """
     payload = default_payload(frame)
     cursor = 0

@@ -1,7 +1,7 @@
 """Message -> configuration of its VHDL package: the signature, and the constants in the types of converters' ports.
 
-ROS messages have no enumerations other than their constants. The package also has the constants of nested messages,
-prefixed with their message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
+ROS messages have constants instead of enumerations. The package also has the constants of nested messages, prefixed
+with the nested message's name: ROS's `PointField.INT8` is `POINTFIELD_INT8` in the package of PointCloud2.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ class _Placed:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words of its name in VHDL."""
+        """The words of the constant's name in VHDL."""
         return (self.constant.name,) if self.message is None else (self.message.name, self.constant.name)
 
     @property
     def comment(self) -> str:
-        """Its type and ROS name, with the value of a number: `uint8 sensor_msgs/PointField.INT8=1`."""
+        """The constant's type and ROS name, with the value if it is a number: `uint8 sensor_msgs/PointField.INT8=1`."""
         owner = "" if self.message is None else f"{self.message}."
         named = f"{self.constant.type} {owner}{self.constant.name}"
         return named if isinstance(self.constant.value, str) else f"{named}={_decimal(self.constant.value)}"
@@ -90,7 +90,7 @@ def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
 
 
 def _collect(name: MessageName, definitions: Definitions, found: list[MessageName]) -> None:
-    """Add a message and all its nested messages, unless found before."""
+    """Add a message and all messages nested in it, unless they were found before."""
     if name in found:
         return
     found.append(name)
@@ -113,7 +113,7 @@ def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
 
 
 def _numbers(values: list[dict[str, Any]]) -> dict[str, Any]:
-    """The constants in columns; if a line would be too long, all comments go above their constants."""
+    """The constants in columns; if a line would be too long, every comment goes above its constant."""
     columns = {key: max((len(item[key]) for item in values), default=0) for key in ("name", "type", "value", "comment")}
     aligned = [{**item, **{key: item[key].ljust(columns[key]) for key in ("name", "type")}} for item in values]
     return {"values": aligned, "is_above": sum(columns.values()) + len("  constant  :  := ; -- ") > _LONGEST_LINE}
@@ -163,7 +163,7 @@ def _characters(text: str) -> list[str]:
     """Pieces that form a string of Latin-1: `"printable"`, and `character'val(10)` for any other character."""
     runs = groupby(text, key=lambda character: character.isascii() and character.isprintable())
     pieces = [piece for is_printable, run in runs for piece in (_quoted("".join(run)) if is_printable else _codes(run))]
-    # Two characters joined with `&` are a string only if an operand is a string; so an empty one comes first.
+    # Characters joined with `&` form a string only if an operand is a string, so an empty string comes first.
     return pieces if pieces and pieces[0].startswith(_QUOTE) else ['""', *pieces]
 
 

@@ -62,7 +62,7 @@ def converters_core(order: Order) -> GeneratedCore:
 
 
 def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix: str = "") -> dict[str, GeneratedFile]:
-    """The package of each message, without duplicates; the definitions are those of the message and nested messages."""
+    """The package of each message, without duplicates; the definitions include nested messages."""
     return {
         path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
         for path, configuration in constants_configurations(messages, prefix)

@@ -12,7 +12,7 @@ from fusesoc_firm.text.naming import distinct_identifiers
 
 INTERFACE_TEMPLATE = "vhdl/interface.vhd"
 
-# The converters' templates close a list with ` );` on a separate line, and declare one name on each line.
+# The converters' templates end a list with ` );` on a separate line, and declare one name on each line.
 _LIST = r"^  {} \(\n(.*?)^  \);\n"
 _NAME = re.compile(r"^    (\w+) +: ", re.MULTILINE)
 

@@ -9,7 +9,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics
 
 
 def check_fixed_size(frame: Frame) -> None:
-    """Raise `InputError` with all fields of variable size."""
+    """Raise `InputError` with all fields of variable size, if there are any."""
     faults = Diagnostics()
     for part in _variable_parts(frame.nodes):
         faults.error(
@@ -21,7 +21,7 @@ def check_fixed_size(frame: Frame) -> None:
 
 
 def _variable_parts(nodes: Sequence[Node]) -> Iterator[Data | Loop]:
-    """The parts of variable length; of a fixed array, the variable parts in its elements."""
+    """The parts of variable length; for a fixed array, the variable parts in its elements."""
     for node in nodes:
         if isinstance(node, Loop) and node.count is not None:
             yield from _variable_parts(node.body)

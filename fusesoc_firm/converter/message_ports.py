@@ -1,11 +1,11 @@
 """The message side of a converter: all ports of a message of fixed or variable size.
 
-The subscriber and the publisher of a message have the same ports, in opposite directions. Fields have the ports of
-`ports`. A message of variable size also has `payload_length`, and each part named `f` has these ports:
+The subscriber and the publisher of a message have the same ports, in opposite directions. The module `ports` names the
+ports of fields. A message of variable size also has `payload_length`, and each part named `f` has these ports:
 
     string, array of numbers    f_length, f_axis_tdata/tkeep/tvalid/tlast/tready
     array of messages           f_length, the ports of an element, f_valid/last/ready
-                                and f_segment_valid if an element has segments of its own
+                                and f_segment_valid if an element has several segments
 
 In an array of strings, `f` is the array and `f_element` is one of its strings.
 """
@@ -82,17 +82,17 @@ class ElementPorts:
 
     @property
     def valid(self) -> str:
-        """The element is complete and its streams have ended."""
+        """The port that signals that the element is complete and its streams have ended."""
         return f"{self.name}_valid"
 
     @property
     def last(self) -> str:
-        """The element is the last one."""
+        """The port that marks the last element."""
         return f"{self.name}_last"
 
     @property
     def ready(self) -> str:
-        """The element is accepted."""
+        """The port that signals that the element is accepted."""
         return f"{self.name}_ready"
 
     @property
@@ -113,7 +113,7 @@ class MessageSide:
     by_path: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(compare=False, repr=False)
 
     def field(self, leaf: FrameField) -> FieldPort:
-        """The port of a leaf, or of any piece of it."""
+        """The port of a leaf, or of any piece of the leaf."""
         found = self.by_path["field", leaf.path]
         assert isinstance(found, FieldPort)
         return found
@@ -154,7 +154,7 @@ def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
 
 
 def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[dict[str, str]]:
-    """The port declarations of the message side, in `direction`; reverse ports get the opposite direction."""
+    """The port declarations of the message side, in `direction`; reverse ports have the opposite direction."""
     opposite = {"in": "out", "out": "in"}[direction]
     return [
         {
@@ -181,7 +181,7 @@ class _Naming:
     taken: set[str] = field(default_factory=lambda: set(_TAKEN))
 
     def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
-        """Name all parts, including unused ones, so that a name does not depend on the selection of fields."""
+        """Name all parts, including unused parts, so that names do not depend on the selection of fields."""
         for node in nodes:
             match node:
                 case Fixed(fields=fields):
@@ -207,7 +207,7 @@ class _Naming:
             self.parts[key] = ports
 
     def name(self, names: Sequence[str], suffixes: Sequence[str]) -> str:
-        """The first of `a_b`, `a_b_2`, `a_b_3`, ... for which no port gets a name that is taken."""
+        """The first of `a_b`, `a_b_2`, `a_b_3`, ... that gives every port an unused name."""
         base = identifier(*names)
         candidate, number = base, 2
         while any(self.is_taken(candidate + suffix) for suffix in suffixes):
@@ -249,7 +249,7 @@ def _words(part: Data | Loop) -> str:
 
 
 def _leaf_ports(side: MessageSide, node: Fixed, done: set[Path]) -> Iterator[MessagePort]:
-    """Each leaf once, even if padding separates its elements."""
+    """Each leaf once, even if padding separates the leaf's elements."""
     for leaf in node.fields:
         if leaf.count and leaf.is_used and leaf.path not in done:
             port = side.field(leaf)

@@ -1,4 +1,4 @@
-"""The order to the generator `firm`: messages, the converters wanted for each, and the names of these converters.
+"""The order to the generator `firm`: messages, the converters requested for each message, and the converters' names.
 
 An order comes from the parameters of a core, for a message, a service or an action, or from a configuration file.
 """
@@ -23,7 +23,7 @@ from fusesoc_firm.message.signature import signature
 from fusesoc_firm.store.reads import Input
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail
 
-# The directions, with the function that names the converter's entity in each.
+# The directions, with the function that names the converter's entity in each direction.
 ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
 
 
@@ -31,8 +31,8 @@ ENTITIES = {"subscriber": subscriber_entity, "publisher": publisher_entity}
 class Wanted:
     """A message's frame, with the definitions of the message and all nested messages.
 
-    `interfaces` has a key for each direction in which a converter is wanted; its value lists additional names for that
-    converter.
+    `interfaces` has a key for each direction in which a converter is requested; the value lists additional names for
+    that converter.
     """
 
     frame: Frame
@@ -52,10 +52,10 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Order:
-    """All wanted messages, each once, with streams of `width` bits and the `files` that they were read from.
+    """All requested messages, each once, for streams of `width` bits, with the `files` from which they were read.
 
-    `libraries` are the libraries of the messages. `prefix` precedes the names of all design units except those that the
-    user named.
+    `libraries` are the libraries of the messages. `prefix` precedes the names of all design units except the units that
+    the user named.
     """
 
     title: str
@@ -83,7 +83,7 @@ def order_of_message(
 ) -> Order:
     """The converters of one message, or of the messages that the two ends of a service or an action exchange.
 
-    `direction` is one of `ENTITIES`, or "both". `selection` selects fields, of a single message only. Raises
+    `direction` is a key of `ENTITIES`, or "both". `selection` selects fields and requires a single message. Raises
     `InputError`.
     """
     selection = selection or Selection()
@@ -148,7 +148,7 @@ def _wanted(
 
 
 def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
-    """Each message once, with all its interfaces."""
+    """Each message once, with all interfaces of the message."""
     joined: dict[tuple[Middleware, MessageName], Wanted] = {}
     for wanted in messages:
         first = joined.get((wanted.ros, wanted.message))

@@ -1,8 +1,8 @@
 """Frame -> configuration of `<pkg>_<type>_length`, which computes a payload's length from the lengths of its parts.
 
 This is the dissertation's listing 6.5 as hardware, with ROS's own sizes: nothing precedes a nested message, and CDR
-adds padding. The size of an element does not depend on its position, so the elements are a sum. Padding only depends on
-positions modulo the largest alignment, so it is a chain of two or three bits next to that sum.
+adds padding. The size of an element does not depend on its position, so the sizes of all elements are simply added.
+Padding only depends on positions modulo the largest alignment, so a chain of two or three bits beside the sum suffices.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def _modulus(terms: Sequence[Term]) -> int:
 
 
 def _counted_parts(terms: Sequence[Term]) -> list[Data | Loop]:
-    """The parts with a variable number of elements that take bytes."""
+    """The parts with a variable number of elements whose elements take bytes."""
     return [
         term.part
         for term in terms
@@ -127,9 +127,9 @@ def _counted_parts(terms: Sequence[Term]) -> list[Data | Loop]:
 class _Sum:
     """A running sum of terms, with the statements that compute it.
 
-    The sum consists of the signals `elements` and `paddings` and of `constant`. The position after it, modulo
-    `modulus`, is the sum of `offset` and of `origin`, which lists signals with their widths. `counts` has the number of
-    elements by path.
+    The sum consists of the signals `elements` and `paddings` and of `constant`. The position after the terms, modulo
+    `modulus`, is the sum of `offset` and the signals in `origin`, which are listed with their widths. `counts` holds
+    the number of elements by path.
     """
 
     modulus: int
@@ -143,7 +143,7 @@ class _Sum:
 
     @property
     def rest_bits(self) -> int:
-        """The bits of the sum without the elements."""
+        """The width in bits of the sum without the elements."""
         return max(1, (self.constant + len(self.paddings) * self.modulus).bit_length())
 
     def add(self, terms: Sequence[Term]) -> None:

@@ -1,7 +1,7 @@
 """The steps of a publisher as a sequence of places.
 
-A place is a word of up to one beat of bytes, or a step without bytes of its own: the opening of a part, a stream,
-padding, or the end of an element. A publisher goes from place to place and returns to the first one.
+A place is a word of at most one beat, or a step without words: the opening of a part, a stream, padding, or the end of
+an element. A publisher goes from place to place and, after the last place, returns to the first.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ROW = 4
 
 @dataclass(frozen=True)
 class Row:
-    """Bytes `offset` to `offset + size - 1` of a step, in words from `place` on.
+    """Bytes `offset` to `offset + size - 1` of a step, in words starting at `place`.
 
     If `times` is more than 1, the row is one word of zeros that is sent `times` times; `size` is the total number of
     bytes.
@@ -35,7 +35,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Area:
-    """The places `first` to `last` of step `number`; `rows` has the step's own bytes, if any."""
+    """The places `first` to `last` of step `number`; `rows` holds the step's bytes, if any."""
 
     number: int
     step: Step
@@ -71,7 +71,7 @@ class Places:
 
     @cached_property
     def closings(self) -> tuple[tuple[Close, int], ...]:
-        """Each `Close` with the place at which the element ends: the last word before it, or its own place."""
+        """Each `Close` with the place at which the element ends: the last word before the step, or the step's place."""
         steps = self.program.steps
         return tuple(
             (step, self.areas[bisect_right(self._area_numbers, number) - 1].last)
@@ -114,7 +114,7 @@ class Places:
         return self.program.behind(number)
 
     def _moments(self, number: int) -> int:
-        """The number of places of a step without bytes of its own; 0 if another step does its work."""
+        """The number of places of a step without words; 0 if another step does the work of this step."""
         match self.program.steps[number]:
             case Guard() | Stream() | Padding():
                 return 1
@@ -155,7 +155,7 @@ class Places:
 
 
 def size_of(step: Step) -> int:
-    """The size of a step in bytes, if it is the same each time the step is reached."""
+    """The size of a step in bytes, if the size is the same each time the step is reached."""
     match step:
         case Header():
             return ID_BYTES + LENGTH_BYTES

@@ -9,7 +9,7 @@ from fusesoc_firm.converter.vhdl import vhdl_type
 from fusesoc_firm.frame.model import Frame, FrameField, Path
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
-# Names that the templates declare or use; a field with such a name gets another port name.
+# Names that the templates declare or use; a field with one of these names gets a different port name.
 _TAKEN = """
     clk rst_n s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
     m_axis_tdata m_axis_tkeep m_axis_tvalid m_axis_tlast m_axis_tready
@@ -20,7 +20,7 @@ _TAKEN = """
     u_select rtl firm firm_axis_select ieee work std numeric_std std_logic_1164
     std_logic std_logic_vector unsigned natural integer to_unsigned resize rising_edge failure true false
 """.split()
-# The names of each store if there are several.
+# The names of each store if there are several stores.
 _NUMBERED = re.compile(r"(store|fields|turns?|used)_\d+(_\w+)?", re.IGNORECASE)
 
 
@@ -39,7 +39,7 @@ class FieldPort:
 
     @property
     def comment(self) -> str:
-        """The ROS name and type of the leaf, to trace the port back: `pose.position.x: float64`."""
+        """The ROS name and type of the leaf, which show the port's origin: `pose.position.x: float64`."""
         return f"{ros_path(self.field.path)}: {self.field.type.name}"
 
 
@@ -60,5 +60,5 @@ def port_width(field: FrameField) -> int | None:
 
 
 def ros_path(path: Path) -> str:
-    """A path in the notation of a definition, with the sizes of fixed arrays: `pose.covariance[36]`."""
+    """A path as written in a definition, with the sizes of fixed arrays: `pose.covariance[36]`."""
     return ".".join(step.name if step.count is None else f"{step.name}[{step.count}]" for step in path)

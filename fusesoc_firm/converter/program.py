@@ -6,14 +6,14 @@ steps:
     Header              the payload's length
     Block               bytes of known arrangement
     Padding             padding that depends on the position
-    Count, Guard, Open  a part's number of elements; a skip of its padding if empty; its beginning
+    Count, Guard, Open  a part's number of elements; a skip of an empty part's padding; the beginning of a part
     Stream              the elements of a string or an array of numbers
     Close               the end of an element of an array of messages or strings
     Tail                the unused rest of the payload
     End                 the end of the message
 
-The index in the list identifies a step. Each step is followed by the next one, with three exceptions whose targets
-`Program` computes: `Guard` and `Open` of an empty part, and `Close`.
+The index in the list identifies a step. Each step is followed by the next step in the list, with three exceptions whose
+targets `Program` computes: `Guard` and `Open` of an empty part, and `Close`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Header:
-    """The payload's length; `completes` is segment 0 if nothing else belongs to that segment."""
+    """The payload's length; `completes` is segment 0 if that segment contains only the length."""
 
     completes: Segment | None = None
     segment: Segment | None = None
@@ -59,8 +59,8 @@ class Block:
     """A block of `size` bytes; the runs of `fields` and the offsets of `constants` count from its first byte.
 
     A constant is a pair (offset, bytes) that a publisher sends. `checks` has the same form: a subscriber compares the
-    received bytes with it. All other bytes are padding or unused. `completes` is the segment that ends with this block;
-    if a `Count` or an `Open` follows, that step completes the segment instead.
+    received bytes with the bytes in `checks`. All other bytes are padding or unused. `completes` is the segment that
+    ends with this block; if a `Count` or an `Open` follows, that step completes the segment instead.
     """
 
     scope: Scope
@@ -91,7 +91,7 @@ class Count:
 
 @dataclass(frozen=True)
 class Guard:
-    """A jump to `Open` if the part is empty: no padding precedes an empty part."""
+    """A jump to `Open` if the part is empty, since no padding precedes an empty part."""
 
     scope: Scope
     part: Data | Loop
@@ -116,7 +116,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Close:
-    """The end of an element of `loop`; `scope` is the scope of the element and includes the loop."""
+    """The end of an element of `loop`; `scope` is the element's scope, which includes the loop."""
 
     scope: Scope
     loop: Loop
@@ -144,7 +144,7 @@ class Program:
 
     @property
     def loops(self) -> tuple[Loop, ...]:
-        """All loops with `Open` steps, in wire order."""
+        """All loops that have an `Open` step, in wire order."""
         return tuple(step.part for step in self.steps if isinstance(step, Open) and isinstance(step.part, Loop))
 
     @property
@@ -184,7 +184,7 @@ class Program:
 
     @cached_property
     def _openings(self) -> dict[int, int]:
-        """The place of each part's `Open`, by the part's identity, since comparing parts compares their contents."""
+        """The place of each part's `Open`, by the part's identity, since `==` on parts compares contents."""
         return {id(step.part): place for place, step in enumerate(self.steps) if isinstance(step, Open)}
 
     @cached_property
@@ -194,7 +194,7 @@ class Program:
 
 
 def _path(scope: Scope) -> Path:
-    """The path of the innermost loop."""
+    """The path of the innermost loop of a scope."""
     return scope[-1].path if scope else ()
 
 
@@ -207,7 +207,7 @@ def subscriber_program(frame: Frame) -> Program:
 
 
 def publisher_program(frame: Frame) -> Program:
-    """The program of a publisher, which sends unused parts as their defaults, as zeros or as empty arrays."""
+    """The program of a publisher, which sends unused parts as defaults, zeros or empty arrays."""
     builder = _Builder(is_publisher=True)
     builder.header(frame)
     builder.nodes(frame.nodes)

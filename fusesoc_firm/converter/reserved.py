@@ -1,4 +1,4 @@
-"""Names that no port of a field may have, since the templates declare or use them; they are read from the templates."""
+"""Names that a field's port must not have, since the templates declare or use them; read from the templates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _DECLARED = re.compile(
 
 @cache
 def reserved_names(*templates: str) -> frozenset[str]:
-    """The names in the VHDL templates, in lower case, except names that contain tags: these are numbered."""
+    """The names in the VHDL templates, in lower case, except names that contain tags, which are numbered."""
     found = set(_USED)
     for template in templates:
         text = _TAG.sub("\N{REPLACEMENT CHARACTER}", _COMMENT.sub("", template_text(template)))

@@ -12,7 +12,7 @@ from fusesoc_firm.frame.model import FrameField
 
 @dataclass(frozen=True)
 class Slice:
-    """`width` bits of a port from bit `low` on, and their position in the payload: `bytes` bytes from `offset` on.
+    """`width` bits of a port from bit `low` on, and the payload bytes that hold them: `bytes` bytes from `offset` on.
 
     A bool is one bit of the port and one byte of the payload. All other types have 8 bits in each byte.
     """

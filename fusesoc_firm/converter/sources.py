@@ -1,7 +1,7 @@
 """The template and configuration of a Frame's converters, of fixed or variable size.
 
-The modules for variable size are imported only if needed, so that an edit of them does not invalidate cached converters
-of fixed size.
+The modules for variable size are imported only if needed, so that edits to these modules do not invalidate cached
+converters of fixed size.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A message at each stage of its way to hardware, as text.
+"""The text of a message at each stage on the route from definition to hardware.
 
-Each stage imports its modules itself, since the user of `firm message show` waits for these imports.
+Each stage imports only the modules that it needs, since the user of `firm message show` waits for these imports.
 """
 
 from __future__ import annotations

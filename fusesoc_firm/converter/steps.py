@@ -25,7 +25,7 @@ _NUMBERS_IN_A_ROW = 16
 
 
 def is_fixed(step: Step) -> bool:
-    """Whether a step takes a known number of bytes."""
+    """Whether a step consumes a known number of bytes."""
     return isinstance(step, Header | Block | Count)
 
 
@@ -72,7 +72,7 @@ def closes_text(step: Step) -> bool:
 
 
 def element_size(step: Step) -> int:
-    """The bytes of an element of the stream that the step opens; 0 for any other step."""
+    """The size in bytes of an element of the stream that the step opens; 0 for any other step."""
     return step.part.element.size if isinstance(step, Open) and isinstance(step.part, Data) else 0
 
 
@@ -89,7 +89,7 @@ def _alignment_is(alignment: int) -> Callable[[Step], bool]:
     return lambda step: alignment_of(step) == alignment
 
 
-# The sets of steps that a template uses; all but the first two are omitted if empty.
+# The sets of steps that a template uses; except for the first two, empty sets are omitted.
 _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("IS_FIXED", "Takes a known number of bytes.", is_fixed),
     ("IS_REST", "Takes what is left of the payload.", lambda step: isinstance(step, Tail | End)),

@@ -1,9 +1,9 @@
 """The configuration of stores, for the partials `store_signals`, `store_enables`, `store_beats` and `store_resets`.
 
-A template that includes these partials counts the beats in `position_r`, in the same way as the stores. Its signal
-`is_first` identifies beat 0, regardless of the count. The template includes `store_beats` where it accepts a beat.
-Comparisons with the ends of its windows enable a store. If the windows are many, a table holds their ends instead, and
-a pointer advances through it.
+A template that includes these partials counts the beats in `position_r` from the same origin as the stores. The
+template's signal `is_first` identifies beat 0, regardless of the count. The template includes `store_beats` where it
+accepts a beat. Comparisons with the limits of a store's windows enable the store. If there are many windows, a table
+holds the limits instead, and a pointer advances through the table.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from fusesoc_firm.converter.stream import Store, StoreMap, ranges
 from fusesoc_firm.converter.vhdl import bits, within
 from fusesoc_firm.text.render import Context
 
-# A table takes less logic (45 LUTs and 1.3 a window, against 40 and 2.3 for comparisons at 8 bits) if both windows and
-# beats are many: with few beats, the comparisons reduce to a small function of the counter.
+# With many windows and many beats, a table takes less logic (at 8 bits: 45 LUTs plus 1.3 per window, against 40 plus
+# 2.3 for comparisons). With few beats, the comparisons reduce to a small function of the counter.
 _MOST_COMPARED = 8
 _TABLE_BEATS = 1024
 _NUMBERS_IN_A_ROW = 12
@@ -32,13 +32,13 @@ def is_beat(first: int, last: int) -> str:
 
 
 def _is_used(table: int, store: Store, parts: Sequence[Store]) -> str:
-    """The condition for the beats of one store, among the `parts` whose windows share a table."""
+    """The condition for the beats of one store; the windows of all `parts` share a table."""
     used = f"used_{table} = '1'"
     return used if len(parts) == 1 else f"{used} and {is_beat(store.beats[0], store.beats[-1])}"
 
 
 def store_configuration(stores: Sequence[Store]) -> Context:
-    """The partials' configuration for `stores`, in the form of `stores_of`."""
+    """The partials' configuration for `stores`, which have the form that `stores_of` returns."""
     tables: list[Context] = []
     enables: list[list[str]] = []
     for _, group in groupby(stores, lambda store: store.lanes):
@@ -69,7 +69,7 @@ def store_names(stores: Sequence[Store]) -> list[str]:
 
 
 def store_data(register: str, store: Store, source: str) -> list[str]:
-    """The next value of a store's register at a beat, highest bits first: its lanes of `source`, then older content."""
+    """The next value of a store's register at a beat, highest bits first: lanes of `source`, then older content."""
     data = [bits(source, 8 * last + 7, 8 * first) for first, last in reversed(ranges(store.lanes))]
     return data if len(store.beats) == 1 else [*data, bits(register, store.bits - 1, store.beat_bits)]
 
@@ -91,12 +91,12 @@ def stored_slices(piece: Slice, places: StoreMap, registers: Sequence[str]) -> I
 
 
 def _table(windows: Sequence[tuple[int, int]]) -> Context:
-    """The table of beats after which a window begins or ends, with a pointer to the next of them."""
+    """The table of beats after which a window begins or ends, with a pointer to the next entry."""
     turns = [beat for first, last in windows for beat in (first - 1, last)]
     # A window that begins with the first beat is open from the start.
     is_open = turns[0] < 0
     turns = turns[1:] if is_open else turns
-    # After the last turn, the pointer stays on a past beat.
+    # After the last entry, the pointer stays on a past beat.
     numbers = [*turns, turns[-1]]
     rows = [numbers[start : start + _NUMBERS_IN_A_ROW] for start in range(0, len(numbers), _NUMBERS_IN_A_ROW)]
     return {

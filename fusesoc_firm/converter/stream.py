@@ -1,7 +1,7 @@
-"""The positions of a frame's bytes on a stream of some width, and the registers that store the fields.
+"""The positions of a frame's bytes on a stream of a given width, and the registers that store the fields.
 
-A subscriber's stream carries the frame without its id. At 8 bits it starts with the length. On wider streams the lane
-of the id, which is the lowest one of the first beat, remains but is void (docs/explanation/design.md).
+A subscriber's stream carries the frame without the id. An 8-bit stream starts with the length. On wider streams, the
+id's lane (the lowest lane of the first beat) remains but is void (docs/explanation/design.md).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from fusesoc_firm.frame.model import ID_BYTES, LENGTH_BYTES
 
-# Larger stores are split, at the cost of one more enable each: a simulator copies a whole store on each accepted beat.
+# A larger store is split, since a simulator copies a whole store on each accepted beat; each split costs an enable.
 _MOST_BITS = 2048
 WIDTHS = (8, 16, 32, 64, 128, 256, 512)
 
@@ -24,17 +24,17 @@ class Stream:
 
     @property
     def lanes(self) -> int:
-        """The bytes of a beat."""
+        """The number of bytes in a beat."""
         return self.width // 8
 
     @property
     def length_start(self) -> int:
-        """The bytes before the length on a subscriber's stream."""
+        """The number of bytes before the length on a subscriber's stream."""
         return 0 if self.lanes == 1 else ID_BYTES
 
     @property
     def payload_start(self) -> int:
-        """The bytes before the payload on a subscriber's stream."""
+        """The number of bytes before the payload on a subscriber's stream."""
         return self.length_start + LENGTH_BYTES
 
     def beat(self, byte: int) -> int:
@@ -48,9 +48,9 @@ class Stream:
 
 @dataclass(frozen=True)
 class Store:
-    """A shift register that stores the bytes of `lanes` in each of `beats`; the first beat's bytes end up lowest.
+    """A shift register for the bytes of `lanes` in each of `beats`; the first beat's bytes end up in the lowest bits.
 
-    Lanes that hold bytes of fields in the same beats share a store, so a field costs only registers and wires.
+    Lanes that hold field bytes in the same beats share a store, so a field costs only registers and wires.
     """
 
     lanes: tuple[int, ...]
@@ -90,7 +90,7 @@ def _parts(beats: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
 
 @dataclass(frozen=True)
 class StoredBytes:
-    """`count` bytes of the payload that are contiguous in store number `store`, from bit `low` on."""
+    """`count` bytes of the payload that are contiguous in store number `store`, starting at bit `low`."""
 
     store: int
     low: int
@@ -114,7 +114,7 @@ class StoreMap:
                     self._place[beat, lane] = number, row * store.beat_bits + 8 * column
 
     def pieces(self, offset: int, count: int) -> list[StoredBytes]:
-        """The payload's bytes `offset` to `offset + count - 1`, in order; neighbours in a store are merged."""
+        """The payload's bytes `offset` to `offset + count - 1`, in order; adjacent bytes in a store are merged."""
         found: list[StoredBytes] = []
         for byte in range(self._stream.payload_start + offset, self._stream.payload_start + offset + count):
             store, low = self._place[self._stream.beat(byte), self._stream.lane(byte)]

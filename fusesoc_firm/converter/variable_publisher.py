@@ -1,7 +1,8 @@
 """Frame -> configuration of the publisher of a message of variable size.
 
-The publisher goes through the places of its program (`places`); a multiplexer selects the word of the current place. A
-value that depends on the place is a list in the order of places; each item holds up to and including its `last` place.
+The publisher goes through the places of its program (`places`); a multiplexer selects the word of the current place.
+A value that depends on the place is a list in the order of places; each item applies up to and including the item's
+`last` place.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from fusesoc_firm.text.render import Context
 
 VARIABLE_PUBLISHER_TEMPLATE = "vhdl/variable_publisher.vhd"
 
-# Longer literals are split: for some of them, GHDL's Verilog output loses the low half.
+# Longer literals are split, since GHDL's Verilog output loses the low half of some of them.
 _LITERAL_BYTES = 4
 _COUNTER_BITS = 32
 _LARGEST_NATURAL = 2**31 - 1
@@ -86,7 +87,7 @@ class _Publisher:
             "lanes": self.lanes,
             "count_bits": self.lanes.bit_length(),
             "is_byte_wide": self.lanes == 1,
-            # A 32-bit count takes several words, or only part of one.
+            # A 32-bit count takes several words, or only part of a word.
             "is_narrow": self.width < _COUNTER_BITS,
             "is_wide": self.width > _COUNTER_BITS,
             "ports": port_declarations(message_ports(self.frame, self.width), "in"),
@@ -118,7 +119,7 @@ class _Publisher:
         return min(LENGTH_BYTES, self.lanes - ID_BYTES)
 
     def _pieces(self) -> Iterator[Context]:
-        """The bits of all words after the header with their values, in order."""
+        """The bit ranges of all words after the header with their values, in order."""
         cursor = 8 * (ID_BYTES + LENGTH_BYTES)
         total = (self.places.end + 1) * self.width
         for low, count, value in [*self._known(), (total, 0, "")]:
@@ -154,7 +155,7 @@ class _Publisher:
         return f"std_logic_vector(unsigned({length}) + {terminator})" if terminator else length
 
     def _slices(self, leaf: FrameField) -> Iterator[Slice]:
-        """The pieces of the leaf's port; another `Fixed` may hold the elements before the leaf's first one."""
+        """The pieces of the leaf's port; another `Fixed` may hold the leaf's preceding elements."""
         port = self.side.field(leaf)
         for piece in slices_of(FieldPort(port.name, port.width, leaf)):
             yield Slice(port, piece.low + leaf.first * leaf.type.bits, piece.width, piece.offset, piece.bytes)
@@ -162,7 +163,7 @@ class _Publisher:
     # --- inputs and sizes of places -----------------------------------------------------------------------------
 
     def _supplies(self) -> Iterator[tuple[int, Context]]:
-        """(last place, the inputs that the places up to it wait for); an element's last place also has its `valid`."""
+        """(last place, the inputs that all places up to it await); an element's last place also waits for `valid`."""
         yield 0, {"signal": "segment_valid(0)", "element": ""}
         for area in self.places.areas:
             signal = self._supply(area.step)
@@ -185,7 +186,7 @@ class _Publisher:
         return _TRUE
 
     def _segment(self, segment: Segment | None) -> str:
-        # After the first place, the message's first segment stays valid, or the message is withdrawn.
+        # After the first place, the message's first segment either stays valid or the message is withdrawn.
         if segment is None or segment == Segment((), 0):
             return _TRUE
         if not segment.scope:
@@ -194,7 +195,7 @@ class _Publisher:
         return ports.valid if ports.segments is None else f"{ports.segment_valid}({segment.number})"
 
     def _sizes(self) -> Iterator[tuple[int, Context]]:
-        """(last place, bytes of each place up to it), without streams and padding, which determine their own sizes."""
+        """(last place, size in bytes of each place up to it), without streams and padding, whose sizes vary."""
         for area in self.places.areas:
             if isinstance(area.step, Stream | Padding):
                 continue
@@ -228,7 +229,7 @@ class _Publisher:
         return {
             "streams": [{"name": port.name, "place": area.first} for area, port in self._streams],
             "in_stream": _any_place(area.first for area, _ in self._streams),
-            # The counter counts bytes, of up to 2**32 - 1 elements.
+            # The counter counts the bytes of up to 2**32 - 1 elements.
             "left_bits": _COUNTER_BITS + extra_bits,
             "has_extra_bits": extra_bits > 0,
             "step_bits": max(2, self.lanes).bit_length(),

@@ -57,7 +57,7 @@ _LARGEST_ALIGNMENT = 8
 
 
 class _Window(Lanes):
-    """The alignment of a block's bytes in the window: the first byte is in the lowest lane."""
+    """The alignment of a block's bytes in the window, where the first byte is in the lowest lane."""
 
     @property
     def payload_start(self) -> int:
@@ -143,7 +143,7 @@ class _Subscriber:
         }
 
     def _kinds(self) -> Context:
-        """The kinds of steps in the program, with the cases that the template must distinguish."""
+        """The kinds of steps that occur in the program, with the cases that the template must distinguish."""
         sizes = {element_size(step) for step in self.steps}
         alignments = {alignment_of(step) for step in self.steps}
         return {
@@ -206,7 +206,7 @@ class _Subscriber:
             }
 
     def _loop(self, place: int) -> Context:
-        """The end of a loop's element: with its last bytes, or in a separate cycle after a variable part or array."""
+        """The end of a loop's element: with the element's last bytes, or in a separate cycle after a variable part."""
         step = self.steps[place]
         assert isinstance(step, Close)
         return {
@@ -218,7 +218,7 @@ class _Subscriber:
         }
 
     def _jumps(self, place: int) -> Iterator[Context]:
-        """The jumps of a step: past an empty part, and at the end of an element."""
+        """The jumps of a step, past an empty part and at the end of an element."""
         match self.steps[place]:
             case Guard():
                 yield _jump("is_guard", place, self.program.behind_guard(place))
@@ -265,7 +265,7 @@ class _Subscriber:
         return found
 
     def _field_slices(self, block: Block, named: Sequence[tuple[str, Store]]) -> Iterator[Context]:
-        """The bits of ports with their positions in the stores."""
+        """The slices of ports with their positions in the stores."""
         places = StoreMap(self.window, [store for _, store in named])
         names = [name for name, _ in named]
         for leaf in block.fields:
@@ -321,7 +321,7 @@ def _jump(kind: str, place: int, target: int, number: int | None = None) -> Cont
 
 
 def _store(place: int, block: Block, name: str, store: Store, lanes: int) -> Context:
-    """A register, with the beats of a block in which it stores lanes of the window."""
+    """A register, with the beats of a block in which the register stores lanes of the window."""
     beats = ranges(store.beats)
     is_always = beats == [(0, -(-block.size // lanes) - 1)]
     windows = [] if is_always else [within("beat_r", *window) for window in beats]

@@ -1,10 +1,10 @@
-"""Literals, operands and conditions in VHDL, for the values that templates print; templates hold the statements."""
+"""Literals, operands and conditions in VHDL, for values that templates print; the templates contain the statements."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-# The approximate length of a condition's lines.
+# The approximate length of the lines of a condition.
 LINE = 80
 
 
@@ -24,7 +24,7 @@ def bits(vector: str, high: int, low: int) -> str:
 
 
 def binary(value: int, width: int) -> str:
-    """A number of `width` bits as a literal."""
+    """A `width`-bit number as a literal."""
     return f'"{value:0{width}b}"'
 
 
@@ -55,10 +55,10 @@ def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
 
 
 def all_of(conditions: Iterable[str]) -> str:
-    """The expression that is '1' while all conditions are."""
+    """The expression that is '1' while all conditions are '1'."""
     return " and ".join(conditions)
 
 
 def any_of(conditions: Iterable[str]) -> str:
-    """The condition that at least one of them holds; "" if there are no conditions."""
+    """The condition that at least one of the conditions holds; "" if there are no conditions."""
     return " or\n        ".join(wrapped(conditions, "or", LINE))

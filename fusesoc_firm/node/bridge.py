@@ -1,7 +1,8 @@
-"""The ROS process of a Python node: it carries serialised messages between ROS topics and a socket.
+"""The ROS process of a Python node, which carries serialised messages between ROS topics and a socket.
 
-It runs under the Python that ROS is installed for, which is seldom the one that runs this package. It is therefore a
-separate program that needs only ROS and the standard library of Python 3.8. `node/carrier.py` starts it.
+The bridge runs under the Python for which ROS is installed, which seldom is the Python that runs this package. The
+bridge is therefore a separate program that needs only ROS and the standard library of Python 3.8. `node/carrier.py`
+starts the bridge.
 
     python3 bridge.py SOCKET [ARGUMENT OF ROS ...]         # SOCKET is a file descriptor, a stream of parcels
 """
@@ -21,18 +22,18 @@ from typing import Any, NamedTuple
 
 # CONFIGURE, to the bridge: its configuration. READY, from the bridge: the names of the topics after remapping.
 CONFIGURE, READY = b"C", b"R"
-# MESSAGE, both ways: a message from a topic, or one to publish. PUBLISHED, from the bridge: it is published (on
-# request).
+# MESSAGE, in both directions: a message from a topic, or a message to publish. PUBLISHED, from the bridge: the message
+# is published (sent on request).
 MESSAGE, PUBLISHED = b"M", b"P"
-# STOP, to the bridge: take no more messages. From the bridge: ROS asks the node to end.
+# STOP, to the bridge: accept no more messages. From the bridge: ROS asks the node to end.
 STOP = b"S"
-# DONE, from the bridge: all messages taken before STOP are handed over. FAULT, from the bridge: the error that ended
-# it.
+# DONE, from the bridge: all messages accepted before STOP are handed over. FAULT, from the bridge: the error that ended
+# the bridge.
 DONE, FAULT = b"D", b"E"
 
 # The kind, the number of the topic, a time of the system's monotonic clock in ns, and the number of bytes that follow.
 _HEADER = struct.Struct("<cHqI")
-# The time that published messages may take to leave, in s.
+# The longest wait for published messages to leave, in s.
 _FLUSH_SECONDS = 2.0
 
 
@@ -71,7 +72,7 @@ class Channel:
                 return None
             kind, topic, time_ns, size = _HEADER.unpack(header)
             data = self._file.read(size)
-        except (OSError, ValueError):  # ValueError: this end is closed
+        except (OSError, ValueError):  # ValueError: this end is closed.
             return None
         return None if len(data) < size else Parcel(kind, topic, time_ns, data)
 
@@ -99,11 +100,11 @@ class Channel:
 
 
 class BridgeError(Exception):
-    """ROS cannot do what the node asks for."""
+    """ROS cannot do what the node requests."""
 
 
 class Ros(ABC):
-    """The common part of both versions of ROS."""
+    """The part that both versions of ROS have in common."""
 
     def __init__(self, config: dict[str, Any], channel: Channel) -> None:
         self._config = config
@@ -112,7 +113,7 @@ class Ros(ABC):
         self._ended = threading.Event()
 
     def take(self, topic: int, payload: bytes) -> None:
-        """Hand over a message; block while the engine does not take it."""
+        """Hand over a message; block until the engine accepts it."""
         if not self._is_taking:
             return
         try:
@@ -134,7 +135,7 @@ class Ros(ABC):
 
     @abstractmethod
     def stop(self) -> None:
-        """Take no more messages, and send DONE when all messages taken so far are handed over."""
+        """Accept no more messages, and send DONE when all messages accepted so far are handed over."""
 
     @abstractmethod
     def spin(self) -> None:
@@ -150,7 +151,7 @@ class Ros1(Ros):
 
     def __init__(self, config: dict[str, Any], arguments: list[str], channel: Channel) -> None:
         super().__init__(config, channel)
-        # rospy reads remappings from here, some of them at import.
+        # rospy reads remappings from here, some of them when it is imported.
         sys.argv = [config["name"], *arguments]
         import rospy
 
@@ -172,10 +173,10 @@ class Ros1(Ros):
         }
 
     def _taken(self, message: Any, topic: int) -> None:
-        self.take(topic, message._buff)  # noqa: SLF001 - rospy has no other name for it
+        self.take(topic, message._buff)  # noqa: SLF001 - rospy has no public name for it
 
     def _stopped_by_ros(self) -> None:
-        """Report a stop by ROS, such as `rosnode kill`. ROS calls it at every shutdown; at others nobody listens."""
+        """Report a stop by ROS, such as `rosnode kill`. ROS calls this at any shutdown; at others, nobody listens."""
         with contextlib.suppress(OSError):
             self._channel.send(STOP)
 
@@ -194,7 +195,7 @@ class Ros1(Ros):
             self._publishers[topic].publish(message)
 
     def stop(self) -> None:
-        """Take no more messages: every callback has handed its message over, or never will."""
+        """Accept no more messages: every callback has handed its message over, or never will."""
         for subscriber in self._subscribers.values():
             subscriber.unregister()
         self._is_taking = False
@@ -222,13 +223,13 @@ def _raw_class(rospy: Any, topic: dict[str, Any]) -> Any:
 def _flush(connection: Any, latest: float) -> None:
     """Wait until a connection's thread has sent all messages that were queued before the call.
 
-    The thread takes everything in the queue at once and then sends it. So when it has come back for more twice, it has
-    sent everything from before the first time.
+    The thread takes all queued messages at once and then sends them. When the thread has returned to the queue twice,
+    it has sent all messages that were queued before the first return.
     """
     for _ in range(2):
         try:
             connection.write_data(b"")
-        except Exception:  # noqa: BLE001 - the peer has gone, which rospy reports by several types
+        except Exception:  # noqa: BLE001 - the peer has gone, which rospy reports with several types
             return
         while getattr(connection, "_queue", None) and not connection.done and time.monotonic() < latest:
             time.sleep(0.005)
@@ -304,7 +305,7 @@ class Ros2(Ros):
         self._publishers[topic].publish(payload)
 
     def stop(self) -> None:
-        """Make `spin` take the messages that have already arrived, and no more."""
+        """Make `spin` take the messages that have already arrived, and no further messages."""
         self._stops_at = time.monotonic() + _FLUSH_SECONDS
         self._executor.wake()
 
@@ -374,7 +375,7 @@ def main() -> int:
     if first is None or first.kind != CONFIGURE:
         return 2
     config = json.loads(first.data)
-    # rospy waits for its master without limit; an engine that gives up closes its end.
+    # rospy waits for its master without a time limit; an engine that gives up closes its end.
     ready = threading.Event()
     threading.Thread(target=_give_up, args=(channel, ready), daemon=True).start()
     try:

@@ -1,4 +1,4 @@
-"""Joins the bursts of a preemptive Manager to frames (docs/reference/manager.md, 'Bursts').
+"""Joins the bursts from a preemptive Manager into frames (docs/reference/manager.md, 'Bursts').
 
     joiner = BurstJoiner(publishers=4, width=64)
     for burst in bursts:                    # the bytes between two `tlast` that `tkeep` marks as valid
@@ -6,8 +6,8 @@
             deliver(frame.id, frame.payload)
     joiner.close()
 
-An uninterrupted frame is one burst, so the class also serves a Manager without preemption. `cpp/firm/bursts.hpp` is the
-same in C++.
+An uninterrupted frame is one burst, so the class also supports a Manager without preemption. `cpp/firm/bursts.hpp` is
+the C++ version.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
 
 class BurstError(ValueError):
-    """A burst that no Manager sends. The part of its frame received so far is dropped."""
+    """A burst that no Manager sends. The received part of the burst's frame is dropped."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class BurstJoiner:
         else:
             if len(burst) <= self._beat_bytes:
                 raise BurstError(f"the burst that resumes the frame of id {identifier} holds nothing but the id")
-            # Only these bytes were inserted. They fill a beat, so that the bytes after them stay in their lanes.
+            # Only these bytes were inserted. They fill a beat, so that the following bytes stay in their lanes.
             frame = begun
             frame += memoryview(burst)[self._beat_bytes :]
         whole = self._frame_bytes(identifier, frame)
@@ -116,7 +116,7 @@ class BurstJoiner:
 
 
 def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
-    """Split a frame into bursts, as the Manager does: each takes the number of beats in `runs`, the last one the rest.
+    """Split a frame into bursts, as the Manager does: `runs` has the beats of each burst except the last one.
 
     This serves tests and models of the Manager. The meaningless bits of an extra beat are zero.
     Raises `ValueError` if a run has no beats, or if the runs have more beats than the frame.

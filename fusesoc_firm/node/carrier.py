@@ -1,4 +1,4 @@
-"""The middleware as a node sees it, and ROS behind it: a process under the Python that ROS is installed for."""
+"""The middleware as a node sees it, and its implementation by ROS: a process under the Python that has ROS."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _END_SECONDS = 5.0
 
 
 class CarrierError(Exception):
-    """The middleware is missing, cannot do what the node asks for, or has ended."""
+    """The middleware is missing, cannot do what the node requests, or has ended."""
 
 
 @dataclass(frozen=True)
 class Taken:
-    """A message from the topic with this number, and its time of arrival in ns of the system's monotonic clock."""
+    """A message from the topic with this number, and the arrival time in ns of the system's monotonic clock."""
 
     topic: int
     payload: bytes
@@ -38,7 +38,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class Published:
-    """A message of the topic with this number was published at this time; the order is that of `publish`."""
+    """A message on the topic with this number was published at this time; events follow the order of `publish`."""
 
     topic: int
     time_ns: int
@@ -51,13 +51,13 @@ class Carrier(Protocol):
         """Yield events until the carrier is closed or the middleware ends. Raises `CarrierError`."""
 
     def publish(self, topic: int, payload: bytes) -> None:
-        """Publish a message; any thread may call it. After the end of the middleware, messages are dropped."""
+        """Publish a message; any thread may call this method. After the middleware has ended, messages are dropped."""
 
     def stop(self) -> None:
-        """Take no more messages."""
+        """Accept no more messages."""
 
     def wait_until_stopped(self, timeout: float) -> bool:
-        """Wait until `receive` has yielded all messages taken before `stop`; return whether it has."""
+        """Wait until `receive` has yielded all messages accepted before `stop`; return whether it has done so."""
 
     def close(self) -> None:
         """End the carrier after all published messages have left."""
@@ -67,8 +67,8 @@ class Carrier(Protocol):
 class RosOptions:
     """How a node appears in ROS.
 
-    `arguments` are ROS's own, such as remappings. `depth` is the depth of ROS's queues, in messages. `python` is the
-    interpreter that ROS is installed for; if it is None, the carrier searches for one.
+    `arguments` are arguments to ROS, such as remappings. `depth` is the depth of ROS's queues, in messages. `python` is
+    the interpreter for which ROS is installed; if it is None, the carrier searches for an interpreter.
     """
 
     name: str
@@ -159,11 +159,11 @@ class RosCarrier:
         self._send(bridge.MESSAGE, topic, payload)
 
     def stop(self) -> None:
-        """Take no more messages."""
+        """Accept no more messages."""
         self._send(bridge.STOP)
 
     def wait_until_stopped(self, timeout: float) -> bool:
-        """Wait until all taken messages are handed over; return whether they are."""
+        """Wait until all accepted messages are handed over; return whether they were."""
         return self._stopped.wait(timeout)
 
     def close(self) -> None:
@@ -174,7 +174,7 @@ class RosCarrier:
         try:
             self._channel.send(kind, topic, data)
         except OSError:
-            # It has ended; `receive` reports this.
+            # The bridge has ended; `receive` reports this.
             return
 
     def _end(self, seconds: float) -> None:
@@ -198,7 +198,7 @@ def _numbered(ros: int, topics: Sequence[NodeTopic]) -> list[dict[str, object]]:
 
 
 def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
-    """Yield ROS's own arguments in the form of its version: NAME:=VALUE for both, all after `--ros-args` for ROS 2."""
+    """Yield the arguments to ROS in the form of its version: NAME:=VALUE for both, all after `--ros-args` for ROS 2."""
     words = iter(arguments)
     if ros == 2:
         yield ROS_ARGUMENTS

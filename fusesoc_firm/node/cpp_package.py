@@ -1,7 +1,7 @@
 """The software node of a system in C++: a ROS package that carries messages between topics and the hardware.
 
-It consists of a table of the system's topics and the headers that do the work (`node/cpp`). It therefore builds
-wherever ROS is installed, such as on the robot's own computer.
+The package consists of a table of the system's topics and the headers that do the work (`node/cpp`). It therefore
+builds wherever ROS is installed, such as on the robot's computer.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _DIALECTS = {
 
 
 def headers() -> list[Path]:
-    """Return the paths of the C++ headers of nodes."""
+    """Return the paths of the nodes' C++ headers."""
     return sorted(HEADERS.rglob("*.hpp"))
 
 
@@ -108,7 +108,7 @@ def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
 
 
 def _headers(dialect: _Dialect) -> dict[str, str]:
-    """Return all headers except those for other versions of ROS."""
+    """Return all headers except headers for other versions of ROS."""
     others = {item.header for item in _DIALECTS.values()} - {dialect.header}
     return {
         f"include/{path.relative_to(HEADERS)}": path.read_text(encoding="utf-8")
@@ -118,7 +118,7 @@ def _headers(dialect: _Dialect) -> dict[str, str]:
 
 
 def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialect) -> dict[str, Any]:
-    """Return the configuration of the template of the table."""
+    """Return the configuration of the table's template."""
     return {
         "name": description.name,
         "ros": middleware_of(description.versions[0]).title,

@@ -1,4 +1,4 @@
-"""Converts the steps that a node in C++ writes (`firm/trace.hpp`), one per line, to the table that `Trace` writes.
+"""Converts the steps that a C++ node writes (`firm/trace.hpp`), one per line, to the table that `Trace` writes.
 
     write_ways(Path("steps.csv"), Path("ways.csv"), describe(loaded))
 
@@ -42,12 +42,12 @@ def are_steps(table: Path) -> bool:
 
 
 def write_ways(steps: Path, table: Path, description: NodeDescription) -> None:
-    """Write the table of the ways that these steps form. Raises `InputError`."""
+    """Write the table of the routes that these steps form. Raises `InputError`."""
     _Fold(description, [*_read(steps, description)]).write(table)
 
 
 class _Fold:
-    """Replays the steps into a `Trace`, with their original times."""
+    """Replays the steps into a `Trace`, with the original times."""
 
     def __init__(self, description: NodeDescription, steps: list[_Step]) -> None:
         self._description = description
@@ -85,7 +85,7 @@ class _Fold:
             self._go_on(trace, step, entry)
 
     def _go_on(self, trace: Trace, step: _Step, entry: Entry) -> None:
-        """Handle the next step of a message on its way to the hardware."""
+        """Handle the next step of a message on its route to the hardware."""
         if step.event == "queued":
             entry.queued_ns = step.time_ns
             return

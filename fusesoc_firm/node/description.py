@@ -19,10 +19,10 @@ from fusesoc_firm.text.diagnostics import fail
 
 @dataclass(frozen=True)
 class NodeTopic:
-    """A topic of a node; `block` is the specification's, `id` the converter's, or None if only software uses it.
+    """A topic of a node; `block` is the specification's block, `id` the converter's id, or None without a converter.
 
-    A relative `name` moves with the node's namespace. `signature` is that of the definition: ROS 1's MD5 sum or ROS 2's
-    hash. `definition` is its text with those of all nested messages; only ROS 1 announces it.
+    A relative `name` moves with the node's namespace. `signature` is the definition's signature: ROS 1's MD5 sum or
+    ROS 2's hash. `definition` is the definition's text with the texts of all nested messages; only ROS 1 announces it.
     """
 
     block: str
@@ -46,11 +46,11 @@ class Crossing:
 class NodeDescription:
     """A system as its node sees it.
 
-    The node takes messages from the topics of `subscribers` and publishes messages on those of `publishers`. Software
-    on this host sends to the hardware through `entering` and receives from it through `leaving`. For each of the
-    hardware's publishers, `sources` has the ids of the subscribers that its messages derive from. `longest_payload` is
-    the longest of a publisher, in bytes, or None if it has no bound. `clock_hz` is None if the specification has no
-    clock.
+    The node takes messages from the topics of `subscribers` and publishes messages on the topics of `publishers`.
+    Software on this host sends to the hardware through `entering` and receives from the hardware through `leaving`. For
+    each of the hardware's publishers, `sources` has the ids of the subscribers from which the publisher's messages
+    derive. `longest_payload` is the size of the longest payload from a publisher, in bytes, or None without a bound.
+    `clock_hz` is None if the specification has no clock.
     """
 
     name: str
@@ -75,7 +75,7 @@ class NodeDescription:
 
     @property
     def versions(self) -> tuple[int, ...]:
-        """The versions of ROS that the topics belong to."""
+        """The versions of ROS to which the topics belong."""
         return tuple(sorted({topic.ros for topic in (*self.subscribers, *self.publishers)}))
 
 
@@ -118,7 +118,7 @@ def _parted(converters: Iterable[Converter], here: Collection[str]) -> tuple[lis
 
 
 def _once(topics: Iterable[Topic]) -> list[Topic]:
-    """Return one topic per block, with its converter if it has one."""
+    """Return one topic per block, with the block's converter if there is one."""
     found: dict[str, Topic] = {}
     for topic in topics:
         found.setdefault(topic.block, topic)

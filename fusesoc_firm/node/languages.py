@@ -1,6 +1,6 @@
 """The languages in which a system's node can be written, each with its writer.
 
-A writer imports its modules when it is called: the command line lists the languages in every help text.
+A writer imports its modules only when called, since the command line lists the languages in every help text.
 """
 
 from __future__ import annotations

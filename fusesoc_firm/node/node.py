@@ -1,13 +1,13 @@
-"""The node: it carries messages from topics to the hardware as frames, and back, without parsing them.
+"""The node, which carries messages from topics to the hardware as frames, and back, without parsing them.
 
     node = Node(description, open_transport, settings)
     node.run({1: carrier})                 # until `node.stop()`, or until a carrier or the hardware fails for good
 
-A message waits in the queue of its subscriber (section 6.3.3: one queue each, the least recently used is next) and is
-sent as a frame. The response comes back as bursts, which are joined. If software is part of the system, the thread that
-brings a message calls its functions. While a function runs, nothing is taken from the hardware, which stalls as with
-any accelerator that is not ready. A function's output never waits for room, since it could wait for itself: if its
-queue to the hardware is full, a message is dropped and counted.
+A message waits in its subscriber's queue (section 6.3.3: one queue per subscriber, the least recently used is next) and
+is sent as a frame. The response returns as bursts, which are joined. If software is part of the system, the thread that
+delivers a message calls the software's functions. While a function runs, the node takes no burst from the hardware; the
+hardware stalls as with any accelerator that is not ready. A function's output never waits for room, since it could wait
+for itself: if the output's queue to the hardware is full, a message is dropped and counted.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from fusesoc_firm.node.transport.transport import Burst, Transport, TransportErr
 
 # The interval at which waiting threads check whether to end.
 _POLL_SECONDS = 0.1
-# The number of successive transports that may fail before they deliver anything.
+# The number of successive transports that may fail without having delivered a burst.
 _MOST_RESTARTS = 5
 # The number of hardware faults that are reported; later ones are only counted.
 _MOST_REPORTS = 20
@@ -44,7 +44,7 @@ class HardwareListener(Protocol):
         """Simulated hardware took the next sent frame in these cycles of clk."""
 
     def refused(self, converter: int | None) -> None:
-        """The hardware reports a fault: of a converter, as `frame_error` counts them, or of a frame's id (None)."""
+        """The hardware reports a fault: from a converter, numbered as in `frame_error`, or in a frame's id (None)."""
 
 
 OpenTransport = Callable[[HardwareListener], Transport]
@@ -54,8 +54,8 @@ OpenTransport = Callable[[HardwareListener], Transport]
 class NodeSettings:
     """Each queue holds `depth` messages; `overflow` is its action when full.
 
-    At the end, received messages are processed: until the hardware has been silent for `settle` seconds and does not
-    report work, but for `drain` seconds at most. If `restarts` is set, a failed transport is reopened.
+    At the end, received messages are processed until the hardware has been silent for `settle` seconds and does not
+    report work, but for at most `drain` seconds. If `restarts` is set, a failed transport is reopened.
     `report` receives messages to the user.
     """
 
@@ -69,7 +69,7 @@ class NodeSettings:
 
 @dataclass(frozen=True)
 class _Message:
-    """A message in its queue."""
+    """A message in a subscriber's queue."""
 
     payload: bytes
     entry: Entry | None
@@ -145,7 +145,7 @@ class Node:
         self._queues.close()
         self.close()
         for thread in (sender, receiver, *takers):
-            # A taking thread ends with its carrier, which the caller closes.
+            # A thread that takes messages ends with its carrier, which the caller closes.
             thread.join(_POLL_SECONDS)
         self._count_rest()
         if self._fault:
@@ -191,7 +191,7 @@ class Node:
         except CarrierError as error:
             self._fail(error)
         except ClosedError:
-            # The time to end is over.
+            # The time for ending the node is over.
             return
         self.stop()
 
@@ -209,7 +209,7 @@ class Node:
             self._offered += 1
         is_there = self._queues.put(number, _Message(payload, entry), timeout)
         if not is_there and self._settings.overflow is Overflow.BLOCK:
-            # No other thread counts it.
+            # No other thread counts this message.
             with self._lock:
                 counts.dropped += 1
                 self._declined += 1
@@ -245,7 +245,7 @@ class Node:
         return True
 
     def _run_software(self, block: str, payload: bytes) -> None:
-        """Pass a message to software, and send its outputs on their way."""
+        """Pass a message to software, and forward the software's outputs."""
         if not self._software or block not in self._software.sources:
             return
         for name, made in self._software.take(block, payload):
@@ -321,15 +321,15 @@ class Node:
         if self._trace and publisher is not None:
             self._trace.published(publisher, event.time_ns)
 
-    # --- what hardware says of itself ------------------------------------------------------------------------------
+    # --- reports from the hardware ---------------------------------------------------------------------------------
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
-        """Record that simulated hardware took the next sent frame; any thread."""
+        """Record that simulated hardware took the next sent frame; any thread may call this method."""
         if self._trace:
             self._trace.taken(first_cycle, last_cycle)
 
     def refused(self, converter: int | None) -> None:
-        """Report a fault of a converter; any thread."""
+        """Report a converter's fault; any thread may call this method."""
         if converter is not None and converter in self._subscriber_names:
             block = self._subscriber_names[converter]
             self.statistics.inputs[block].refused += 1
@@ -348,7 +348,7 @@ class Node:
             if self._is_over.is_set():
                 return False
             if hardware is not self._hardware:
-                # The other thread has reopened it.
+                # The other thread has reopened the transport.
                 return True
             hardware.transport.close()
             self._failed_restarts = 0 if hardware.has_answered else self._failed_restarts + 1
@@ -363,7 +363,7 @@ class Node:
             return True
 
     def _forget(self, transport: Transport, why: str) -> None:
-        """Continue with hardware that starts from reset; forget all messages in it."""
+        """Continue with hardware that starts from reset, and forget all messages in the hardware."""
         self._report(f"{why}; it is restarted, and the messages in it are lost")
         self.statistics.restarts += 1
         if self._trace:

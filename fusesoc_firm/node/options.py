@@ -1,4 +1,4 @@
-"""The command line of a node: its own options and those of ROS."""
+"""The command line of a node: the node's options, and arguments to ROS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes the node of a system as a Python file: its table, and a call of the code that does the work."""
+"""Writes the node of a system as a Python file: a table, and a call of the code that does the work."""
 
 from __future__ import annotations
 

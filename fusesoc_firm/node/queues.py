@@ -5,9 +5,9 @@
     for subscriber, frame in queues:                               # the thread that owns the DMA, until `close`
         send(frame)
 
-Section 6.3.3, figure 6.4b. With one queue for all, the default of a middleware, each subscriber would wait for all
-earlier frames. The policies are those of the hardware's schedulers. They are non-preemptive, because the host's stream
-has one order. `cpp/firm/queues.hpp` is the same in C++.
+Section 6.3.3, figure 6.4b. With a single queue, which is a middleware's default, each subscriber would wait for all
+earlier frames. The policies are the same as for the hardware's schedulers, but non-preemptive, because the host sends
+whole frames in a single stream. `cpp/firm/queues.hpp` is the C++ version.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Item = TypeVar("Item")
 
 
 class Policy(ABC):
-    """Chooses the next subscriber: the one whose first frame has the smallest key; among equals, the lowest index."""
+    """Chooses the next subscriber: the first frame with the smallest key wins; among equal keys, the lowest index."""
 
     @abstractmethod
     def key(self, subscriber: int, arrival: int) -> int:
@@ -50,7 +50,7 @@ class RoundRobin(Policy):
         self._first = 0
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """Return the distance of the index from the next in turn."""
+        """Return the distance from the next index in turn to this index."""
         return (subscriber - self._first) % self._subscribers
 
     def served(self, subscriber: int) -> None:
@@ -69,20 +69,20 @@ class LeastRecentlyUsed(Policy):
         self._now = 0
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """Return the time at which it was last served, counted in frames."""
+        """Return the time at which the subscriber was last served, counted in frames."""
         return self._served_at[subscriber]
 
     def served(self, subscriber: int) -> None:
-        """Record it as the most recently used."""
+        """Record the subscriber as the most recently used."""
         self._served_at[subscriber] = self._now
         self._now += 1
 
 
 class EarliestDeadlineFirst(Policy):
-    """The subscriber whose first frame has the earliest deadline: its arrival plus the subscriber's time limit."""
+    """The subscriber whose first frame has the earliest deadline: arrival time plus the subscriber's time limit."""
 
     def __init__(self, deadlines: Sequence[int]) -> None:
-        """Take the relative deadlines, in ns."""
+        """Set the relative deadlines, in ns."""
         self._deadlines = tuple(deadlines)
 
     def key(self, subscriber: int, arrival: int) -> int:
@@ -91,15 +91,15 @@ class EarliestDeadlineFirst(Policy):
 
 
 class LeastSlackTime(Policy):
-    """The subscriber whose first frame has the least slack: the time until its deadline minus its transfer time."""
+    """The subscriber whose first frame has the least slack: time until the deadline minus transfer time."""
 
     def __init__(self, deadlines: Sequence[int], transfer_times: Sequence[int]) -> None:
-        """Take the relative deadlines and the transfer times, in ns, one of each per subscriber."""
+        """Set the relative deadlines and the transfer times, in ns, one of each per subscriber."""
         pairs = zip(deadlines, transfer_times, strict=True)
         self._latest_starts = tuple(deadline - transfer for deadline, transfer in pairs)
 
     def key(self, subscriber: int, arrival: int) -> int:
-        """Return the latest time to start; it differs from the slack by the present time, which is the same for all."""
+        """Return the latest start time; it differs from the slack by the current time, which is the same for all."""
         return arrival + self._latest_starts[subscriber]
 
 
@@ -120,7 +120,7 @@ class EmptyError(Exception):
 
 
 class SubscriberQueues(Generic[Item]):
-    """Bounded queues, one per subscriber, read as one. Any number of threads may write and read."""
+    """Bounded queues, one per subscriber, which are read as one queue. Any number of threads may write and read."""
 
     def __init__(
         self,
@@ -130,7 +130,7 @@ class SubscriberQueues(Generic[Item]):
         overflow: Overflow = Overflow.DROP_OLDEST,
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
-        """Create queues of `capacity` frames each; without a `policy`, least recently used; `clock` gives ns."""
+        """Create queues of `capacity` frames each; the default `policy` is least recently used; `clock` returns ns."""
         if subscribers < 1 or capacity < 1:
             raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 and more")
         self._policy = policy or LeastRecentlyUsed(subscribers)
@@ -145,7 +145,8 @@ class SubscriberQueues(Generic[Item]):
     def put(self, subscriber: int, item: Item, timeout: float | None = None) -> bool:
         """Add an item; return whether it is queued.
 
-        It is not if the full queue drops the newest, or if there was no room for `timeout` seconds (None: no limit).
+        The item is not queued if a full queue drops the newest item, or stays full for `timeout` seconds (None: no
+        limit).
         Raises `ClosedError`, even during the wait, and `IndexError` for an unknown subscriber.
         """
         if not 0 <= subscriber < len(self._queues):
@@ -193,7 +194,7 @@ class SubscriberQueues(Generic[Item]):
             yield found
 
     def close(self) -> None:
-        """Take no more items; queued ones can still be read. Wakes all waiting threads."""
+        """Accept no more items; queued items can still be read. Wakes all waiting threads."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()

@@ -1,4 +1,4 @@
-"""The transports that a node opens, and may reopen: a simulator built for it, or hardware at an address."""
+"""The transports that a node opens and may reopen: a simulator built for the node, or hardware at an address."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from fusesoc_firm.node.transport.open_transport import open_transport
 from fusesoc_firm.node.transport.simulator import ErrorPulse, Event, Pace, Simulator, SimulatorTransport, Taken
 from fusesoc_firm.simulation.simulator import BuiltSimulator
 
-# After so many cycles without a beat, the simulation runs only now and then, to save processor time. This serves
-# accelerators that send spontaneously or compute for longer. A simulation that never slept would not get its turn when
-# a message arrives.
+# After this many cycles without a beat, the simulation runs only at intervals, to save processor time. It still serves
+# accelerators that send spontaneously or compute for longer. A simulation that never slept would not get processor time
+# when a message arrives.
 _PACE = Pace(rest_cycles=2_000, idle_seconds=0.05)
 
 

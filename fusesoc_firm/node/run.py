@@ -25,7 +25,7 @@ from fusesoc_firm.text.diagnostics import fail
 
 @dataclass(frozen=True)
 class RunOptions:
-    """The options of a node at its start. `versions` are the versions of ROS that its topics belong to."""
+    """The options of a node at its start. `versions` are the versions of ROS to which the node's topics belong."""
 
     versions: tuple[int, ...]
     ros: RosOptions

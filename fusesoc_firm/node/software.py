@@ -1,4 +1,4 @@
-"""Runs a system's software in its node: payloads in, functions called, payloads out."""
+"""Runs a system's software in a node: takes payloads, calls the functions, and returns payloads."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from fusesoc_firm.text.diagnostics import InputError, fail
 class NodeSoftware:
     """The blocks of type ROS-SW that have sources.
 
-    A message enters from a block (a topic or a converter), and the functions' outputs leave to others. `report`
-    receives each fault. The failed call and its messages are lost; all else continues.
+    A message enters from a block (a topic or a converter), and the functions' outputs leave to other blocks. `report`
+    receives each fault. A failed call and its messages are lost; all other calls continue.
     """
 
     functions: Functions
@@ -33,7 +33,7 @@ class NodeSoftware:
     _lock: Lock = field(default_factory=Lock)
 
     def take(self, block: str, payload: bytes) -> list[tuple[str, bytes]]:
-        """Take a message; return the resulting messages, each with the block that it goes to."""
+        """Take a message; return the resulting messages, each with its destination block."""
         end, frame = self.sources[block]
         with self._lock:
             return list(self._run(block, end, frame, payload))
@@ -55,7 +55,7 @@ class NodeSoftware:
 
 @contextmanager
 def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) -> Iterator[NodeSoftware | None]:
-    """Load the software of a system; None if it has none. Its sources can be imported within this context.
+    """Load a system's software, None if it has none. The sources can be imported within this context.
 
     Raises `InputError`, also for a fault within a file.
     """
@@ -69,7 +69,7 @@ def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) ->
         topics = (*system.subscribers, *system.publishers, *software.subscribers)
         ends = {topic.block: (End(topic.block), topic.frame) for topic in topics}
         ends |= {topic.block: (end, topic.frame) for topic, end in sent_elsewhere(system).items()}
-        # Hardware's output to software elsewhere is a topic, which no function here takes.
+        # An output from hardware to software elsewhere is a topic, which no function here takes.
         outside = {topic.block for topic in taken}
         yield NodeSoftware(
             functions,

@@ -33,8 +33,8 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 class SoftwarePorts:
     """The inputs and outputs of a system's functions; the index in each is the id in frames.
 
-    Inputs: the topics that they take, then the hardware's publishers that feed them. Outputs: the hardware's
-    subscribers that they feed, then the topics that they publish.
+    Inputs: the topics that the functions take, then the hardware's publishers that feed functions. Outputs: the
+    hardware's subscribers that the functions feed, then the topics that the functions publish.
     """
 
     inputs: tuple[Topic, ...]
@@ -61,7 +61,7 @@ def software_ports(system: DerivedSystem) -> SoftwarePorts:
 
 
 def serve(system: DerivedSystem, folder: Path, taken: BinaryIO, given: BinaryIO) -> None:
-    """Process frames until the input ends. Raises `InputError` for a fault of a function, or of the stream of frames.
+    """Process frames until the input ends. Raises `InputError` for a fault in a function or in the stream of frames.
 
     A payload that is not a message is reported on standard error and skipped.
     """
@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # The reader has gone, so nobody is left to report to.
+        # The reader has gone, so there is no recipient for a report.
         return 1
     return 0
 

@@ -5,8 +5,8 @@
     trace.close()
 
 A row is a message from a subscriber to a publisher. A publisher's n-th message belongs to the n-th message of each
-subscriber that feeds its block, and the row is that of the latest of them. This holds for accelerators that answer
-every message with one. Steps in software before and after the hardware are rows of their own.
+subscriber that feeds the publisher's block; the row describes the latest of these messages. This holds for accelerators
+that respond to every message with one message. Steps in software before and after the hardware have separate rows.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ COLUMNS = (
 
 @dataclass
 class Entry:
-    """A message on its way to the hardware; times are those of the system's monotonic clock, in ns."""
+    """A message on its route to the hardware; times are in ns of the system's monotonic clock."""
 
     subscriber: int
     size: int
@@ -61,7 +61,7 @@ class _Answer:
 
 @dataclass
 class _Ways:
-    """Messages under way: to the hardware, in it towards each publisher, and to each topic."""
+    """Messages in transit: to the hardware, within the hardware to each publisher, and to each topic."""
 
     untaken: deque[Entry] = field(default_factory=deque)
     pending: dict[tuple[int, int], deque[Entry]] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class _Ways:
 
 
 class Trace:
-    """Writes the table; any thread may report events. Times count from its creation."""
+    """Writes the table; any thread may report events. Times count from the creation of the `Trace`."""
 
     def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
         """Create the file at `path`; `clock` gives ns. Raises `InputError`."""
@@ -111,7 +111,7 @@ class Trace:
                 self._ways.untaken.popleft().cycles = (first_cycle, last_cycle)
 
     def refused(self, subscriber: int) -> None:
-        """Record that the hardware rejected the frame of a subscriber that it took last: no publisher answers it."""
+        """Record that the hardware rejected the last frame that it took for a subscriber: there will be no response."""
         with self._lock:
             for publisher in self._reached.get(subscriber, ()):
                 queue = self._ways.pending.get((subscriber, publisher))

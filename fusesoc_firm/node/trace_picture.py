@@ -42,7 +42,7 @@ _METADATA: dict[str, dict[str, None]] = {
 
 
 def draw_trace(table: Path, picture: Path) -> None:
-    """Draw a table that `Trace` has written: a row of panels for each way, wall time beside simulated time.
+    """Draw a table that `Trace` has written: a row of panels for each route, wall time beside simulated time.
 
     Raises `InputError` for another kind of file, an unknown picture format, and if matplotlib is missing.
     """
@@ -87,7 +87,7 @@ def _draw(
 
 
 def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:
-    """Return the rows of each way, for the messages with a response."""
+    """Return the rows of each route, for the messages with a response."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)

@@ -36,7 +36,7 @@ class Bound:
 
     @property
     def lateness(self) -> int | None:
-        """The most cycles from deadline to end; negative if the task always ends before its deadline (equation 4.5)."""
+        """The longest time in cycles from deadline to end; negative if the task always ends in time (equation 4.5)."""
         return None if self.response is None else self.response - self.task.deadline
 
 
@@ -70,26 +70,26 @@ class Analysis:
 
     @property
     def latest(self) -> Bound:
-        """The task with that lateness."""
+        """The task with the greatest bound on lateness."""
         return max(self.bounds, key=lambda bound: inf if bound.lateness is None else bound.lateness)
 
     @property
     def buffer(self) -> int | None:
-        """The bytes of all buffers; None if one of them has no bound."""
+        """The size of all buffers together in bytes; None if a buffer has no bound."""
         sizes = [bound.buffer for bound in self.bounds]
         return None if None in sizes else sum(size for size in sizes if size is not None)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """The resource that the tasks share: bytes of a beat, and the shortest run in beats before an interruption."""
+    """The resource that the tasks share: the bytes of a beat, and the shortest run before an interruption in beats."""
 
     beat_bytes: int = 1
     shortest_run: int = 1
 
 
 def utilisation(tasks: Sequence[Task]) -> float:
-    """The utilisation of the channel by the tasks (equation 4.1)."""
+    """The channel's utilisation by the tasks (equation 4.1)."""
     return sum(task.transfer_time / task.period for task in tasks)
 
 
@@ -135,10 +135,10 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
 
 
 def luts(policy: str, requesters: int) -> int | None:
-    """The LUTs of a scheduler, plus those that the Manager needs for the bursts of a preemptive one.
+    """The LUTs of a scheduler, plus the Manager's LUTs for bursts if the scheduler is preemptive.
 
-    The values are measured. If there is no measurement, they are those of the dissertation's table 4.1, which has no
-    bursts. The result is None if both are missing.
+    The values are measured. If there is no measurement, the value from the dissertation's table 4.1 applies, which does
+    not include bursts. The result is None if both are missing.
     """
     measured = area.measured()
     if not measured:
@@ -157,7 +157,7 @@ def _burst_luts(measured: Areas, requesters: int) -> int | None:
 
 
 def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
-    """The bytes that arrive while a task is late: those of the requests after it, at most one beat in each cycle.
+    """The bytes that arrive while a task is late: the data of later requests, at most one beat in each cycle.
 
     The result never exceeds the rule of section 6.3.2: one byte for each cycle of the greatest lateness.
     """
@@ -175,8 +175,8 @@ def assign_priorities(policy: str, tasks: Sequence[Task], overheads: Overheads) 
     """The tasks, the highest priority first.
 
     Deadline monotonic is optimal with preemption if no deadline is longer than its period (J. Leung and J. Whitehead,
-    1982). Otherwise, priorities are assigned from the lowest up: each goes to a task that meets its deadline there (N.
-    Audsley, 1991). If several tasks do, or none, the one with the longest deadline gets it.
+    1982). Otherwise, priorities are assigned from the lowest up: each goes to a task that meets its deadline at this
+    priority (N. Audsley, 1991). If several tasks or no task do, the task with the longest deadline gets the priority.
     """
     by_deadline = sorted(tasks, key=lambda task: task.deadline)
     if POLICIES[policy].is_preemptive and all(task.deadline <= task.period for task in tasks):
@@ -226,7 +226,7 @@ def _lst(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
 
 
 def _least(task: Task, lateness: float, counted: int) -> int:
-    """The smaller of two bounds, the first of which limits the lateness of every task."""
+    """The smaller of two bounds; the first one limits the lateness of every task."""
     return counted if lateness == inf else min(task.deadline + floor(lateness), counted)
 
 

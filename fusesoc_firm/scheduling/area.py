@@ -1,8 +1,8 @@
 """LUTs and flip-flops of the schedulers and of the Manager, measured by `make bench BENCH=manager`.
 
 The file is `area.csv` next to this module, with the columns design, requesters, lut, ff. A design is a policy, a
-combination of policies by its name in table 4.5, or the Manager without scheduler for streams of 8 bits. The areas of
-all other designs and numbers of requesters are unknown.
+combination of policies by its name in table 4.5, or the Manager without a scheduler for 8-bit streams. The areas of all
+other designs and numbers of requesters are unknown.
 """
 
 from __future__ import annotations
@@ -56,6 +56,6 @@ def write(path: Path, areas: Areas) -> None:
 
 
 def at(areas: Areas, design: str, requesters: int) -> Area | None:
-    """The area for a number of requesters, or for the next larger known number; None if there is none."""
+    """The area for a number of requesters, or for the next larger known number; None if there is no such number."""
     known = [number for name, number in areas if name == design and number >= requesters]
     return areas[design, min(known)] if known else None

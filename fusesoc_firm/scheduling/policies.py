@@ -24,7 +24,7 @@ class Order(StrEnum):
 
 @dataclass(frozen=True)
 class Policy:
-    """A policy; `name` is its word in specifications, and the name of its model's function and file."""
+    """A policy; `name` is used in specifications, and as the name of the model's function and file."""
 
     name: str
     short: str

@@ -11,7 +11,7 @@ analysis: refuted, revisited and revised, 2007;
 * EDF: S. Baruah, A. Mok, L. Rosier, Preemptively scheduling hard-real-time sporadic tasks on one processor, 1990.
 
 A requester has one task at a time. It requests at least a period after its last request, and never before its last task
-has ended. So, at any load, each other requester has at most one earlier task for which a task must wait.
+has ended. At any load, a task therefore waits for at most one earlier task of each other requester.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from fusesoc_firm.scheduling.tasks import Task
 
 # The number of deadlines that the processor-demand test examines; a straight line bounds the demand of later ones.
 _MOST_DEADLINES = 500_000
-# The most steps of a fixed-point iteration; if it has not converged by then, it is treated as divergent.
+# The maximum number of steps in a fixed-point iteration; one that has not converged by then counts as divergent.
 _MOST_STEPS = 10_000
 
 
 @dataclass(frozen=True)
 class Overheads:
-    """The costs of a scheduler, in cycles; `analysis.overheads_of` has those of the cores."""
+    """The costs of a scheduler, in cycles; `analysis.overheads_of` returns the costs of the cores."""
 
     decision: int = 0
     """From a request to the grant if nobody sends."""
@@ -84,7 +84,7 @@ def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], ov
             responses.append(None if start is None else start - number * task.period + service)
         known = [response for response in responses if response is not None]
         return max(known) if len(known) == len(responses) else None
-    # Only tasks of higher priority can have waited for it.
+    # Only tasks of higher priority can have waited for the task.
     start = _start(max(blocking, service) if higher else blocking, higher, overheads)
     return None if start is None else start + service
 
@@ -156,8 +156,8 @@ def lst_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) ->
     """A bound under LST at any load, by counting as under EDF.
 
     The slack of a waiting task shrinks in every cycle, so a task that arrives late enough never has less slack. While a
-    task is being sent, its slack is constant and that of the others shrinks. This extends the window in which others
-    count.
+    task is being sent, its slack is constant and the slack of other tasks shrinks, which extends the window in which
+    other tasks count.
     """
     wait = overheads.acceptance + overheads.blocking
     own = _interrupted_service(task, overheads)
@@ -168,7 +168,7 @@ def lst_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) ->
 
 
 def lst_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
-    """The greatest lateness of any task under LST, which is optimal as EDF is (A. Mok, 1983).
+    """The greatest lateness of any task under LST, which is as optimal as EDF (A. Mok, 1983).
 
     Optimality requires that the task of least slack runs in every cycle. Here a run lasts some cycles too long, and
     each other task may delay the late one in this way.
@@ -186,7 +186,7 @@ def _interrupted_service(task: Task, overheads: Overheads) -> int:
 
 
 def _requests(window: int, period: int) -> int:
-    """The tasks of a requester that count: a waiting one, and those that arrive within the window, if it is open."""
+    """The number of a requester's tasks: a waiting task, and the tasks that arrive within the window, if it is open."""
     return 1 + (window // period + 1 if window >= 0 else 0)
 
 

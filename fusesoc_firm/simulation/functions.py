@@ -1,7 +1,7 @@
-"""The functions of accelerators in software, and the messages on their way between them.
+"""The functions of accelerators in software, and the messages in transit between the functions.
 
 A function is called when all its messages have arrived. Each block of a type has its own function with its own state. A
-message keeps only the fields that its connection carries. A function's result is converted as a middleware would do.
+message keeps only the fields that its connection carries. A function's result is converted as by a middleware.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
     listed = {(folder / source).resolve(): item for item in accelerators for source in item.sources}
     owners = {path.parent: item for path, item in reversed(listed.items())}
     paths, known, writes = [*sys.path], {*sys.modules}, sys.dont_write_bytecode
-    # After all other folders, so that they hide no module of Python's own.
+    # After all other folders, so that the user's files hide no module of Python's standard library.
     sys.path += map(str, owners)
     # Write no __pycache__ beside the user's files.
     sys.dont_write_bytecode = True
@@ -109,7 +109,7 @@ class Functions:
         return made
 
     def take(self, source: End, message: Message) -> list[tuple[str, Message]]:
-        """Take a message; return the resulting messages to other blocks, each with the block that it goes to.
+        """Take a message; return the resulting messages to other blocks, each with its destination block.
 
         After an `InputError`, `run` returns the remaining messages: only the failed call is lost.
         """

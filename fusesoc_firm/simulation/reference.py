@@ -1,10 +1,10 @@
-"""Runs the model that a simulation is compared with: a user's Python file with a function `respond`.
+"""Runs the model with which a simulation is compared: a user's Python file with a function `respond`.
 
     def respond(subscriber: str, message: dict) -> list[tuple[str, dict]]:
 
-It gets each message sent, with the name of the subscriber's block. It returns the responses that the system must send,
-each with the name of its publisher's block. It is called in the order of the stimuli and may keep state. It also
-returns the messages to accelerators in software (`software`).
+The function receives each sent message, with the name of the subscriber's block. It returns the responses that the
+system must send, each with the name of the publisher's block. It is called in the order of the stimuli and may keep
+state. It also returns the messages to accelerators in software (`software`).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topi
 
 @dataclass(frozen=True)
 class _Model:
-    """The user's function. In all methods, `when` names the message that it was called for."""
+    """The user's function. In all methods, `when` names the message for which the function was called."""
 
     respond: UserFunction
 

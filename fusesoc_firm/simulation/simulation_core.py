@@ -151,7 +151,7 @@ def _verilog_bench(
 
 
 def _beats(expected: list[Response], width: int) -> int:
-    """Return the beats of all expected frames, the most that can wait for the ends of their frames."""
+    """Return the number of beats in all expected frames: the most that can wait for the end of a frame."""
     lanes = width // 8
     return sum(-(-(ID_BYTES + LENGTH_BYTES + len(response.payload)) // lanes) for response in expected) or 1
 

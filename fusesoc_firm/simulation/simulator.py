@@ -59,12 +59,12 @@ class BuiltSimulator:
     words: tuple[str, ...] = field(repr=False)
 
     def command(self, *, seed: int = 1, stall_percent: int = 0) -> list[str]:
-        """Return the command to start it in `folder`; `seed` chooses the `stall_percent` of cycles with stalls."""
+        """Return the command to run in `folder`; `seed` determines which `stall_percent` of the cycles have stalls."""
         mark = _live(self.tool).parameter
         return [*self.words, f"{mark}SEED={seed}", f"{mark}STALL_PERCENT={stall_percent}"]
 
     def script(self, *, seed: int = 1, stall_percent: int = 0) -> Path:
-        """Return a program that starts it from any folder."""
+        """Return a program that starts the simulator from any folder."""
         path = self.folder / f"run-simulator-seed{seed}-stall{stall_percent}"
         command = shlex.join(self.command(seed=seed, stall_percent=stall_percent))
         text = "#!/bin/sh\n# The simulated system at the end of a pipe: descriptors 3 and 4.\n"
@@ -153,7 +153,7 @@ def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
 
 
 def _project_folder(spec: Path) -> Path:
-    """Return the folder with FuseSoC's configuration: above the specification, otherwise the current folder."""
+    """Return the specification's nearest parent folder with FuseSoC's configuration, or else the current folder."""
     return next((folder for folder in spec.parents if (folder / "fusesoc.conf").is_file()), Path.cwd())
 
 
@@ -191,7 +191,7 @@ def _words(work: Path, tool: str) -> list[str]:
 
 
 def _live(tool: str) -> Live:
-    """Return the tool's support for live simulation. Raises `InputError` if it has none."""
+    """Return the tool's support for live simulation. Raises `InputError` if the tool has no support."""
     if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
         fail(f"unknown simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
     return live

@@ -1,7 +1,8 @@
 """Runs the software of a system for its simulation: the user's functions run while the simulation is generated.
 
 The model supplies the messages from hardware to a block in software. A message from such a block to hardware becomes a
-stimulus after the one that caused it. A message from it to a publisher bypasses the hardware and is compared here.
+stimulus after the stimulus that caused it. A message from such a block to a publisher bypasses the hardware and is
+compared here.
 
 A block without sources is software elsewhere: the stimuli hold its messages.
 """
@@ -33,7 +34,7 @@ class Traffic:
 
 
 def stimulated(system: DerivedSystem) -> list[Topic]:
-    """Return the topics of stimuli: all inputs of the system except those from its own software."""
+    """Return the topics of stimuli: all inputs of the system except inputs from the system's software."""
     converters = [item for item in system.subscribers if item.software is None]
     blocks = {item.block for item in converters}
     topics = [item for item in system.software.subscribers if item.block not in blocks]
@@ -88,7 +89,7 @@ def _elsewhere(system: DerivedSystem, sides: Callable[[AcceleratorType], Iterabl
 
 
 def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> None:
-    """Raise `InputError` if stimuli or model contain no message for a topic that software waits for."""
+    """Raise `InputError` if stimuli or model contain no message for a topic that software requires."""
     faults = Diagnostics()
     sent = {stimulus.subscriber.block for stimulus in stimuli}
     for topic, end in sent_elsewhere(system).items():
@@ -126,7 +127,7 @@ class _Run:
         return {item.block: way_to(item.block, self.system) for item in self.system.publishers}
 
     def take(self, stimulus: Stimulus, responses: Sequence[Response]) -> None:
-        """Send a message, and run the software for it and for the responses of the hardware."""
+        """Send a message, and run the software for this message and for the responses of the hardware."""
         block = stimulus.subscriber.block
         if block in self._subscribers and block not in self._ends:
             self.traffic.stimuli.append(stimulus)
@@ -154,7 +155,7 @@ class _Run:
 
 
 def way_to(publisher: str, system: DerivedSystem) -> set[str]:
-    """Return the blocks in hardware that a publisher's message derives from."""
+    """Return the blocks in hardware from which a publisher's message derives."""
     found: set[str] = set()
     new = {publisher}
     while new:

@@ -1,7 +1,7 @@
 """The message sources that the core next to a specification names, so that all commands search where a build does.
 
-The order is also that of a build: the specification's own `paths`, the command's arguments, the core's paths, a sourced
-ROS, a distribution.
+The order of the search is also the same: the specification's `paths`, the command's arguments, the core's paths, a
+sourced ROS, a distribution.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ _INSTANCE = "system"
 
 @dataclass(frozen=True)
 class MessageSources:
-    """The sources of a system's messages in order of precedence, except those that its specification names."""
+    """The sources of a system's messages in order of precedence, except the sources that the specification names."""
 
     paths: tuple[Path, ...] = ()
     distro: str | None = None
 
 
 def core_of(spec: Path) -> CoreFile | None:
-    """The core next to a specification that uses and can simulate it; None if there is no such core."""
-    # Path.resolve() raises an error of its own for a cyclic link.
+    """The core next to a specification that uses and can simulate the specification; None if there is no such core."""
+    # Path.resolve() raises a different error for a cyclic link.
     spec = Path(os.path.realpath(spec))
     for path in sorted(spec.parent.glob("*.core")):
-        # FuseSoC reports the faults of unrelated cores.
+        # FuseSoC reports faults in unrelated cores.
         with suppress(InputError):
             core = read_core(path)
             made = core.parameters(_INSTANCE).get("spec")
@@ -68,14 +68,14 @@ def load_beside(
     needs_sources: bool = True,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """The system of a specification for a command with arguments `paths` and `distro`; raises `InputError`."""
+    """The system of a specification, for a command with the arguments `paths` and `distro`; raises `InputError`."""
     sources = sources_of(spec, paths, distro, core_folders)
     known = libraries(sources.paths, os.environ, sources.distro)
     return load_system(spec, known, needs_sources=needs_sources, core_folders=core_folders)
 
 
 def known_names(spec: Path, own: Sequence[str], sources: MessageSources, core_folders: CoreFolders) -> list[str]:
-    """All messages that a specification at `spec` with its `own` paths can name, sorted; raises `InputError`."""
+    """All messages that a specification at `spec` with `own` paths can name, sorted; raises `InputError`."""
     known = libraries(sources.paths, os.environ, sources.distro)
     found = with_paths(known, dict.fromkeys(own), spec.parent, core_folders, Diagnostics())
     return sorted({str(name) for library in found.values() for name in library.names()})

@@ -48,7 +48,7 @@ from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, S
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
 
-# FuseSoC's file types for accelerators' languages, and the suffixes of files that are not compiled by themselves.
+# FuseSoC's file types for accelerators' languages, and the suffixes of files that are not compiled separately.
 _FILE_TYPES = {
     ".vhd": VHDL,
     ".vhdl": VHDL,
@@ -64,7 +64,7 @@ _INCLUDE_SUFFIXES = (".vh", ".svh")
 class LoadedSystem:
     """A specification, its folder, an optional board, and the derived system; paths are relative to the folder.
 
-    `warnings` are for the author of the specification.
+    `warnings` are messages to the author of the specification.
     """
 
     specification: Specification
@@ -79,12 +79,12 @@ class LoadedSystem:
         return [*source_files(self.specification, self.folder), *self._message_files()]
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
-        """Each message of a converter once, regardless of its used fields, with its definition and all nested ones."""
+        """Each converter's message once, regardless of used fields, with its definition and all nested definitions."""
         messages = dict.fromkeys((frame.ros, frame.message) for frame in self.system.frames)
         return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
 
     def definitions(self) -> list[tuple[MessageLibrary, Definitions]]:
-        """The library of each message, also of those of software, with the message's definition and all nested ones."""
+        """The library of each message, including software's messages, with its definition and nested definitions."""
         types = self.system.software.types
         sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
         frames = dict.fromkeys((*self.system.frames, *sides))
@@ -105,8 +105,8 @@ def load_system(
 ) -> LoadedSystem:
     """Read and derive the system of a specification, on an optional board; raises `InputError` with all faults.
 
-    Unless it `needs_sources`, accelerators' source files may be missing. Messages in the specification's `paths` take
-    precedence over those in `libraries`.
+    Unless `needs_sources` is set, accelerators' source files may be missing. Messages in the specification's `paths`
+    take precedence over messages in `libraries`.
     """
     faults = Diagnostics()
     specification = read_specification(path, str(path), faults)
@@ -129,7 +129,7 @@ def with_paths(
 ) -> dict[Middleware, MessageLibrary]:
     """The libraries, with the `paths` of a specification in `folder` first.
 
-    Raises `InputError` with all `faults` if one of these paths is wrong, since unknown messages would follow from it.
+    Raises `InputError` with all `faults` if one of these paths is wrong, since a wrong path leads to unknown messages.
     """
     before = len(faults.found)
     places: dict[Path, SourceRef | None] = {}
@@ -165,7 +165,7 @@ def specification_path(request: Request) -> Path:
 
 
 def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """The specification of a request with all files that it uses."""
+    """The specification of a request with all files that the specification uses."""
     board = [_board_path(request)] if request.parameters.get("board") else []
     return [specification_path(request), *board, *loaded.inputs()]
 
@@ -180,7 +180,7 @@ def _board(request: Request) -> Board | None:
 
 
 class Part(Enum):
-    """The purpose of a generated file, in the classes of the dissertation's table 6.2."""
+    """The purpose of a generated file, classified as in the dissertation's table 6.2."""
 
     CONVERTERS = "converters"
     WRAPPERS = "wrappers"
@@ -189,7 +189,7 @@ class Part(Enum):
 
 @dataclass(frozen=True)
 class Artifact:
-    """A generated file: its name, its purpose, its template and its data."""
+    """A generated file: name, purpose, template and data."""
 
     path: str
     part: Part
@@ -285,7 +285,7 @@ def _clock(loaded: LoadedSystem) -> Fraction:
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:
-    """The user's VHDL and Verilog; a shared package is listed once, as it must not be analysed twice."""
+    """The user's VHDL and Verilog; a shared package is listed once, since a package must not be analysed twice."""
     files: dict[str, GeneratedFile] = {}
     taken: set[Path] = set()
     for type_ in types:

@@ -1,12 +1,12 @@
 """AXI DMA between memory and the system's streams, for the block design of a board with a processor.
 
-The engine has scatter and gather, 26 bits of length, 32 bits of address, and no realignment
+The engine supports scatter-gather, 26-bit lengths and 32-bit addresses, but not realignment
 (docs/how-to/build-for-a-board.md). Each direction has a ring of descriptors with a buffer each. Frames are copied into
-free buffers, and bursts fill the next free ones. A frame or burst that is longer than a buffer continues in the next
-one. PG021 (AXI DMA) describes registers and descriptors.
+free buffers, and bursts fill the next free buffers. A frame or burst that is longer than a buffer continues in the next
+buffer. PG021 (AXI DMA) describes registers and descriptors.
 
-Python has no barrier between memory and registers. It relies on the many instructions that the interpreter executes
-between a write to one and a write to the other; a program in C++ could not.
+Python has no barrier between memory and registers. This module relies on the many instructions that the interpreter
+executes between a write to memory and a write to a register; a C++ program could not rely on them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from types import TracebackType
 from fusesoc_firm.node.transport.dma_device import DmaDevice
 from fusesoc_firm.node.transport.transport import Burst, TransportError
 
-# The first registers of the channels to and from the system; other registers are offsets from there.
+# The first registers of the channels to and from the system; other registers are at offsets from these.
 TO_SYSTEM, FROM_SYSTEM = 0x00, 0x30
 CONTROL, STATUS, FIRST_DESCRIPTOR, LAST_DESCRIPTOR = 0x00, 0x04, 0x08, 0x10
 _NAMES = {TO_SYSTEM: "MM2S", FROM_SYSTEM: "S2MM"}
@@ -66,7 +66,7 @@ _SHORTEST_PAUSE, _LONGEST_PAUSE = 5e-6, 500e-6
 
 @dataclass(frozen=True)
 class DmaBuffers:
-    """The number of buffers per direction, and the bytes of each: a multiple of 64, or 0 for as many as fit."""
+    """The number of buffers per direction, and the bytes in each: a multiple of 64, or 0 for the most that fit."""
 
     send: int = 16
     receive: int = 16
@@ -77,7 +77,7 @@ class _Ring:
     """The descriptors and buffers of one direction, used in turn."""
 
     def __init__(self, device: DmaDevice, channel: int, count: int, places: tuple[int, int, int]) -> None:
-        """`places` are the offsets of descriptors and buffers in the memory, and the bytes of each buffer."""
+        """`places` are the offsets of descriptors and buffers in the memory, and the size of each buffer in bytes."""
         self._device, self._channel, self._count = device, channel, count
         self._descriptors, self._buffers, self.size = places
         self._words = device.memory.cast("I")
@@ -126,7 +126,7 @@ class DmaTransport:
     """A transport over AXI DMA."""
 
     def __init__(self, device: DmaDevice, buffers: DmaBuffers | None = None, longest: int = 2**26) -> None:
-        """Reset the engine, and with it the system. No burst has more than `longest` bytes. Raises `TransportError`."""
+        """Reset the engine and thereby the system. No burst has more than `longest` bytes. Raises `TransportError`."""
         self._device = device
         self._longest = longest
         self._buffers = buffers or DmaBuffers()
@@ -142,7 +142,7 @@ class DmaTransport:
             self._buffers.receive,
             (self._buffers.send * DESCRIPTOR_BYTES, first_buffer + self._buffers.send * size, size),
         )
-        # Sender: the next descriptor, the first that the engine has, and the number that it has.
+        # Sender: the next descriptor, the first descriptor that the engine owns, and the number of such descriptors.
         self._next_sent, self._first_sent, self._handed_over = 0, 0, 0
         # Receiver: the descriptor that is filled next, and the bytes of the current burst.
         self._next_received, self._burst = 0, bytearray()

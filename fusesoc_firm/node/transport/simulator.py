@@ -9,7 +9,7 @@
         transport.send(pack_frame(0, payload))
         burst = transport.receive()
 
-The simulator is a separate process. Its output is kept, and shown if it ends unexpectedly.
+The simulator is a separate process. If it ends unexpectedly, its output is shown.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from fusesoc_firm.node.transport.transport import Burst, TransportError, Transpo
 MOST_CYCLES = 2**31 - 1
 """The limit of the cycles of one run, and of the bytes of a frame."""
 
-# Puts the pipes at the descriptors that a simulator expects. A shell cannot copy descriptors of two digits, but opens
+# Put the pipes at the descriptors that a simulator expects. A shell cannot copy two-digit descriptors, but can open
 # them by name.
 _SHELL = 'exec 3<"$1" 4>"$2"; shift 2; exec "$@"'
 _ID_ERROR = 65535
@@ -39,7 +39,7 @@ _SHOWN_LINES = 20
 # A simulator normally ends at once when it is asked to, or when its pipes close.
 _END_SECONDS = 10.0
 
-# A thread runs the simulator for this time before it looks for frames again, within the limits on cycles.
+# A thread runs the simulator for this time before looking for frames again, within the limits on cycles.
 _STEP_SECONDS = 0.001
 _FEWEST_CYCLES, _MOST_CYCLES = 64, 2**20
 
@@ -102,7 +102,7 @@ class Simulator:
         return self._process.pid
 
     def request(self, frame: bytes) -> None:
-        """Append a frame to those that are to be sent to the system. Raises `TransportError`."""
+        """Append a frame to the frames to send to the system. Raises `TransportError`."""
         if not 1 <= len(frame) <= MOST_CYCLES:
             raise ValueError(f"a frame of {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
         self._write(b"F" + len(frame).to_bytes(4, "little"), frame)
@@ -124,7 +124,7 @@ class Simulator:
         self.close()
 
     def kill(self) -> None:
-        """Kill the simulator at once. Another thread may do so; the one that uses it gets a `TransportError`."""
+        """Kill the simulator at once. Any thread may do so; the simulator's thread gets a `TransportError`."""
         self._process.kill()
 
     def close(self) -> None:
@@ -174,7 +174,7 @@ class Simulator:
         return int.from_bytes(self._read(size), "little")
 
     def _events(self) -> list[Event]:
-        """Return all reports up to the one at which the simulation stops."""
+        """Return all reports up to the report at which the simulation stops."""
         events: list[Event] = []
         while (kind := self._read(1)) != b"S":
             events.append(self._event(kind))
@@ -216,12 +216,12 @@ class Simulator:
 
 @dataclass(frozen=True)
 class Pace:
-    """The way in which a `SimulatorTransport` runs its simulator.
+    """How a `SimulatorTransport` runs its simulator.
 
     `send` waits while the system has not yet taken `most_frames` earlier frames. The simulator rests after
     `rest_cycles` without a beat. At rest it still runs a little every `idle_seconds`, for accelerators that send
-    spontaneously (None: it does not). It stops while unreceived bursts hold `most_bytes`, as hardware does that is not
-    read. If it ends unexpectedly, another one is started, up to `restarts` times.
+    spontaneously (None: it does not). Like hardware that is not read, it stops while unreceived bursts hold
+    `most_bytes`. If it ends unexpectedly, another simulator is started, up to `restarts` times.
     """
 
     most_frames: int = 2
@@ -369,7 +369,7 @@ class SimulatorTransport:
             self._bytes += len(event.data)
 
     def _recover(self, error: TransportError) -> None:
-        """Restart with the frames not yet given to the simulator, or end."""
+        """Restart with the frames not yet passed to the simulator, or end."""
         if self._is_closed or not self._restarts:
             self._end(error)
             return

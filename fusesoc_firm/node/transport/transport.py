@@ -1,10 +1,10 @@
-"""The one interface to the hardware: frames to it, bursts from it.
+"""The only interface to the hardware: it sends frames and receives bursts.
 
     with transport:
         transport.send(pack_frame(0, payload))          # waits while the hardware is not ready
         burst = transport.receive(timeout=1.0)          # None if none arrived in time
 
-A simulator's pipe, a UART and AXI DMA implement it. `cpp/firm/transport.hpp` in the folder above is the same in C++.
+A simulator's pipe, a UART and AXI DMA implement this interface. `../cpp/firm/transport.hpp` is the C++ version.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ class TransportError(Exception):
 
 
 class TransportResetError(TransportError):
-    """The hardware was reset, and the transport continues: all data under way in either direction is lost."""
+    """The hardware was reset, and the transport continues: all data in transit in either direction is lost."""
 
 
 @dataclass(frozen=True)
 class Burst:
     """The bytes of the system's stream up to a `tlast` that `tkeep` marks as valid: a frame or a part of one.
 
-    `tid` is the stream's, if the transport carries it. For simulated hardware, the cycles of clk in which the first and
-    the last beat were taken are known.
+    `tid` is the stream's `tid`, if the transport carries it. For simulated hardware, the cycles of clk in which the
+    first and the last beat were taken are known.
     """
 
     data: bytes

@@ -4,9 +4,9 @@
         transport.send(pack_frame(0, payload))
         burst = transport.receive(timeout=1.0)          # a whole frame, since a link carries no parts of frames
 
-A byte stream has no markers. The board takes a break as one: the next byte begins a frame. From the board, only silence
-is a marker. The transport uses both when it is opened, and again when received bytes cannot form a frame: an illegal
-length, or a pause in the middle of a frame.
+A byte stream has no markers. The board accepts a break as a marker: the next byte begins a frame. From the board, only
+silence is a marker. The transport uses both markers when it is opened, and again when received bytes cannot form a
+frame: after an illegal length, or a pause in the middle of a frame.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ class UartTransport:
         return None
 
     def _cut(self) -> None:
-        """Send a break, and drop all bytes received before it and all that are waiting to be sent."""
+        """Send a break, and drop all bytes received before the break and all bytes that are waiting to be sent."""
         with self._writing:
             self._cuts += 1
             termios.tcflush(self._line, termios.TCOFLUSH)
@@ -192,7 +192,7 @@ class UartTransport:
 
 
 def _configure(line: int, speed: int, *, has_flow_control: bool) -> None:
-    """Set a line to raw bytes at a speed."""
+    """Configure a line for raw bytes at a speed."""
     control = termios.CS8 | termios.CREAD | termios.CLOCAL
     if has_flow_control:
         control |= termios.CRTSCTS
@@ -202,5 +202,5 @@ def _configure(line: int, speed: int, *, has_flow_control: bool) -> None:
 
 
 def _least(*seconds: float | None) -> float | None:
-    """Return the shortest of some times; None means no time."""
+    """Return the shortest of several times; None means no limit."""
     return min((max(0.0, item) for item in seconds if item is not None), default=None)

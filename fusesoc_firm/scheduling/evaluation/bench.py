@@ -49,7 +49,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Places:
-    """The places where the work is done and where its results go."""
+    """The places where the jobs run and where the results are written."""
 
     jobs: int | None = None
     cluster: str | None = None
@@ -113,7 +113,7 @@ def write(evaluation: chapter.Evaluation, selection: Selection, folder: Path) ->
 
 
 def _check(places: Places) -> None:
-    """Make the folder, and check that the file can be written: an evaluation is too long to fail at its end."""
+    """Make the folder, and check that the file can be written, since an evaluation should not fail only at its end."""
     if places.output:
         make_folder(places.output)
     if places.csv:

@@ -31,7 +31,7 @@ class Evaluation:
     areas: Areas
 
     def value(self, data_set: str, policy: str, requesters: int, metric: str) -> float:
-        """A mean; NaN if it was not evaluated."""
+        """The mean of a metric; NaN if the metric was not evaluated."""
         return self.means.get(Key(data_set, policy, requesters), {}).get(metric, math.nan)
 
     def requesters(self, data_set: str) -> tuple[int, ...]:
@@ -57,7 +57,7 @@ def tables(evaluation: Evaluation) -> Iterator[Table]:
 
 
 def figures(evaluation: Evaluation) -> Iterator[Figure]:
-    """Figures 4.5 to 4.7 and 4.10 to 4.18, with all that was evaluated."""
+    """Figures 4.5 to 4.7 and 4.10 to 4.18, with all evaluated values."""
     yield _area_figure(evaluation.areas)
     if numbers := evaluation.requesters(LARGE):
         yield from _large_figures(evaluation, numbers)
@@ -115,7 +115,7 @@ def _spread_table(
 
 
 def _verdict(ours: float, theirs: float) -> str:
-    """The comparison of our value with the dissertation's, for metrics of which smaller is better."""
+    """The comparison of our value with the dissertation's value, for metrics where smaller is better."""
     if math.isnan(ours) or math.isnan(theirs):
         return UNKNOWN
     if abs(ours - theirs) <= _EQUAL:
@@ -169,7 +169,7 @@ def _criteria(evaluation: Evaluation, number: int) -> Iterator[tuple[str, str, C
 
 
 def _best(scores: Mapping[str, float]) -> list[str]:
-    """All policies with the best score; none if a score is unknown."""
+    """All policies with the best score; empty if a score is unknown."""
     if not scores or any(math.isnan(score) for score in scores.values()):
         return []
     least = min(scores.values())

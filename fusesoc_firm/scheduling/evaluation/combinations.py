@@ -1,4 +1,4 @@
-"""The combined schedulers of section 4.3.5: two schedulers of half the accelerators each, below an LRU scheduler."""
+"""The combined schedulers of section 4.3.5: two schedulers with half the accelerators each, below an LRU scheduler."""
 
 from __future__ import annotations
 

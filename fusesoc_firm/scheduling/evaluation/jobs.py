@@ -89,7 +89,7 @@ def evaluate(job: Job) -> Outcome:
 
 
 def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence[int], settings: Settings) -> list[Job]:
-    """A job for each combination; the longest come first, so that no single worker finishes long after the others.
+    """A job for each combination, longest jobs first, so that no worker finishes long after the others.
 
     The combined schedulers of figure 4.18 are included if all their components are.
     """

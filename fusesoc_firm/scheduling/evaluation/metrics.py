@@ -4,8 +4,8 @@ The dissertation defines each metric but not its aggregation. Here the minimum, 
 tasks of a set, then averaged over the sets. This explains why all three columns of tables 4.3 and 4.4 have fractions,
 and the models of the fixed priorities and of LRU reproduce their values.
 
-The response time is that of every granted task, although equation 4.4 speaks of completed transactions. The maxima of
-table 4.3 are only reproduced if tasks cut short by the end of the simulation count
+The response time covers every granted task, although equation 4.4 refers to completed transactions. The maxima of
+table 4.3 are only reproduced if tasks that the end of the simulation cut short are included
 (docs/explanation/scheduler-evaluation.md).
 """
 
@@ -54,7 +54,7 @@ class Metrics:
     """The same of the cycles in which somebody asked, in percent."""
 
     def means(self) -> dict[str, float]:
-        """The mean of each metric over the sets with a value; NaN if no set has one."""
+        """The mean of each metric over the sets with a value; NaN if no set has a value."""
         return {each.name: _mean(getattr(self, each.name)) for each in fields(self)}
 
 
@@ -108,7 +108,7 @@ def _distinct(of_set: Times, of_requester: Times, sets: int, requesters: int) ->
 
 
 def _preemptions(trace: Trace, completed: Times) -> Values:
-    """The preemptions per completed task, averaged over the accelerators that completed one.
+    """The preemptions per completed task, averaged over the accelerators that completed a task.
 
     Preemptions of unfinished tasks count too.
     """

@@ -42,7 +42,7 @@ def draw_figure(figure: Figure, folder: Path) -> None:
 
 
 def draw_timeline(timeline: Timeline, folder: Path) -> None:
-    """Draw requests as thin bars, with the grant as thick bars over them."""
+    """Draw requests as thin bars, overlaid by the grant as thick bars."""
     plots = _plots()
     drawing, axis = plots.subplots(figsize=_TIMELINE_INCHES, layout="constrained")
     axis.set_title(f"Figure {timeline.number}: {timeline.title}")

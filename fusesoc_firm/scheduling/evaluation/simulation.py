@@ -34,7 +34,7 @@ class SchedulerModel(Protocol):
 
 @dataclass(frozen=True)
 class Tasks:
-    """All granted tasks, one in each element, in the order of their ends; unfinished ones come last.
+    """All granted tasks, one in each element, in the order of their ends; unfinished tasks come last.
 
     Times are clock edges: an event in cycle k begins at k and ends at k + 1. `finish` is -1 for a task that the end of
     the simulation cut short.
@@ -82,8 +82,8 @@ def simulate(
     `first_requests` (B, N) are the cycles of the first requests. If it is None, each requester makes its first request
     after its usual pause. Section 4.3 leaves this open; this choice explains the maxima of table 4.3 for two
     accelerators, while simultaneous first requests would give a quarter more. Each run of a task except its first
-    begins with `resume_beats` more cycles, as the Manager's resumed bursts need them; the scheduler sees no beat in
-    them.
+    begins with `resume_beats` additional cycles, which the Manager needs to resume a burst; the scheduler sees no beat
+    in these cycles.
     """
     first = workload.frequencies if first_requests is None else first_requests
     environment = _Environment(workload, first, resume_beats)
@@ -151,7 +151,7 @@ class _Environment:
         if not begins.any():
             return
         new, old = granted[begins], self.running[begins]
-        # The interrupted task has begun and is unfinished, unless it is the one that begins.
+        # The interrupted task has begun and is unfinished, unless it is the beginning task.
         interrupted = old[(self.grant[old] >= 0) & (old != new)]
         self.preemptions[interrupted] += 1
         is_first = self.grant[new] < 0
@@ -169,7 +169,7 @@ class _Environment:
         self.preemptions[done] = 0
 
     def trace(self, cycles: int) -> Trace:
-        """The tasks noted so far, with those that have begun and are unfinished."""
+        """The tasks noted so far, including unfinished tasks that have begun."""
         cut = np.flatnonzero(self.grant >= 0)
         cut_short = (cut, self.arrival[cut], self.grant[cut], np.full(cut.size, -1), self.preemptions[cut])
         columns = [np.concatenate(column) for column in zip(*self.finished, cut_short, strict=True)]

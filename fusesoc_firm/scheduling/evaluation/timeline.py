@@ -44,7 +44,7 @@ class Recorder:
 
 @dataclass(frozen=True)
 class Timeline:
-    """The requests of each accelerator and the granted one (-1: none yet) in each cycle."""
+    """The requests of each accelerator and the granted accelerator (-1: none yet) in each cycle."""
 
     number: str
     title: str
@@ -77,7 +77,7 @@ def timelines() -> tuple[Timeline, Timeline]:
 
 
 def record(policy: str, workload: Workload, cycles: int) -> tuple[tuple[tuple[bool, ...], ...], tuple[int, ...]]:
-    """The requests and grants of the workload's first set; all its accelerators request in cycle 1."""
+    """The requests and grants of the workload's first set; all accelerators request in cycle 1."""
     recorder = Recorder(model_of(policy, workload))
     simulate(recorder, workload, cycles, np.ones_like(workload.frequencies))
     requests = np.array(recorder.request)[:, 0, :].T

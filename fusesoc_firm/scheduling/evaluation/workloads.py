@@ -104,7 +104,7 @@ def draw(
 ) -> Workload:
     """Draw a workload of a data set; equal arguments give equal workloads on every machine.
 
-    Each set has a random generator of its own, so a larger number of `sets` leaves the first ones unchanged.
+    Each set has a separate random generator, so a larger number of `sets` leaves the first sets unchanged.
     """
     count = data_set.sets if sets is None else sets
     pairs = np.stack([_pairs(data_set, requesters, [seed, requesters, k], distribution) for k in range(count)])

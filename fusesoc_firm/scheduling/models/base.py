@@ -91,7 +91,7 @@ class Scheduler(ABC):
 
     @abstractmethod
     def step(self, request: Bools, beat: Bools, last: Bools) -> None:
-        """Simulate a rising edge; `request` (B, N), `beat` and `last` (B,) are those of the ending cycle.
+        """Simulate a rising edge; `request` (B, N), `beat` and `last` (B,) are the inputs in the ending cycle.
 
         No argument is changed. `beat` may be true only where the grant is valid and its requester requests. `last`
         matters only where `beat` is true.

@@ -73,7 +73,7 @@ class Arrivals:
         self._accepted = accepted
 
     def _accept(self, request: Bools, where: Bools, accepted: Ints, finished_row: Ints, finished_bit: Ints) -> None:
-        """Accept the new requests of the next row into `accepted` where the previous row is empty."""
+        """Accept the next row's new requests into `accepted` where the previous row is empty."""
         self._padded[:, : self._requesters] = request
         by_row: Bools = self._padded.reshape((len(request), self._rows, self._columns))
         asks: Bools = np.logical_or.reduce(by_row, axis=2)
@@ -83,7 +83,7 @@ class Arrivals:
         row = order[self._members, np.take_along_axis(asks, order, axis=1).argmax(axis=1)]
         new = by_row[self._members, row] @ self._weights
         new &= ~self._known[self._members, row]
-        # The request of the requester that finishes belongs to its last beat.
+        # The request of a finishing requester belongs to its last beat.
         new &= ~np.where(row == finished_row, finished_bit, 0)
         self._known[self._members, row] |= np.where(where, new, 0)
         self._row = np.where(where, row, self._row)
@@ -91,7 +91,7 @@ class Arrivals:
 
 
 class Queue(ABC):
-    """A priority queue of items with distinct indices; `root_*` and `ready` are those of the current cycle.
+    """A priority queue of items with distinct indices; `root_*` and `ready` apply to the current cycle.
 
     While the root is still on its way, `root_id` and `root_key` already describe the next root, like the core's
     first_id and first_key, and `pop` removes it.
@@ -125,7 +125,7 @@ class Queue(ABC):
     @property
     @abstractmethod
     def empty(self) -> Bools:
-        """Whether the queue has no item, not even a root that is on its way."""
+        """Whether the queue has no item, not even a root that is not yet available."""
 
     @property
     @abstractmethod
@@ -135,7 +135,7 @@ class Queue(ABC):
     @property
     @abstractmethod
     def ready_with_pop(self) -> bool:
-        """Whether an item can enter while another one leaves."""
+        """Whether an item can enter while another item leaves."""
 
     @abstractmethod
     def ready(self, pop: Bools) -> Bools:
@@ -333,7 +333,7 @@ class Engine(Scheduler):
         advance = keys.advance(((self._running & self._keyed, self._key), (root_valid, root_key)), queue.clearing)
 
         choose = finished | ~(self._running | beat)
-        # If the task can be preempted after a beat, it need not wait for a root that is on its way.
+        # If the task can be preempted after a beat, it need not wait for a root that is not yet available.
         gives_way = ~queue.first_valid if self._is_preemptive and self._rules.shortest_run == 1 else empty
         take_root = choose & queue.first_valid
         take_b = choose & gives_way & self._b_valid

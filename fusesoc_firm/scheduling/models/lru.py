@@ -34,7 +34,7 @@ class ImmediateLru(ChoosingScheduler):
 class Stamps(Keys):
     """The model of firm_sched_stamps: the time of each requester's last completion, counted in completions."""
 
-    _QUARTER_BITS = 3  # bits beyond those of an index
+    _QUARTER_BITS = 3  # bits in addition to an index's bits
     _STEPS = 4  # bits of the count for one requester of the sweep
 
     def __init__(self, batch: int, requesters: int) -> None:

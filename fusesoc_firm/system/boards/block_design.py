@@ -1,8 +1,8 @@
-"""Derived System -> template configuration: the system next to a processor, as a block design of Vivado.
+"""Derived System -> template configuration: the system next to a processor, as a Vivado block design.
 
-A DMA engine carries frames between the processor's memory and the system's streams. It uses lists of descriptors
-(scatter and gather): frames, or the bursts of a preemptive scheduler, arrive at any time with any length, each in the
-next buffer. The id is in the bytes, so `m_axis_tid` is not connected.
+A DMA engine carries frames between the processor's memory and the system's streams. The engine uses lists of
+descriptors (scatter-gather), since frames, or the bursts of a preemptive scheduler, arrive at any time with any length,
+each in the next buffer. The frame contains the id, so `m_axis_tid` is not connected.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fusesoc_firm.text.render import Context
 BLOCK_DESIGN_TEMPLATE = "board/block_design.tcl"
 PACKAGE_TEMPLATE = "hls/package.tcl"
 
-# The width of the length in a descriptor: the DMA engine's maximum (PG021).
+# The width of a descriptor's length field in bits: the DMA engine's maximum (PG021).
 _LENGTH_BITS = 26
 _ADDRESS_BITS = 32
 _STREAM = ("tdata", "tkeep", "tvalid", "tlast")
@@ -115,7 +115,7 @@ def _interfaces(processor: Processor) -> Iterator[tuple[str, str]]:
 
 
 def _nets(system: DerivedSystem, processor: Processor) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """The connections of single pins, each with driver and sink."""
+    """The connections of single pins, each with its driver and sink."""
     clock = f"processor/{processor.clock.format(0)}"
     processor_clocks = (f"processor/{processor.control_clock}", f"processor/{processor.memory_clock}")
     yield "The clock", [(clock, pin) for pin in (*processor_clocks, *_CLOCK_PINS)]
@@ -167,7 +167,7 @@ def _pins(system: DerivedSystem) -> list[Context]:
 def package_configuration(
     type_: AcceleratorType, sources: Sequence[str], system: DerivedSystem, board: Board, clock: Fraction
 ) -> Context:
-    """The configuration of the script for Vitis HLS, which makes an IP of a C++ function from adjacent `sources`."""
+    """The configuration of the Vitis HLS script that makes an IP from a C++ function in `sources` next to it."""
     clocks = {item.name: item.frequency for item in system.clocks}
     fastest = max(clocks.get(block.clock, clock) for block in system.accelerators if block.type is type_)
     return {

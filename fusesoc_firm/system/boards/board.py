@@ -1,8 +1,8 @@
 """A board: the connections of its FPGA, and the top level that fits a system to it.
 
-A board is one YAML file. The package's boards are in `fusesoc_firm/boards`; a core names its own board by a path. A
-board without a processor has pins, and a link to the host. A board with a processor has the system in a block design
-(`block_design`).
+A YAML file describes a board. The package's boards are in `fusesoc_firm/boards`; a core refers to any other board by a
+path. A board without a processor has pins, and a link to the host. On a board with a processor, the system is part of a
+block design (`block_design`).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 FOLDER = Path(__file__).resolve().parents[2] / "boards"
 BOARD_TEMPLATE = "vhdl/board.vhd"
 
-# Edalize's flows for boards with pins, each with the template and FuseSoC file type of its constraints.
+# Edalize's flows for boards with pins, each with the template and FuseSoC file type of the constraints.
 FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
-# Tools that implement the system with its streams: Vivado next to a processor, Quartus without changes.
+# Tools that implement the system with streams as ports: Vivado next to a processor, Quartus without changes.
 VIVADO, QUARTUS = "vivado", "quartus"
 # The keys of a board that each tool requires.
 _NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
@@ -97,7 +97,7 @@ class Board(Section):
 
 @dataclass(frozen=True)
 class _Port:
-    """A pin of an accelerator at the top level: its bits, None for a scalar, and its name in messages."""
+    """A pin of an accelerator at the top level: the pin's bits, None for a scalar, and the pin's name in messages."""
 
     name: str
     direction: str
@@ -106,7 +106,7 @@ class _Port:
     source: SourceRef | None
 
     def bits(self) -> list[str]:
-        """All bits; each of them has a place of its own."""
+        """All bits; each bit has a separate place on the board."""
         return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
 
 
@@ -121,7 +121,7 @@ def board_path(name: str, folder: Path) -> Path:
 
 
 def read_board(name: str, folder: Path = Path()) -> Board:
-    """Read the board that `board_path` identifies; raises `InputError`."""
+    """Read the board file that `board_path` identifies; raises `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
         fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
@@ -174,8 +174,8 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
 def on_board(specification: Specification, board: Board) -> Specification:
     """The specification of the system on the board, with the board's interconnect.
 
-    On a board without a processor, the clock pin determines the frequency of clk. On other boards, a PLL provides any
-    frequency that the specification asks for.
+    On a board without a processor, the clock pin determines the frequency of clk. On other boards, a PLL provides the
+    frequency that the specification requests.
     """
     clock = board.clock if board.is_linked else specification.project.clock or board.clock
     return replace(specification, project=replace(specification.project, interconnect=board.interconnect, clock=clock))
@@ -212,7 +212,7 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
 
 
 def board_entity(system: DerivedSystem, board: Board) -> str:
-    """The entity of the top level of a system on a board; next to a processor, the block design."""
+    """The top-level entity of a system on a board; next to a processor, the name of the block design."""
     return system.entity if board.flow == QUARTUS else f"{system.name}_{board.name}"
 
 
@@ -255,11 +255,11 @@ def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
 
 
 def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
-    """The accelerators' pins with the names and bits that they have at the top level."""
+    """The accelerators' pins with their names and bits at the top level."""
     names = top_level_pins(system)
     return [
         _Port(
-            # In lower case, as GHDL writes it.
+            # In lower case, as GHDL writes names.
             names[block.block, pin.name].lower(),
             str(pin.direction),
             pin.bits,

@@ -1,4 +1,4 @@
-"""The processors of FPGAs as Vivado's blocks: the names of their IPs, pins and properties.
+"""The processors in FPGAs as Vivado blocks: the names of IPs, pins and properties.
 
 Sources: Zynq-7000, PG082 (Processing System 7) and UG585; Zynq UltraScale+, PG201 and UG1085.
 """
@@ -13,11 +13,12 @@ MOST_CLOCKS = 4
 
 @dataclass(frozen=True)
 class Processor:
-    """A processor of an FPGA; names with `{}` are those of clock 0, 1, ...
+    """A processor in an FPGA; `{}` in a name is the number of a clock: 0, 1, ...
 
-    `clock` is a clock's pin and `timing_clock` its name in timing constraints. `frequency` and `clock_switch` are its
-    properties. `control` is the master for registers; `base` is the address of the DMA engine's registers. `memory` is
-    the slave that leads to the processor's memory and has `memory_width` bits. Both come with the pins of their clocks.
+    `clock` is a clock's pin and `timing_clock` the clock's name in timing constraints. `frequency` and `clock_switch`
+    are properties of the clock. `control` is the master for registers; `base` is the address of the DMA engine's
+    registers. `memory` is the slave that leads to the processor's memory and has `memory_width` bits. Master and slave
+    are listed with the pins of their clocks.
     """
 
     ip: str

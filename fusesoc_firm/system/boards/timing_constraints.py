@@ -1,4 +1,4 @@
-"""Derived System -> template configuration: constraints of clocks, and of the paths between them.
+"""Derived System -> template configuration: constraints on clocks and on the paths between clocks.
 
 docs/how-to/use-several-clocks.md lists them.
 """

@@ -1,6 +1,7 @@
-"""The data flow: finds the ports and fields that each `outgoing` refers to, and reports faults.
+"""Find the ports and fields to which each `outgoing` refers, and report faults in the data flow.
 
-An impossible connection is reported as one fault. Messages that are missing only because of it are not reported.
+An impossible connection is reported as one fault. Messages that are missing only because of this fault are not
+reported.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from fusesoc_firm.text.yaml_text import Text
 Sides = Mapping[str, tuple[MessageSide, ...]]
 Pair = tuple[MessageSide, MessageSide]
 
-# Represents the fields of a message without fields.
+# Stands in for the fields of a message without fields.
 _NO_FIELD: Names = ()
 
 
@@ -30,9 +31,9 @@ _NO_FIELD: Names = ()
 class Wiring:
     """The connections between named `blocks` whose message sides (`inputs`, `outputs`) are known.
 
-    The other attributes limit follow-up errors of faulty specifications. `has_more_blocks` is set if names of blocks
+    The other attributes limit follow-up errors in faulty specifications. `has_more_blocks` is set if names of blocks
     could not be read, `has_more_messages` if messages of connections are unknown. `strays` are messages of connections
-    that could not be read. `ambiguous` are names of several blocks; the tables contain the first one.
+    that could not be read. `ambiguous` are names that several blocks share; the tables contain the first such block.
     """
 
     blocks: Mapping[str, Block]
@@ -47,12 +48,12 @@ class Wiring:
     sinks: dict[End, dict[End, frozenset[Names]]] = field(default_factory=dict)
     frames: dict[End, Frame] = field(default_factory=dict)
     driven: dict[End, dict[Names, Outgoing]] = field(default_factory=dict)
-    # The two ends of connections that could not be made.
+    # The ends of connections that could not be made.
     broken_sources: set[str] = field(default_factory=set)
     broken_sinks: set[str] = field(default_factory=set)
 
     def connect(self) -> tuple[Connection, ...]:
-        """Make all connections, one for each giving message side, in the order of the specification."""
+        """Make all connections, one for each side that provides a message, in the order of the specification."""
         for block in self.blocks.values():
             for outgoing in block.outgoing:
                 if not self._connect(block, outgoing):
@@ -141,12 +142,12 @@ class Wiring:
         return pairs
 
     def _rivals(self, outgoing: Outgoing, pair: Pair, names: Iterable[Names]) -> tuple[Names, Outgoing] | None:
-        """A field that another connection already drives, with this connection."""
+        """A field that another connection already drives, with that connection."""
         driven = self.driven.get(self._sink(outgoing, pair), {})
         return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
 
     def _chosen(self, block: Block, free: Sequence[Pair]) -> Pair:
-        """The first pair whose output is unused; otherwise the last matching output gets a further sink."""
+        """The first pair whose output is unused; otherwise the last pair, whose output gets another sink."""
         unused = [pair for pair in free if self._source(block, pair) not in self.sinks]
         last = free[-1][0]
         return unused[0] if unused else next(pair for pair in free if pair[0] == last)
@@ -166,7 +167,7 @@ class Wiring:
                     self._check_sink(block, side)
 
     def _check_sink(self, block: Block, side: MessageSide) -> None:
-        """Check that a sink is driven; a publisher sends defaults for missing fields, an accelerator needs all."""
+        """Check that a sink is driven; publishers send defaults for missing fields, accelerators need all fields."""
         driven = self.driven.get(End(str(block.name), side.prefix), {})
         missing = sorted(dotted(name) for name in _names(side.frame) - driven.keys())
         if not driven:
@@ -195,7 +196,7 @@ class Wiring:
 
     def _check_cycles(self) -> None:
         """Check that no message depends on itself."""
-        # Lists, since the order in sets of strings differs from run to run.
+        # Lists, since the order of sets of strings differs from run to run.
         graph: dict[str, list[str]] = {}
         for source, sinks in self.sinks.items():
             for sink in sinks:
@@ -205,16 +206,16 @@ class Wiring:
             start = min(range(len(cycle)), key=lambda position: order.index(cycle[position]))
             way = [*cycle[start:], *cycle[: start + 1]]
             self.faults.error(f"these blocks wait for each other: {' -> '.join(way)}", self.blocks[way[0]].name.source)
-            # Removing this edge breaks the cycle; there may be others.
+            # Removing this edge breaks the cycle; there may be other cycles.
             graph[way[1]] = [block for block in graph[way[1]] if block != way[0]]
 
 
 def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
-    """The blocks of a cycle in the direction of its messages, each once; empty if there is no cycle."""
+    """The blocks of a cycle in the direction of the messages, each once; empty if there is no cycle."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
-        # Each block is the predecessor of the next one; the first one is repeated at the end.
+        # Each block is the predecessor of the next one; the first block is repeated at the end.
         return list(error.args[1][:-1])
     return []
 
@@ -239,7 +240,7 @@ def _messages(sides: Sequence[MessageSide]) -> str:
 
 
 def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
-    """The key that an accelerator without a message at this side lacks; empty if it has one."""
+    """The key that is missing from an accelerator without a message at this side; empty if there is a message."""
     return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
 
 

@@ -1,12 +1,13 @@
 """Accelerators written as a C++ function for high-level synthesis.
 
-Such an accelerator consists of a kernel with the `ap_ctrl_hs` handshake, which HLS tools give a function, and a wrapper
-with the message sides of an accelerator. In synthesis, the kernel is the output of the HLS tool. In simulation, it is
-an entity of the same name and ports that calls the user's function, compiled to a shared library.
+An accelerator of this type consists of a kernel with the `ap_ctrl_hs` handshake, which HLS tools generate for a
+function, and a wrapper with the message sides of an accelerator. In synthesis, the kernel is the output of the HLS
+tool. In simulation, the kernel is an entity with the same name and ports that calls the user's function, compiled to a
+shared library.
 
-The function has the name of its file. Its parameters are the inputs' fields by value, followed by the outputs' fields
-by pointer or reference, in wire order. They should have the names `<field>_in` and `<field>_out`, which become the
-ports.
+The function has the name of its file. The parameters are the inputs' fields by value, followed by the outputs' fields
+by pointer or reference, in wire order. The parameters should be named `<field>_in` and `<field>_out`; these names
+become the ports' names.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ _CPP_TYPES = {
 class Argument:
     """A parameter of the C++ function.
 
-    `port` is the kernel's port and `signal` the accelerator's; `word` is the index of the first 32-bit word that
-    carries it.
+    `port` is the kernel's port and `signal` the accelerator's signal; `word` is the index of the first 32-bit word
+    that carries the argument.
     """
 
     port: str
@@ -59,20 +60,20 @@ class Argument:
 
 
 def function_name(accelerator: AcceleratorType) -> str:
-    """The C++ function's name, which is that of the first source file."""
+    """The C++ function's name, which is the name of the first source file without suffix."""
     return PurePosixPath(accelerator.accelerator.sources[0]).stem
 
 
 def kernel_entity(accelerator: AcceleratorType) -> str:
-    """The entity around the function: an IP or, in simulation, an entity that calls the C++ function.
+    """The name of the entity around the function: an IP or, in simulation, an entity that calls the C++ function.
 
-    The wrapper instantiates it. It does not have the function's own name, which belongs to a module within the IP.
+    The wrapper instantiates this entity. The entity cannot have the function's name, which a module in the IP has.
     """
     return f"{function_name(accelerator)}_kernel"
 
 
 def library_name(accelerator: AcceleratorType) -> str:
-    """The shared library that the simulation loads from its work folder."""
+    """The file name of the shared library that the simulation loads from its work folder."""
     return f"lib{function_name(accelerator)}.so"
 
 
@@ -123,7 +124,7 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
 
 
 def _problems(frame: Frame) -> list[str]:
-    """The parts of a message that no parameter can carry."""
+    """The parts of a message that parameters cannot carry."""
     try:
         check_fixed_size(frame)
     except InputError as error:

@@ -1,7 +1,8 @@
 """Specification -> derived System: data types and data flow.
 
-Resolves every message, assigns ids, and uses `connections` to find the port and block that each connection refers to.
-Faults are reported at their place in the specification; as many checks as possible run before anything is raised.
+This module resolves every message, assigns ids, and uses `connections` to find the port and block to which each
+connection refers. Faults are reported at their places in the specification; as many checks as possible run before an
+error is raised.
 """
 
 from __future__ import annotations
@@ -71,9 +72,9 @@ def derive(
     *,
     needs_sources: bool = True,
 ) -> DerivedSystem:
-    """Derive the system of a specification in `folder`; unless it `needs_sources`, source files may be missing.
+    """Derive the system of a specification in `folder`; unless `needs_sources` is set, source files may be missing.
 
-    Raises `InputError` with the faults found here and those already in `faults`.
+    Raises `InputError` with the faults found here and the faults already in `faults`.
     """
     analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
     analysis.check_names()
@@ -123,10 +124,10 @@ def source_files(specification: Specification, folder: Path) -> list[Path]:
 
 @dataclass
 class _Analysis:
-    """The state of one analysis: everything resolved so far.
+    """The state of an analysis: the types and blocks resolved so far.
 
-    `blocks` are the possible ends of connections: the first block of each name. If a fault leaves the messages of a
-    block unknown, its inputs and outputs are missing from the tables.
+    `blocks` are the possible ends of connections: the first block of each name. If the messages of a block are unknown
+    because of a fault, the inputs and outputs of this block are missing from the tables.
     """
 
     specification: Specification
@@ -190,7 +191,7 @@ class _Analysis:
                 self.faults.error(f"'{source}' is not a source of type {accelerator.type}", source.source, hint)
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
-        """The message sides of an interface, numbered if there are several; None if a message has a fault."""
+        """The message sides of an interface, numbered if there are several sides; None if a message has a fault."""
         frames = [self._frame(item.middleware, item.message, item.include, item.exclude) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
         sides = [
@@ -257,7 +258,7 @@ class _Analysis:
     def _resolve_converter(self, block: Block) -> None:
         missing = [key for key in CONVERTER_KEYS if getattr(block, key) is None]
         if missing:
-            # The faults of a block that could not be read are noted already.
+            # The faults in a block that could not be read are already noted.
             if block.is_sound:
                 words = ", ".join(f"'{key}'" for key in missing)
                 self.faults.error(f"block '{block.name}' needs {words}", block.name.source, _KINDS_OF_BLOCKS)
@@ -328,7 +329,7 @@ class _Analysis:
         return Parting(self.blocks, software, self.inputs, self.outputs, connections, names).parts()
 
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
-        """The accelerators' blocks with known types, in one part of the system."""
+        """The accelerators' blocks with known types, in hardware or in software."""
         found = [
             AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
             for block in self.blocks.values()

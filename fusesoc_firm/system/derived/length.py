@@ -1,8 +1,8 @@
-"""The way in which the length of each payload is known in advance, and the publishers that store whole frames.
+"""The sources of each payload's length, and the publishers that store whole frames.
 
-A length is computed from the lengths of the parts, given by the accelerator, or counted in a buffer after the
-publisher. Publishers that share a source stream also have buffers: only one of them sends at a time, so the others
-would block the stream forever.
+A payload's length must be known before the payload is sent. The length is computed from the lengths of the parts,
+provided by the accelerator, or counted in a buffer after the publisher. Publishers that share a source stream also have
+buffers: only one publisher sends at a time, so without buffers the others would block the stream forever.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def _check_whole(
     blocks: Mapping[str, Block],
     faults: Diagnostics,
 ) -> None:
-    """Note a message of variable size that is split: its segment boundaries depend on its fields."""
+    """Note a message of variable size that is split, since the segment boundaries depend on the fields."""
     names = [names_in_use(frame) for frame in connection.frames]
     whole = names[0] if blocks[connection.source.block].type is None else names_in_use(side.frame)
     message = connection.frame.message
@@ -75,10 +75,10 @@ def _check_whole(
 
 
 def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
-    """The length of a subscriber's output, which is the length of the whole message.
+    """The source of the length of a subscriber's output, which is the length of the whole message.
 
-    If some of its parts are missing, a forwarded message (`is_sent`) has a different length; at an accelerator, the
-    received length is valid.
+    If some parts of the message are missing, a forwarded message (`is_sent`) has a different length; at an
+    accelerator, the received length is valid.
     """
     unused = [node for node in all_nodes(frame.nodes) if isinstance(node, Data | Loop) and not node.is_used]
     if not unused or not is_sent:

@@ -8,12 +8,12 @@ from fusesoc_firm.system.derived.model import Link, LinkKind, Scheduling
 from fusesoc_firm.system.written.specification import AXI_STREAM, Project
 from fusesoc_firm.text.diagnostics import Diagnostics
 
-# A higher frequency exceeds VHDL's integers in the generic CLOCK_HZ.
+# In the generic CLOCK_HZ, a higher frequency exceeds the range of VHDL's integers.
 _FASTEST = 10**9
 
 
 def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
-    """The link between the host and a system; None if the system's streams are its ports; faults are noted.
+    """The link between the host and a system; None if the streams are ports of the system; faults are noted.
 
     `clock` is the frequency of clk in Hz, if it is given.
     """

@@ -1,6 +1,6 @@
 """The derived System: all converters, accelerators, ids and connections, with all decisions made.
 
-`analysis` derives it from a specification. All templates and `firm system show` use it as their data.
+`derivation` derives the System from a specification. All templates and `firm system show` use the System as data.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from fusesoc_firm.text.naming import identifier
 
 
 def absolute_name(topic: str) -> str:
-    """A topic's name in the root namespace."""
+    """The name of a topic in the root namespace."""
     return topic if topic.startswith("/") else f"/{topic}"
 
 
 @dataclass(frozen=True)
 class Topic:
-    """A message between the system and others; without a `given_name`, its topic has the block's name."""
+    """A message between the system and other programs; without a `given_name`, the topic has the block's name."""
 
     block: str
     frame: Frame
@@ -33,7 +33,7 @@ class Topic:
 
     @property
     def ros_name(self) -> str:
-        """The topic's name as a node uses it: without a leading `/`, it is relative to the node's namespace."""
+        """The topic's name as a node uses it: a name without a leading `/` is relative to the node's namespace."""
         return self.given_name or identifier(self.block, avoid=())
 
     @property
@@ -44,7 +44,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class End:
-    """One end of a connection: a block, and the prefix of the message's ports there (empty at a converter)."""
+    """One end of a connection: a block, and the prefix of the message's ports at the block (empty at a converter)."""
 
     block: str
     prefix: str = ""
@@ -70,7 +70,7 @@ class LengthSource(Enum):
 
 @dataclass(frozen=True)
 class PayloadLength:
-    """The way in which a publisher learns the length of its payloads, with the reason.
+    """The source from which a publisher learns the length of a payload, with the reason.
 
     `suffix` is the suffix of the entity that computes the length.
     """
@@ -82,7 +82,7 @@ class PayloadLength:
 
 @dataclass(frozen=True)
 class MessageSide:
-    """A message at a block: its ports begin with `prefix` (`in_`, `out1_`, empty at a converter)."""
+    """A message at a block, where the names of its ports begin with `prefix` (`in_`, `out1_`, empty at a converter)."""
 
     prefix: str
     frame: Frame
@@ -90,13 +90,13 @@ class MessageSide:
 
     @property
     def kind(self) -> tuple[MessageName, Middleware]:
-        """The key by which two sides match: the message, regardless of the fields that they use."""
+        """The key by which two sides match: the message, regardless of the used fields."""
         return self.frame.message, self.frame.ros
 
 
 @dataclass(frozen=True)
 class AcceleratorType:
-    """An accelerator with its messages resolved; its streams have `width` bits, its WIDTH if `has_width` is set."""
+    """An accelerator with resolved messages and `width`-bit streams; `has_width` tells whether WIDTH sets the width."""
 
     accelerator: Accelerator
     inputs: tuple[MessageSide, ...]
@@ -112,18 +112,18 @@ class AcceleratorType:
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether it is software that runs in another program and is reached by topics."""
+        """Whether the accelerator is software that runs in another program and is reached through topics."""
         return self.accelerator.is_software and not self.accelerator.sources
 
     @property
     def is_component(self) -> bool:
-        """Whether the top level declares it as a component: a Verilog module is not an entity."""
+        """Whether the top level declares the unit as a component, since a Verilog module is not an entity."""
         return self.accelerator.type == "Verilog"
 
 
 @dataclass(frozen=True)
 class AcceleratorBlock:
-    """An instance of an accelerator; `clock` is the name of its clock, empty for the system's clock."""
+    """An instance of an accelerator; `clock` is the name of the instance's clock, empty for the system's clock."""
 
     block: str
     type: AcceleratorType
@@ -132,10 +132,10 @@ class AcceleratorBlock:
 
 @dataclass(frozen=True)
 class Connection:
-    """The way of a message from its source to all its sinks, in the order of the specification.
+    """The route of a message from its source to all its sinks, in the order of the specification.
 
-    `frames` has the message for each sink; its used fields are those that this connection carries there. A message of
-    variable size is the same for all sinks, and has a `length`.
+    `frames` has the message for each sink, where the used fields are the fields that this connection carries to the
+    sink. A message of variable size is the same for all sinks, and has a `length`.
     """
 
     source: End
@@ -153,8 +153,7 @@ class Connection:
 class PublisherTimes:
     """The known times of a publisher, in cycles.
 
-    These are the times from message to message, for sending a frame, and from the request to the deadline for sending
-    it.
+    These are the time between messages, the time to send a frame, and the time from a request to its deadline.
     """
 
     period: int | None
@@ -166,8 +165,8 @@ class PublisherTimes:
 class Scheduling:
     """The scheduler that chooses the next frame to the host: its policy, with the publishers' times by id.
 
-    A preemptive policy interrupts a frame after `shortest_run` beats at the earliest. The times have `time_bits`. If
-    the policy was chosen automatically, `reasons` explain the choice.
+    A preemptive policy interrupts a frame after `shortest_run` beats at the earliest. The times have `time_bits` bits.
+    If the policy was chosen automatically, `reasons` explain the choice.
     """
 
     policy: str
@@ -187,7 +186,7 @@ class LinkKind(Enum):
 
 @dataclass(frozen=True)
 class Link:
-    """The link between the host and the system, and the frequency of clk if it is needed or known."""
+    """The link between the host and the system, and the frequency of clk if the frequency is needed or known."""
 
     kind: LinkKind
     clock_hz: int
@@ -198,8 +197,8 @@ class Software:
     """The host's part of a system: `blocks` in software, and all connections whose messages travel on the host.
 
     The source of a connection is one of the `subscribers`, a block, or the hardware's publisher that represents a
-    block's input. Its sinks are blocks, the `publishers`, or the hardware's subscribers that represent blocks' outputs.
-    A subscriber may be in hardware as well; a publisher is only here.
+    block's input. The sinks of a connection are blocks, the `publishers`, or the hardware's subscribers that represent
+    blocks' outputs. One of the `subscribers` may be in hardware as well; the `publishers` are in software only.
     """
 
     blocks: tuple[AcceleratorBlock, ...] = ()
@@ -215,7 +214,7 @@ class Software:
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock other than the system's: its `frequency` in Hz, and the `ratio` of its edges to those of clk."""
+    """A clock other than the system's: its `frequency` in Hz, and the `ratio` of its edges to clk's edges."""
 
     name: str
     frequency: Fraction
@@ -228,18 +227,18 @@ class Clock:
 
     @property
     def reset(self) -> str:
-        """The reset of its domain, synchronous and active-low."""
+        """The synchronous, active-low reset of the clock's domain."""
         return f"rst_{self.name}_n"
 
 
 @dataclass(frozen=True)
 class DerivedSystem:
-    """The whole system; `name` is an identifier, `width` the streams' bits, `clocks` all clocks other than clk.
+    """The whole system; `name` is an identifier, `width` the width of the streams, `clocks` all clocks except clk.
 
     `clock` is the frequency of clk in Hz, if it is given.
 
-    Without a `link`, the streams are ports of the system. Converters, accelerators and connections are those of the
-    hardware. `names` are the names of the accelerators' messages outside of the accelerators: `<block>_in`,
+    Without a `link`, the streams are ports of the system. Converters, accelerators and connections in software are not
+    included. `names` are the names of the accelerators' messages outside of the accelerators: `<block>_in`,
     `<block>_out1` and so on.
     """
 
@@ -291,7 +290,7 @@ class DerivedSystem:
         }
 
     def length_to(self, publisher: Converter) -> PayloadLength | None:
-        """The way in which a publisher learns the length of its payloads; None if the length is constant."""
+        """The source from which a publisher learns the length of a payload; None if the length is constant."""
         return next(item.length for item in self.connections if End(publisher.block) in item.sinks)
 
     @property
@@ -301,7 +300,7 @@ class DerivedSystem:
 
     @property
     def kernels(self) -> tuple[AcceleratorType, ...]:
-        """The types in C++ that an HLS tool turns into hardware."""
+        """The C++ accelerators that an HLS tool turns into hardware."""
         return tuple(type_ for type_ in self.accelerator_types if type_.accelerator.type == "HLS")
 
     @property

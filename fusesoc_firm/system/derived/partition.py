@@ -2,8 +2,8 @@
 
 A specification defines the connections; the type of an accelerator decides between hardware and software. A message
 from hardware to a block in software leaves through an added publisher. A message from such a block to hardware enters
-through an added subscriber. All other messages of software stay on the host. So a subscriber that feeds only software,
-or a publisher that only software feeds, is not a converter.
+through an added subscriber. All other messages of software stay on the host. A subscriber that feeds only software, or
+a publisher that only software feeds, is therefore not a converter.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ MOST_CONVERTERS = 256
 class Parts:
     """A partitioned system: `software`, and the hardware's blocks by name, message sides and connections.
 
-    `crossings` are the added converters among these blocks, each with the message side in software that it represents.
-    They come last, in the order of the specification's blocks.
+    `crossings` are the added converters among these blocks, each with the message side in software that the converter
+    represents. Added converters come last, in the order of the specification's blocks.
     """
 
     blocks: Mapping[str, Block]
@@ -47,7 +47,7 @@ class Parts:
         return {name: block for name, block in self.blocks.items() if block.type is None and block.mode == mode}
 
     def check(self, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
-        """Note the faults of the hardware of a specification with these `blocks`."""
+        """Note the faults in the hardware of a specification with these `blocks`."""
         first = next(iter(blocks.values())).name.source
         if not self.blocks:
             hint = "an accelerator, or a message that goes from a subscriber to a publisher, must stay there"
@@ -81,7 +81,7 @@ def message_names(blocks: Mapping[str, Block], inputs: Sides, outputs: Sides) ->
 
 @dataclass(frozen=True)
 class Parting:
-    """A system before its partition, with its blocks in `software`; `names` are those of `message_names`."""
+    """A system before partitioning, with its blocks in `software`; `names` is the result of `message_names`."""
 
     blocks: Mapping[str, Block]
     software: Sequence[AcceleratorBlock]
@@ -107,7 +107,7 @@ class Parting:
         )
 
     def _software(self, connections: tuple[Connection, ...]) -> Software:
-        """The host's part; its publishers have the fields that are driven."""
+        """The host's part of the system; its publishers have only the driven fields."""
         sources = {connection.source.block for connection in connections}
         subscribers = [
             self._topic(name, self.outputs[name][0].frame) for name in self._converters(SUBSCRIBER) if name in sources
@@ -143,10 +143,10 @@ class Parting:
 
     @cached_property
     def _hardware_sinks(self) -> frozenset[End]:
-        """The ends whose whole message is in hardware, even if a part of it comes from the host.
+        """The ends whose whole message is in hardware, even if part of the message comes from the host.
 
-        These are the accelerators in hardware, all sinks of such accelerators, and the publishers that subscribers
-        drive.
+        These ends are the accelerators in hardware, all sinks of accelerators in hardware, and the publishers that
+        subscribers drive.
         """
         return frozenset(
             sink
@@ -197,7 +197,7 @@ class Parting:
                 yield _connection(connection.source, pairs)
 
     def _crossing(self, end: End) -> End:
-        """The end in hardware that represents an end in software; other ends stay unchanged."""
+        """The end in hardware that represents an end in software; any other end is returned unchanged."""
         return End(self.names[end]) if end.block in self._in_software else end
 
     def _converter(self, end: End, side: MessageSide) -> Block:
@@ -223,7 +223,7 @@ def _check_no_publisher_keys(block: Block, faults: Diagnostics) -> None:
 
 
 def _bare(side: MessageSide) -> MessageSide:
-    """The side without a prefix, as a converter has it."""
+    """The side without a prefix, as at a converter."""
     return MessageSide("", side.frame)
 
 
@@ -236,6 +236,6 @@ def _connection(source: End, pairs: Sequence[tuple[End, Frame]]) -> Connection:
 
 
 def _joined(frames: Sequence[Frame]) -> Frame:
-    """A message with all fields that are used in any of several frames."""
+    """A message with all fields that at least one of several frames uses."""
     names = reduce(frozenset.union, (names_in_use(frame) for frame in frames))
     return with_names_in_use(frames[0], names)

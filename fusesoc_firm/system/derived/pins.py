@@ -1,4 +1,4 @@
-"""The pins of accelerators: ports that belong to no message and that the top level exports."""
+"""The pins of accelerators: ports that are not part of a message and that the top level exports."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fusesoc_firm.text.naming import identifier
 # The width of the largest array that fits a message's port.
 _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
-# The kinds of ports that accelerators of some types lack.
+# The kinds of ports that are missing in accelerators of some types.
 _WITHOUT_PINS = {"HLS": "ports but those of its messages", SOFTWARE: "ports"}
 
 

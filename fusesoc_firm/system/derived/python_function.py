@@ -3,7 +3,7 @@
     def mix(message0, message1):
         return {"x": message0["x"] + message1["x"], "y": 0.0, "z": 0.0}
 
-This module only reads the file and never runs it.
+This module only reads the file and never runs the function.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _KEYWORDS = frozenset(word.lower() for word in keyword.kwlist)
 
 
 def function_name(type_: AcceleratorType) -> str:
-    """The function's name, which is that of the accelerator."""
+    """The function's name, which is the name of the accelerator."""
     return identifier(type_.accelerator.name, avoid=_KEYWORDS, suffix="function")
 
 
@@ -41,7 +41,7 @@ def prototype(type_: AcceleratorType) -> str:
 
 
 def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> None:
-    """Note faults of the function in the file at `path`, which is the first of the sources; the file may be missing."""
+    """Note faults in the function, whose file at `path` is the first source; the file may be missing."""
     accelerator = type_.accelerator
     if not type_.inputs:
         message = f"'{accelerator.name}' takes no message, so nothing would call its function"
@@ -86,12 +86,12 @@ class _File:
 
 
 def _definition(module: ast.Module, name: str) -> ast.stmt | None:
-    """The last statement of a module that binds a name, which determines its value."""
+    """The last statement of a module that binds a name, since this statement determines the name's value."""
     return next((found for found in reversed([*_statements(module.body)]) if name in _bound(found)), None)
 
 
 def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
-    """All statements in a module's own scope, including conditional ones."""
+    """All statements in a module's scope, including conditional statements."""
     for statement in body:
         yield statement
         for block in ("body", "orelse", "finalbody"):
@@ -100,7 +100,7 @@ def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _bound(statement: ast.stmt) -> set[str]:
-    """The names that a statement binds to something that may be callable."""
+    """The names that a statement binds to a possibly callable object."""
     match statement:
         case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
             return {name}

@@ -30,9 +30,9 @@ class SidePort:
 
 @dataclass(frozen=True)
 class Handshake:
-    """A pair of `valid` and `ready`; `part` is the part that it belongs to, empty for the message itself.
+    """A pair of `valid` and `ready`; `part` is the part to which the pair belongs, empty for the message itself.
 
-    If there is a `segment_valid`, it has `segments` bits and falls with `ready`.
+    If there is a `segment_valid`, it has `segments` bits, which go low together with `ready`.
     """
 
     part: str
@@ -45,8 +45,8 @@ class Handshake:
 def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> list[SidePort]:
     """The ports of a message side; `gives` tells whether its block is the source of the message.
 
-    With `has_valid`, the sink of a converter also learns from `msg_valid` that the message is complete. In messages of
-    variable size, every sink does.
+    With `has_valid`, the sink of a converter also learns from `msg_valid` that the message is complete. For messages of
+    variable size, every sink has `msg_valid`.
     """
     ports = [
         SidePort(port.name, port.width, gives is not port.is_reverse, port.comment)
@@ -60,7 +60,7 @@ def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> lis
 
 
 def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]]:
-    """All ports of an accelerator's message sides with their prefixes, in the order of the interface.
+    """All ports of an accelerator's message sides, with prefixes, in the order of the interface.
 
     An output's length is a port only if the accelerator provides it.
     """

@@ -1,8 +1,8 @@
 """The publishers' times that the scheduler needs, in cycles of `clk`.
 
-A time in the specification is a number of cycles, or a number with a unit that the project's `clock` converts to
-cycles. The duration of sending a frame (its WCET in the dissertation's section 6.3.2) follows from the frame's size, if
-the size is known.
+A time in the specification is a number of cycles, or a number with a unit, which is converted to cycles with the
+project's `clock`. The time to send a frame (its WCET in the dissertation's section 6.3.2) follows from the frame's
+size, if the size is known.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from fusesoc_firm.text.yaml_text import Text
 if TYPE_CHECKING:
     from fusesoc_firm.scheduling.analysis import Bound, Channel
 
-# The bytes of a frame before its payload: id and length.
+# The number of bytes before a frame's payload: id and length.
 _HEADER_BYTES = 5
-# A scheduler's times are some bits wider than the longest deadline, to distinguish early from late (cores/sched).
+# A scheduler's times are a few bits wider than the longest deadline, to distinguish early from late (cores/sched).
 _SPARE_TIME_BITS = 3
 _FEWEST_TIME_BITS, _MOST_TIME_BITS = 8, 31
 _LONGEST_TIME = 2 ** (_MOST_TIME_BITS - _SPARE_TIME_BITS) - 1
@@ -69,7 +69,7 @@ def scheduling_of(
 
 
 def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
-    """The publishers' tasks, in the order of their ids; raises `InputError` for every unknown time."""
+    """The publishers' tasks, in the order of the publishers' ids; raises `InputError` with all unknown times."""
     faults = Diagnostics()
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
@@ -91,7 +91,7 @@ def channel_of(system: DerivedSystem) -> Channel:
 
 
 def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
-    """The bounds for each publisher under the system's scheduler, in the order of their ids.
+    """The bounds for each publisher under the system's scheduler, in the order of the publishers' ids.
 
     The result is empty unless all times of all publishers are known.
     """
@@ -115,7 +115,7 @@ def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> 
 def _chosen(
     project: Project, publishers: Sequence[Converter], times: Sequence[PublisherTimes]
 ) -> tuple[str, tuple[str, ...]]:
-    """The smallest scheduler that meets all deadlines, as far as times are known, with the reasons."""
+    """The smallest scheduler that meets all deadlines, as far as times are known, with the reasons for the choice."""
     # Imported here, since loading NumPy takes longer than generating most systems.
     from fusesoc_firm.scheduling.analysis import Channel, Criterion, choose
 
@@ -123,7 +123,7 @@ def _chosen(
     if len(tasks) < len(publishers) or project.shortest_run < 1:
         return DEFAULT, ()
     channel = Channel(project.width // 8, project.shortest_run)
-    # The priorities follow from the publishers' ids, which the host knows and which must not change.
+    # Priorities follow the publishers' ids. The host knows these ids, so they must not change.
     choice = choose(tasks, Criterion.LUTS, channel, is_ordered=True)
     return choice.best.policy, choice.reasons
 
@@ -134,7 +134,7 @@ def frame_beats(payload_bytes: int, width: int) -> int:
 
 
 def _time_bits(times: Iterable[PublisherTimes]) -> int:
-    """The bits of the scheduler's time: enough for all deadlines with a frame of every other publisher in between."""
+    """The width of the scheduler's time: enough for all deadlines with a frame of every other publisher in between."""
     reach = max((item.deadline or 0 for item in times), default=0) + sum(item.transfer_time or 0 for item in times)
     return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
 
@@ -145,7 +145,7 @@ def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
 
 
 def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
-    """A frequency in Hz; None if the value of `key` is not a frequency, which is noted."""
+    """A frequency in Hz; if the value of `key` is not a frequency, None, with the fault noted."""
     found = _QUANTITY.fullmatch(text)
     hertz = Fraction(found[1]) * _HERTZ[found[2]] if found and found[2] in _HERTZ else Fraction(0)
     if not _SLOWEST <= hertz <= _FASTEST:
@@ -167,7 +167,7 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
     has_deadlines = not is_auto and POLICIES[policy].has_deadlines
     has_transfer_times = is_auto or POLICIES[policy].has_transfer_times
     for block, item in zip(blocks, times, strict=True):
-        # Faults of unreadable blocks are noted already.
+        # Faults in unreadable blocks are already noted.
         if is_auto and item.period is None and block.period is None:
             faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
         if has_deadlines and item.deadline is None and block.period is None and block.deadline is None:
@@ -186,7 +186,7 @@ class _Reader:
     faults: Diagnostics
 
     def times(self, block: Block, publisher: Converter, width: int) -> PublisherTimes:
-        """A publisher's times; early ones are rounded down and late ones up, so rounding never hides a late frame."""
+        """A publisher's times; early times are rounded down, late times up, so rounding never hides a late frame."""
         period = self._cycles(block.period, "period", floor)
         transfer_time = self._cycles(block.wcet, "wcet", ceil)
         if block.wcet is None:

@@ -18,7 +18,7 @@ _LEGAL = "legal here: /arm/left, or arm/left, which is relative to the node's na
 
 @dataclass(frozen=True)
 class TopicUse:
-    """The use of a topic: its name and type, whether the system publishes or subscribes, and the place of the use."""
+    """The use of a topic: its name and type, whether the system publishes or subscribes, and the place in the file."""
 
     topic: Topic
     is_published: bool
@@ -37,7 +37,7 @@ def check_topic_name(name: Text, faults: Diagnostics) -> None:
 def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
     """Note each topic with two types, and warn of each topic that the system both publishes and subscribes to.
 
-    Topics of ROS 1 and of ROS 2 are always distinct. Relative names are compared without a namespace.
+    ROS 1 topics and ROS 2 topics are always distinct. Relative names are compared without a namespace.
     """
     met: dict[tuple[object, str], list[TopicUse]] = {}
     for use in uses:

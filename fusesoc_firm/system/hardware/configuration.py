@@ -2,7 +2,7 @@
 
 All blocks have the same few ports on their message sides: the fields, `segment_valid`, `msg_valid` and `msg_ready`.
 Every block has a signal `<block>_<port>` for each port (`names`); `instances` connects blocks to these signals, and
-`wires` connects signals with each other.
+`wires` connects the signals to each other.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def system_configuration(system: DerivedSystem) -> Context:
 
 
 def test_bench_entity(system: DerivedSystem, *, is_live: bool) -> str:
-    """The test bench that compares with files, or the live one that is controlled through a pipe."""
+    """The test bench that compares frames with files, or the live test bench that is controlled through a pipe."""
     return f"{system.entity}_live" if is_live else f"{system.entity}_tb"
 
 
@@ -67,7 +67,7 @@ def test_bench_configuration(
     """The configuration of the test bench: the system with the simulated host, and the `environment` at its pins.
 
     The environment is an entity with `clk`, `rst_n` and the pins in the opposite directions. If `is_live` is set, the
-    host is at the other end of a pipe, and joins no bursts.
+    host is at the other end of a pipe, and the test bench does not join bursts.
     """
     pins = pin_groups(Names(system), system)
     formals = [
@@ -76,7 +76,7 @@ def test_bench_configuration(
         *(clock.port for clock in system.clocks),
         *(str(port["name"]) for group in pins for port in group["ports"]),
     ]
-    # A link carries bytes.
+    # A link carries single bytes.
     host_width = 8 if system.link else system.width
     has_join = system.scheduling.is_preemptive and not is_live
     return {
@@ -114,7 +114,7 @@ def _clocks(system: DerivedSystem) -> list[Context]:
 
 
 def _resets(system: DerivedSystem) -> Context | None:
-    """The resets of the further clocks: the domains, clk's included, see the reset in turn, then all release it."""
+    """The resets of the other clocks: all domains, including clk's, enter reset in turn, then all are released."""
     if not system.clocks:
         return None
     before = ""

@@ -38,7 +38,7 @@ def crossing_configuration(names: Names, crossing: Crossing, source: SourceSide)
 
 
 def field_pairs(names: Names, crossing: Crossing, source: SourceSide) -> Iterator[tuple[str, str]]:
-    """The assignments between the fields of a message of variable size and the registers that hold them."""
+    """The assignments between the fields of a message of variable size and the registers that hold the fields."""
     for scope in crossing.scopes:
         given, taken = (names.crossing(crossing, word(scope.handshake.part, name)) for name in ("given", "taken"))
         low = 0
@@ -95,7 +95,7 @@ def _message(names: Names, crossing: Crossing, scope: Scope, source: SourceSide)
 
 
 def _fixed_sides(names: Names, crossing: Crossing, _: Scope, source: SourceSide) -> dict[str, Any]:
-    """The sides of a message of fixed size: its fields are stable at the source, and it crosses as a whole."""
+    """The sides of a message of fixed size: the fields are stable at the source, and the message crosses as a whole."""
     valid = source.ports["segment_valid"]
     return {
         "is_one_segment": True,
@@ -118,7 +118,7 @@ def _fixed_sides(names: Names, crossing: Crossing, _: Scope, source: SourceSide)
 
 
 def _variable_sides(names: Names, crossing: Crossing, scope: Scope, source: SourceSide) -> dict[str, Any]:
-    """The sides of a message or element of variable size: its fields are held until its nested parts have crossed."""
+    """The sides of a message or element of variable size: the fields are held until all nested parts have crossed."""
     handshake, parent, sink = scope.handshake, scope.parent, crossing.sink
     has_inner = bool(parts_of(scope, crossing.scopes))
     own = {name: names.crossing(crossing, word(handshake.part, name)) for name in ("given", "taken")}

@@ -1,8 +1,8 @@
 """The instances between the ends of a connection whose clocks or stream widths differ.
 
-A message and each of its elements is a scope: a handshake, fields that are stable during it, and nested streams and
-elements. A handshake and its fields cross in a `firm_cdc_message`, a stream in a `firm_cdc_stream`. If only the widths
-differ, streams pass through a `firm_axis_resize`, which causes no stall, and all other signals are wired.
+A message or an element of an array is a scope: a handshake, fields that are stable during the handshake, and nested
+streams and elements. A handshake and its fields cross in a `firm_cdc_message`, a stream in a `firm_cdc_stream`. If only
+the widths differ, streams pass through a `firm_axis_resize`, which causes no stall, and all other signals are wired.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Two different ends of a connection; a clock is None if it is the system's clock."""
+    """Two different ends of a connection; the system's clock is represented as None."""
 
     source: End
     sink: End
@@ -73,7 +73,7 @@ class Crossing:
         return f"{self.source_width} to {self.sink_width} bits" if is_resized else ""
 
     def signals(self) -> Iterator[tuple[str, int | None]]:
-        """The declared signals: the word and the width of each."""
+        """The declared signals: the word and the width of each signal."""
         if not self.is_clocked:
             return
         if self.frame.is_fixed_size:

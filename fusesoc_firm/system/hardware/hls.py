@@ -25,7 +25,7 @@ SHIM_TEMPLATE = "hls/kernel.cpp"
 
 
 def wrapper_configuration(accelerator: AcceleratorType) -> Context:
-    """The configuration of the wrapper, which gives the kernel the message sides of an accelerator."""
+    """The configuration of the wrapper, which adds an accelerator's message sides to the kernel."""
     inputs, outputs = arguments(accelerator)
     return {
         "entity": accelerator.entity,
@@ -49,7 +49,7 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Context:
 
 
 def _kernel_port(argument: Argument) -> Context:
-    """A port of the kernel; a single bit is a vector there."""
+    """A port of the kernel, where a single bit is a vector."""
     is_bit = argument.field.width is None
     return {"port": argument.port, "signal": argument.signal, "bits": argument.bits, "is_bit": is_bit}
 

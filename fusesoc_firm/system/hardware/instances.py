@@ -60,7 +60,7 @@ def _error(converter: Converter, system: DerivedSystem) -> dict[str, int]:
 
 
 def _buffer(names: Names, converter: Converter, system: DerivedSystem) -> dict[str, Any]:
-    """The buffer after a publisher, with the signals between both."""
+    """The buffer after a publisher, with the signals between publisher and buffer."""
     block, lanes = converter.block, system.width // 8
     return {
         "block": block,
@@ -94,7 +94,7 @@ def accelerator_instance(names: Names, block: AcceleratorBlock, system: DerivedS
 
 
 def component(type_: AcceleratorType) -> dict[str, Any]:
-    """The declaration of an accelerator as a component, if it is not an entity."""
+    """The component declaration of an accelerator that is not an entity."""
     ports = [(f"{prefix}{port.name}", port.is_output, port.width) for prefix, port in accelerator_ports(type_)]
     ports += [(str(pin.name), pin.direction == "out", pin.bits) for pin in type_.accelerator.pins]
     return {

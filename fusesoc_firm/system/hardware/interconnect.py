@@ -1,4 +1,4 @@
-"""The top level's host side as plain data: streams as ports, or the link that they end at."""
+"""The top level's host side as plain data: streams as ports, or the link at which the streams end."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from fusesoc_firm.system.derived.model import DerivedSystem, LinkKind
 
-# The pins of a link at the top level, with the names in its core; a board may leave pins with a default unconnected.
+# A link's pins at the top level, with the names in the link's core; a board may omit pins that have a default.
 LINK_PINS = {
     LinkKind.UART: (
         ("uart_rxd", "in", "std_logic"),

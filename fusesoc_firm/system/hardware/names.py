@@ -18,7 +18,7 @@ from fusesoc_firm.system.derived.sides import (
 from fusesoc_firm.system.hardware.crossings import Crossing, all_crossings
 from fusesoc_firm.text.naming import distinct_identifiers
 
-# Names of the top level and its test bench, which no signal of a block and no pin may have.
+# Names in the top level and its test bench, which signals of blocks and pins must not have.
 _TAKEN = """
     clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
     s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
@@ -66,7 +66,7 @@ class Names:
         entities |= {item.entity for item in system.accelerator_types}
         entities |= {length_entity(frame, suffix) for frame, suffix in system.computed_lengths.items()}
         reserved = {*_TAKEN, system.entity, *entities, *label_names, *clock_names(system)}
-        # Keys of instances between blocks have three parts, so they differ from the keys of all fields.
+        # Keys of instances between blocks have three parts, so such a key never equals the key of a field.
         ports = [(block, f"{prefix}{port.name}") for block, sides in found for prefix, port in sides]
         signals: list[tuple[str, ...]] = [
             _fork_key(end, fork, word) for end, fork in forks for word in _fork_words(fork)
@@ -74,7 +74,7 @@ class Names:
         signals += [(block, "", word) for block in buffered for word in FRAME_SIGNALS]
         signals += [_length_key(item.source) for item in system.connections if is_found_out(item)]
         signals += [_crossing_key(item, word) for item in all_crossings(system) for word, _ in item.signals()]
-        # Pins come first, so that they get the requested names.
+        # Pins are named first, so that they get the requested names.
         pins = [(block.block, pin.name) for block in system.accelerators for pin in block.type.accelerator.pins]
         keys: list[tuple[str, ...]] = [*pins, *ports, *signals]
         self._signals: Mapping[tuple[str, ...], str] = dict(
@@ -82,7 +82,7 @@ class Names:
         )
 
     def label(self, *words: str) -> str:
-        """The label of a block, or of an instance that further words identify."""
+        """The label of a block, or of an instance identified by further words."""
         return self._labels["u", *words]
 
     def port(self, block: str, port: str) -> str:

@@ -11,7 +11,7 @@ from fusesoc_firm.system.hardware.maps import port_map
 
 
 def scheduler_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """The scheduler's entity and generics, with the constants of publishers' times that the generics use."""
+    """The scheduler's entity and generics, with the constants for publishers' times that the generics use."""
     scheduling = system.scheduling
     policy = POLICIES[scheduling.policy]
     times = {

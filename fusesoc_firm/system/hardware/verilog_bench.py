@@ -1,6 +1,7 @@
-"""Derived System -> template configuration of its test bench in Verilog, for simulators that read a netlist.
+"""Derived System -> template configuration of the Verilog test bench, for simulators that read a netlist.
 
-If the system's pins are connected to an environment, an entity contains both, so that all VHDL becomes one netlist.
+If the system's pins are connected to an environment, an entity contains the system and the environment, so that all
+VHDL becomes one netlist.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ _LEAST_FRAMES = 65536
 
 
 def translated_unit(system: DerivedSystem, *, has_environment: bool) -> str:
-    """The entity that is translated for the test bench."""
+    """The entity that is translated to the test bench's netlist."""
     return f"{system.entity}_in_environment" if has_environment else system.entity
 
 
@@ -26,7 +27,7 @@ def verilog_bench_configuration(
 ) -> Context:
     """The configuration of the test bench, which includes the configuration `bench` of the VHDL test bench.
 
-    Each file has space for `frames`; `beats` limits the beats that wait for the ends of their frames.
+    Each file has space for `frames`; `beats` limits the number of beats that wait for the end of their frame.
     """
     return {
         **bench,
@@ -38,7 +39,7 @@ def verilog_bench_configuration(
 
 
 def _open_pins(system: DerivedSystem) -> list[Context]:
-    """The pins of a system without an environment; inputs are low."""
+    """The pins of a system without an environment, with all inputs low."""
     names = top_level_pins(system)
     return [
         {"name": names[block.block, pin.name], "is_input": pin.direction == "in", "bits": pin.bits or 1}

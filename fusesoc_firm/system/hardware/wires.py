@@ -1,6 +1,6 @@
 """The connections of the top level as assignments between signals, as in the dissertation's listing 6.9.
 
-Between the signals are instances that distribute a message to several blocks or determine the length of a payload.
+Instances between the signals distribute a message to several blocks or determine the length of a payload.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from fusesoc_firm.system.hardware.crossings import Crossing, crossings, port_of
 from fusesoc_firm.system.hardware.maps import port_map
 from fusesoc_firm.system.hardware.names import Names, forked, is_found_out
 
-# A length of 32 bits.
+# A 32-bit length.
 _LONGEST = 'x"FFFFFFFF"'
 
 
 def connections(names: Names, system: DerivedSystem) -> list[dict[str, Any]]:
-    """The assignments of all connections; a sink with several sources takes all parts of its message together."""
+    """The assignments of all connections; a sink with several sources takes all parts of the message together."""
     waiting: dict[End, list[str]] = {}
     for connection in system.connections:
         if connection.frame.is_fixed_size:
@@ -37,12 +37,12 @@ def _connection(
 ) -> dict[str, Any]:
     """The assignments of a connection; forks let each of several sinks take the message independently.
 
-    `waiting` has the `valid` signals of all sources of each sink; their conjunction is assigned with the last one.
+    `waiting` has the `valid` signals of each sink's sources; the sink's `valid` is assigned with the last source.
     """
     length = connection.length
     pairs: list[tuple[str, str]] = []
     if _is(LengthSource.BUFFERED, length):
-        # The buffer determines the actual length, so the publisher gets the greatest one.
+        # The buffer determines the actual length, so the publisher gets the greatest length.
         pairs.append((names.length(connection), _LONGEST))
     if connection.frame.is_fixed_size:
         pairs += _fixed_pairs(names, system, connection, waiting)
@@ -92,7 +92,7 @@ def _arriving(names: Names, system: DerivedSystem, connection: Connection) -> li
 
 
 def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
-    """The `valid` for each sink of a message of fixed size and the `ready` from it, as seen by the source."""
+    """The `valid` to each sink of a message of fixed size, and the `ready` from the sink, as seen by the source."""
     source = connection.source
     for fork in forked(connection):
         valid, ready = (names.forked(source, fork, word) for word in ("valid", "ready"))
@@ -103,7 +103,7 @@ def _handshakes(names: Names, connection: Connection) -> list[tuple[str, str]]:
 def _pairs(
     names: Names, connection: Connection, number: int, system: DerivedSystem, crossing: Crossing | None
 ) -> list[tuple[str, str]]:
-    """The assignments of a message of variable size between its source and a sink, unless an instance connects them."""
+    """The assignments of a message of variable size between source and sink, unless an instance connects both."""
     sink, source = connection.sinks[number], _source_side(names, connection, number, system)
     if crossing and crossing.is_clocked:
         return list(field_pairs(names, crossing, source))

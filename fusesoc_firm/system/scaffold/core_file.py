@@ -1,7 +1,7 @@
 """The `.core` file of a system, with all targets that the system supports.
 
-Its upper part is generated once; then it belongs to its author. The targets are regenerated from a template, so that
-every system gets new targets. Targets that the author added under other names are kept.
+The upper part of the file is generated once; after that, the author maintains it. The targets are regenerated from a
+template, so that every system gets new targets. Targets that the author added under other names are kept.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fusesoc_firm.tools.simulators import Simulator, default_simulator, fitting
 HEAD_TEMPLATE = "core/system.core"
 TARGETS_TEMPLATE = "core/targets.core"
 
-# Yosys' names of FPGA families, with the options of the synth command: each gets a target synth_<name>.
+# Yosys' names of FPGA families, with the options of the synth command: each family gets a target synth_<name>.
 FAMILIES = [
     {"name": "xilinx", "description": "Xilinx UltraScale+", "options": "[-family, xcup, -flatten, -abc9]"},
     {"name": "ecp5", "description": "Lattice ECP5", "options": "[-abc9]"},
@@ -35,7 +35,7 @@ FAMILIES = [
 ]
 # The instances of the generator that targets use.
 _SYSTEM, _SIMULATION = "system", "simulation"
-# The core with the generator `far`, and the core that had it before version 0.2.0.
+# The core with the generator `far`, and the core that had this generator before version 0.2.0.
 _SYSTEM_CORE, _GENERATORS = "robot:firm:firm_system", "robot:firm:generators"
 _SECTION = re.compile(r"^targets:[^\n]*\n((?:[ \t#][^\n]*\n|\n)*)", re.MULTILINE)
 # A target with the comment above it; blank lines separate targets.
@@ -57,7 +57,7 @@ class CoreOptions:
 
 
 def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
-    """The text of the `.core` at `path` for the system of a specification; an existing core gets updated targets.
+    """The text of the `.core` at `path` for a specification's system; the targets of an existing core are updated.
 
     The `paths` of `options` are relative to the current folder. Raises `InputError`.
     """
@@ -126,7 +126,7 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
                 for is_live in ((False, True) if is_simulated else ())
                 for target in _simulations(system, unit, is_live=is_live)
             ],
-            # Kernels come from an HLS tool only, so there is no netlist of the whole system.
+            # Only an HLS tool generates kernels, so there is no netlist of the whole system.
             "has_kernels": has_kernels,
             "families": [] if has_kernels else FAMILIES,
             "boards": [target for name in boards() if (target := _board(system, name, has_kernels=has_kernels))],
@@ -135,9 +135,9 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
 
 
 def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator[dict[str, object]]:
-    """The targets of simulations, or of live ones: the first simulator has the name without a suffix.
+    """The targets of simulations or live simulations; the first simulator's target has the name without a suffix.
 
-    Simulators that do not read VHDL translate the design unit `unit` with all its subunits.
+    For simulators that do not read VHDL, the design unit `unit` with all subunits is translated.
     """
     has_verilog = any(item.is_component for item in system.accelerator_types)
     sources = [source.lower() for item in system.accelerator_types for source in item.accelerator.sources]
@@ -188,7 +188,7 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
         "frontends": ["ghdlsynth"] if board.is_linked else None,
         "part": board.part,
         "board_part": board.board_part,
-        # A block design can refer to modules by name only if Vivado manages the sources.
+        # Only if Vivado manages the sources can a block design refer to modules by name.
         "source_mgmt_mode": "All" if board.flow == VIVADO else None,
         "yosys_synth_options": board.synth_options,
         "nextpnr_options": board.nextpnr_options,
@@ -200,7 +200,7 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
     return {
         "name": name,
         "description": f"{product} for the board {board.description}",
-        # Edalize has no flow for Quartus.
+        # Edalize does not have a flow for Quartus.
         "is_tool": board.flow == QUARTUS,
         "flow": str(board.flow),
         "options": [{"name": option, "value": _value(value)} for option, value in options.items() if value],

@@ -1,4 +1,4 @@
-"""A first version of an accelerator in software: a function with its messages' fields, and defaults as responses."""
+"""A first version of an accelerator in software: a function with the messages' fields, and defaults as responses."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def python_skeleton(type_: AcceleratorType) -> Context:
 
 
 def _described(name: str, frame: Frame) -> Context:
-    """A message, and its used fields with their types."""
+    """A message, and the used fields with their types."""
     fields = dict(_fields(frame.nodes, "", 0))
     return {
         "name": name,
@@ -44,7 +44,7 @@ def _described(name: str, frame: Frame) -> Context:
 
 
 def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str, str]]:
-    """The leaves of nodes below `above`, the element to which `depth` names lead."""
+    """The leaves of nodes below `above`, an element at the end of a path of `depth` names."""
     for node in nodes:
         match node:
             case Fixed(fields=leaves):

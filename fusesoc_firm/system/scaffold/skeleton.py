@@ -1,4 +1,4 @@
-"""A first version of an accelerator without a source: the ports for its messages, and zeros as responses."""
+"""A first version of an accelerator without a source: ports for all messages, and zeros as responses."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _LANGUAGES = {
 
 
 def missing_sources(system: DerivedSystem, folder: Path) -> dict[Path, str]:
-    """A text for the first source of each accelerator that has no source file in `folder`."""
+    """The text of a first source for each accelerator that has no source file in `folder`."""
     texts = {}
     for type_ in (*system.accelerator_types, *system.software.types):
         paths = [folder / source for source in type_.accelerator.sources]
@@ -185,7 +185,7 @@ def _length(port: str, side: MessageSide) -> Context:
 
 
 def _counts(side: MessageSide, number: int) -> list[Context]:
-    """The arrays of fixed size in output `number`; their elements are counted to mark the last one."""
+    """The arrays of fixed size in output `number`; elements are counted to mark the last element."""
     if side.frame.is_fixed_size:
         return []
     ports = message_side(side.frame)

@@ -1,7 +1,7 @@
-"""`firm system new`: builds a specification from the answers to questions that follow the grammar.
+"""`firm system new`: builds a specification from the user's answers to questions that follow the grammar.
 
-All keys, their meanings and their legal values come from `specification`. An existing file is extended and keeps its
-comments. In a new file, each key is explained at its first use.
+All keys, with their meanings and legal values, come from `specification`. An existing file is extended and keeps its
+comments. In a new file, a comment explains each key at its first use.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
     check_output(path)
     is_new = not path.exists()
     if not is_new:
-        read_yaml(path)  # reports invalid YAML, with its place
+        read_yaml(path)  # Report invalid YAML with its place.
     before = "" if is_new else path.read_text(encoding="utf-8")
     content = CommentedMap() if is_new else _style(before).load(before)
     _Wizard(asker, message_names, content, is_new, path.parent).run()
@@ -60,16 +60,16 @@ def _style(text: str) -> YAML:
     yaml.preserve_quotes = True
     yaml.brace_single_entry_mapping_in_flow_sequence = True
     yaml.width = 10**6
-    # The dash of a list item with the text after it, starting at the column of the list's key.
+    # The dash of a list item and the text after the dash; the dash is in the column of the list's key.
     _, item, dash = load_yaml_guess_indent(text) if text else (None, None, None)
     yaml.indent(sequence=item or 4, offset=2 if dash is None else dash)
     return yaml
 
 
 def _word(answer: str) -> Any:
-    """An answer as a scalar, in quotes if YAML or a list around it would misread it."""
+    """An answer as a scalar, in quotes if YAML would otherwise misread the answer, alone or in a list."""
     if answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer:
-        # A number also serves as a word, and reads better without quotes.
+        # A number is also accepted as a word, and reads better without quotes.
         return int(answer)
     try:
         is_plain = pyyaml.safe_load(f"[{answer}]") == [answer]
@@ -89,7 +89,7 @@ def _words(answers: Sequence[str]) -> Any:
 
 @dataclass
 class _Wizard:
-    """The state of one run: the specification so far and, for a new one, the keys explained so far."""
+    """The state of one run: the specification so far and, for a new specification, the keys explained so far."""
 
     asker: Asker
     message_names: MessageNames
@@ -111,7 +111,7 @@ class _Wizard:
             self._connect_blocks()
 
     def _ask_paths(self) -> None:
-        """Ask for the folders and cores with a new specification's messages, which also provide the completions."""
+        """Ask for the folders and cores of a new specification's messages; the messages also serve as completions."""
         entry = _key(Specification, "paths")
         question = Question("paths", entry.meaning, check=self._fault_of_path)
         if found := self._texts(question):
@@ -123,7 +123,7 @@ class _Wizard:
         return None if is_there else f"'{answer}' is neither a folder, a bag nor a core"
 
     def _connect_blocks(self) -> None:
-        """Ask for further connections from the file's existing blocks."""
+        """Ask for further connections from existing blocks of the file."""
         blocks = {str(block["name"]): block for block in self.content.get("blocks", [])}
         question = Question("block", "a block to which further connections are added", [*blocks], is_choice=True)
         while name := self.asker.ask(question):
@@ -182,7 +182,7 @@ class _Wizard:
         return _word(answer) if answer else None
 
     def _texts(self, question: Question) -> Any:
-        """Ask for one answer after the other, up to an empty one."""
+        """Ask for answers until an answer is empty."""
         found: list[str] = []
         further = Question(f"another item of {question.name}", question.meaning, question.words, check=question.check)
         while answer := self.asker.ask(further if found else question):
@@ -211,7 +211,7 @@ class _Wizard:
         return [str(item["name"]) for item in self.content.get(name, [])]
 
     def _fault(self, draft: _Draft, name: str, entry: Key, answer: str) -> str | None:
-        """The fault of an answer, beyond the choices in the grammar."""
+        """The fault in an answer that the grammar's choices do not exclude."""
         if answer and (fault := entry.rule(answer)):
             return f"'{name}' {fault[0]}; {fault[1]}"
         if entry.form == "integer" and not answer.isdecimal():
@@ -225,7 +225,7 @@ class _Wizard:
 
 @dataclass
 class _Draft:
-    """An unfinished section, with the finished sections of its list."""
+    """An unfinished section, with the finished sections of the same list."""
 
     section: type[Section]
     siblings: Sequence[CommentedMap]

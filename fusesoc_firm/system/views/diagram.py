@@ -58,7 +58,7 @@ def _accelerator(block: AcceleratorBlock) -> str:
 
 
 def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
-    """Draw the host, and the streams between it, the Manager and the converters with their ids."""
+    """Draw the host, the streams between host and Manager, and the converters' streams with their ids."""
     graph.node(f"{_HOST}_out", "host", shape="oval")
     graph.node(f"{_HOST}_in", "host", shape="oval")
     graph.edge(f"{_HOST}_out", f"{_MANAGER}_in", **_STREAM)
@@ -113,5 +113,5 @@ def _with(streams: Iterable[str]) -> str:
 
 
 def _node(block: str) -> str:
-    """The node name of a block, which differs from those of host and Manager and has no colon, DOT's mark of a port."""
+    """The node name of a block, distinct from host and Manager, and without a colon, which marks a port in DOT."""
     return f"block {quote(block, safe=' ')}"

@@ -1,4 +1,4 @@
-"""The amounts of written and generated code: the dissertation's table 6.2, for any system."""
+"""The amounts of hand-written and generated code: the dissertation's table 6.2, for any system."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fusesoc_firm.system.system_core import LoadedSystem, Part, artifacts
 
 @dataclass(frozen=True)
 class Report:
-    """The lines of code of a system: those of its author, and the generated ones.
+    """The number of lines of code of a system, hand-written and generated.
 
     Empty lines and comment lines do not count. `software` counts functions in software that could be hardware, and
     `configuration` counts the templates' data as YAML.
@@ -29,12 +29,12 @@ class Report:
 
     @property
     def generated(self) -> int:
-        """The number of all generated lines."""
+        """The total number of generated lines."""
         return self.configuration + self.wrappers + self.converters + self.components
 
     @property
     def ratio(self) -> float:
-        """The number of generated lines for each written line."""
+        """The number of generated lines per hand-written line."""
         return self.generated / (self.written + self.software)
 
     def __str__(self) -> str:
@@ -54,7 +54,7 @@ class Report:
 
 
 def report(specification: Path, loaded: LoadedSystem) -> Report:
-    """Count the lines of a system and of its specification; raises `InputError`."""
+    """Count the lines of a system and of the specification; raises `InputError`."""
     lines: Counter[Part] = Counter()
     configuration = 0
     for item in artifacts(loaded):

@@ -1,4 +1,4 @@
-"""The derived System as plain data, with the content of the dissertation's listings 6.7 and 6.9."""
+"""The derived System as plain data, with the contents of the dissertation's listings 6.7 and 6.9."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _clocks(system: DerivedSystem) -> dict[str, Any]:
 
 
 def _domain(system: DerivedSystem, block: AcceleratorBlock) -> dict[str, Any]:
-    """The differences between a block and its system: its clock, and the width of its streams."""
+    """The differences between a block and the system: the block's clock and stream width."""
     clock = system.clock_of(block.block)
     shown: dict[str, Any] = {"clock": clock.port} if clock else {}
     return shown | ({"width": block.type.width} if block.type.width != system.width else {})
@@ -127,7 +127,7 @@ def _pins(block: AcceleratorBlock, names: Mapping[tuple[str, str], str]) -> dict
 
 
 def _software(system: DerivedSystem) -> dict[str, Any]:
-    """The blocks in software, with the ways of their messages on the host."""
+    """The blocks in software, with the routes of their messages on the host."""
     blocks = [
         {
             "name": block.block,
@@ -147,13 +147,13 @@ def _function(block: AcceleratorBlock) -> dict[str, Any]:
 
 
 def _taken(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
-    """A message that software takes, with its source."""
+    """A message that software receives, with its source."""
     sources = [item.source for item in system.software.connections if end in item.sinks]
     return {**_message(end, side, system), "from": [_place(source, system.publishers, system) for source in sources]}
 
 
 def _given(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, Any]:
-    """A message that software gives, with its sinks."""
+    """A message that software sends, with its sinks."""
     sinks = [sink for item in system.software.connections if item.source == end for sink in item.sinks]
     return {**_message(end, side, system), "to": [_place(sink, system.subscribers, system) for sink in sinks]}
 
@@ -163,7 +163,7 @@ def _message(end: End, side: MessageSide, system: DerivedSystem) -> dict[str, An
 
 
 def _place(end: End, converters: Iterable[Converter], system: DerivedSystem) -> dict[str, Any]:
-    """The other end of a message of software: another block, a converter of the hardware, or a topic."""
+    """The other end of a message to or from software: another block, a hardware converter, or a topic."""
     if end.prefix:
         return {"block": end.block, "message": system.names[end]}
     crossing = [item for item in converters if item.block == end.block]
@@ -190,7 +190,7 @@ def _payload_bytes(frame: Frame) -> int | str:
 
 
 def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any]:
-    """The way in which a publisher learns the length of its payloads, with the reason, and the size of its buffer."""
+    """The source from which a publisher learns the length of a payload, with the reason, and the size of the buffer."""
     if length is None:
         return {}
     buffer = {"buffer": publisher.buffer} if publisher.buffer else {}

@@ -14,9 +14,9 @@ from fusesoc_firm.text.naming import identifier
 
 @dataclass(frozen=True)
 class _Language:
-    """The syntax of comments, of a unit's parameters, and of a parameter named WIDTH in a language.
+    """The syntax of a language for comments, a unit's parameters, and a parameter named WIDTH.
 
-    `parameters` has a placeholder for the unit's name, and a group for the text between name and ports.
+    `parameters` has a placeholder for the unit's name, and a group for the text between that name and the ports.
     """
 
     comment: re.Pattern[str]

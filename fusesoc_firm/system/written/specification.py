@@ -1,7 +1,7 @@
 """The system specification as its author wrote it: the grammar of the dissertation's listing 6.6.
 
-This module is the single source of the grammar. A section is a class and a key is a field, which defines the key's
-spelling, form, legal values and meaning. Rules across sections (known names, connections) are part of `analysis`.
+This module is the single source of the grammar. Each section is a class, and each key is a field that defines the key's
+spelling, form, legal values and meaning. Rules across sections (known names, connections) are part of `derivation`.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ SUBSCRIBER, PUBLISHER = MODES = ("subscriber", "publisher")
 CONVERTER, ACCELERATOR = "converter", "accelerator"
 # The keys that make a block a converter.
 CONVERTER_KEYS = ("middleware", "mode", "message")
-# The word for the smallest scheduler that meets all deadlines.
+# The keyword for the smallest scheduler that meets all deadlines.
 AUTO_SCHEDULER = "auto"
-# The ways of frames between the host and the system: the top level's own streams, or a byte link (cores/board).
+# The routes of frames between the host and the system: streams of the top level, or a byte link (cores/board).
 AXI_STREAM = "axi_stream"
 LINKS = ("uart", "spi")
 LENGTHS = ("computed", "given", "buffered")
@@ -104,7 +104,7 @@ class Project(Section):
 
 @dataclass(frozen=True)
 class InterfaceType(Section):
-    """A message that an accelerator takes."""
+    """A message that an accelerator receives."""
 
     middleware: Text = key("the middleware that defines the message", **_MIDDLEWARE)
     message: Text = key("the message's type, such as geometry_msgs/Quaternion", is_required=True)
@@ -114,7 +114,7 @@ class InterfaceType(Section):
 
 @dataclass(frozen=True)
 class OutputType(InterfaceType):
-    """A message that an accelerator gives."""
+    """A message that an accelerator sends."""
 
     length: Text | None = key("source of the length of a payload of variable size", choices=LENGTHS)
 
@@ -129,7 +129,7 @@ class Interface(Section):
 
 @dataclass(frozen=True)
 class Pin(Section):
-    """A port of an accelerator that belongs to no message; the top level exports it."""
+    """An accelerator's port that is not part of a message; the top level exports the port."""
 
     name: Text = key("the port's name; at the top level it is <block>_<name>", is_required=True)
     direction: Text = key("direction of the port at the accelerator", is_required=True, choices=DIRECTIONS)
@@ -155,7 +155,7 @@ class Accelerator(Section):
 
     @property
     def is_software(self) -> bool:
-        """Whether it runs on the host."""
+        """Whether the accelerator runs on the host."""
         return self.type == SOFTWARE
 
 
@@ -170,7 +170,7 @@ class Outgoing(Section):
 
 @dataclass(frozen=True)
 class Block(Section):
-    """An instance: of an accelerator (it has a type) or a converter (it has middleware, mode and message)."""
+    """An instance of an accelerator (with a type) or of a converter (with middleware, mode and message)."""
 
     name: Text = key("the block's name", is_required=True)
     type: Text | None = key("the type of an accelerator; not for a converter")
@@ -215,17 +215,17 @@ class Specification(Section):
     )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
-    # The file is invalid YAML from some place on, so any section may have more items.
+    # From some place on, the file is invalid YAML, so any section may have more items.
     is_cut: bool = False
 
     @property
     def message_cores(self) -> dict[str, SourceRef | None]:
-        """The cores among `paths`, with their places."""
+        """The names of cores among `paths`, with their places."""
         return {str(item): item.source for item in self.paths if is_core(item)}
 
     @property
     def middlewares(self) -> set[str]:
-        """The middlewares of the specification, by their words in it."""
+        """The middlewares of the specification, by the words that the specification uses."""
         sides = [side for item in self.accelerators for side in (*item.interface.input, *item.interface.output)]
         words = [*(block.middleware for block in self.blocks), *(side.middleware for side in sides)]
         return {str(word) for word in words if word}
@@ -237,7 +237,7 @@ def is_core(path: str) -> bool:
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
-    """The specification in a file, which messages call `file`, with all its faults noted.
+    """Read the specification in a file, which messages call `file`, and note all faults.
 
     Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
