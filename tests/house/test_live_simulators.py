@@ -161,7 +161,7 @@ def test_a_changed_source_is_built_and_its_fault_shown(tmp_path: Path) -> None:
     source = next(spec.parent.glob("rtl/*.vhd"))
     right = source.read_text()
     source.write_text(right.replace("begin", "begin nonsense", 1))
-    with pytest.raises(InputError, match=r"cannot be built(.|\n)*quat2euler\.vhd:\d+:\d+"):
+    with pytest.raises(InputError, match=r"cannot build(.|\n)*quat2euler\.vhd:\d+:\d+"):
         build_simulator(spec, build_root=tmp_path / "build")
     source.write_text(right)
     assert build_simulator(spec, build_root=tmp_path / "build").folder.is_dir()
