@@ -40,7 +40,7 @@ class Piece:
         return Piece(self.file, self.line, self.line_text, self.start + start, stop)
 
     def strip(self) -> Piece:
-        """The piece without leading and trailing blanks."""
+        """The piece without leading or trailing blanks."""
         start = len(self.text) - len(self.text.lstrip())
         return self.part(start, max(start, len(self.text.rstrip())))
 
@@ -56,6 +56,6 @@ class Piece:
 
 
 def read_lines(text: str, file: str) -> Iterator[Piece]:
-    """Split a text into lines, numbered from 1, without line ends and byte order mark."""
+    """Split a text into lines, numbered from 1, without line endings or a byte order mark."""
     for number, line in enumerate(_LINE_END.split(text.removeprefix(_BYTE_ORDER_MARK)), start=1):
         yield Piece(file, number, line, 0, len(line))

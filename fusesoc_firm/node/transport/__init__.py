@@ -1,1 +1,1 @@
-"""How frames get between the host's software and hardware, simulated or not (docs/reference/transports.md)."""
+"""How frames travel between the host's software and hardware, simulated or not (docs/reference/transports.md)."""

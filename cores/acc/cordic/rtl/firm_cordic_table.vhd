@@ -99,11 +99,10 @@ package body firm_cordic_table is
   constant EXACT_INVERSE_GAIN : unsigned(79 downto 0) := x"9b74eda8435e5a67f5f9";
 
   function arctangent(index : natural; fraction : positive) return unsigned is
-    constant EXACT  : angle_t := ARCTANGENTS(index);
     variable result : unsigned(fraction-1 downto 0);
   begin
-    result := EXACT(TABLE_FRACTION-1 downto TABLE_FRACTION-fraction);
-    if EXACT(TABLE_FRACTION-fraction-1) = '1' then
+    result := ARCTANGENTS(index)(TABLE_FRACTION-1 downto TABLE_FRACTION-fraction);
+    if ARCTANGENTS(index)(TABLE_FRACTION-fraction-1) = '1' then
       result := result + 1;
     end if;
     return result;
