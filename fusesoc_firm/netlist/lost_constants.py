@@ -247,8 +247,11 @@ class Source:
         yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in assigned)]))
 
     def _first_value(self, found: re.Match[str]) -> _Probe | None:
+        """Return the probe of a declaration, unless the value depends on parameters: GHDL runs such functions."""
         is_vector = found[3].strip().lower().startswith(_VECTORS)
-        if not found[4] or (self.unit(found.start()) == "package" and not is_vector):
+        if not found[4] or not self._is_constant(*found.span(4)):
+            return None
+        if self.unit(found.start()) == "package" and not is_vector:
             return None
         return self._value(found, *found.span(4))
 

@@ -78,8 +78,8 @@ EDITS = (
     Edit(
         "the partial store_beats.mustache",
         "code/fusesoc_firm/templates/partials/store_beats.mustache",
-        "if {{{store}}} = '1' then\n",
-        "if {{{store}}} = '1' then -- edited\n",
+        "if store{{{suffix}}} = '1' then\n",
+        "if store{{{suffix}}} = '1' then -- edited\n",
         frozenset(_KINDS),
         frozenset({FLAT, NESTED}),
     ),
@@ -211,6 +211,7 @@ def edit_rows(share: int = 1) -> Iterator[tuple[str, ...]]:
         for edit in EDITS:
             path = folder / edit.file
             text, before = path.read_text(), _converters(folder)
+            assert edit.before in text, f"{edit.file} has no {edit.before!r}"
             path.write_text(text.replace(edit.before, edit.after, 1))
             found, after = origins(), _converters(folder)
             path.write_text(text)

@@ -288,6 +288,18 @@ KEPT = [
         _LONG_TABLE,
         _clocked(f"if rst = '1' then r <= (others => '0'); else r <= T({_PLACE}); end if;"),
     ),
+    _design(
+        "read_by_a_function",
+        64,
+        "r",
+        f"{_LONG_TABLE}\n"
+        "function high (index : natural; width : positive) return std_logic_vector is\n"
+        "  constant exact : std_logic_vector(63 downto 0) := T(index);\n"
+        "begin\n"
+        "  return exact(63 downto 64 - width);\n"
+        "end function high;",
+        _clocked("if rst = '1' then r <= (others => '0'); else r <= high(1, 32) & x(31 downto 0); end if;"),
+    ),
 ]
 
 # An integer without bits.
