@@ -37,11 +37,11 @@ def renamed(topics: Iterable[AnyTopic], names: Mapping[str, str]) -> list[AnyTop
 def routes_of(
     bag: Bag, subscribers: Sequence[Topic], signatures: Mapping[Message, str] | None = None
 ) -> dict[Stream, Route]:
-    """The route of each stream that has one; either all streams of a topic have a route, or none.
+    """Return the route of each stream that has one; either all streams of a topic have a route, or none.
 
     A topic goes to all subscribers with the same topic name. A subscriber whose name is not in the bag takes the only
     topic of its type, if it is the only such subscriber. `signatures` holds the known signatures of the system's
-    messages. Raises `InputError` with every topic that does not fit.
+    messages. Raise `InputError` with every topic that does not fit.
     """
     return _Routing(bag, subscribers, signatures or {}).routes()
 
@@ -73,7 +73,7 @@ class _Routing:
         return tuple(item for item in self.subscribers if item.name == absolute_name(topic))
 
     def _only_topic(self, subscriber: Topic, takers: Mapping[str, Sequence[Topic]]) -> str:
-        """The only topic that fits a subscriber whose name is not in the bag; empty if there is not exactly one."""
+        """Return the only topic that fits a subscriber whose name is not in the bag, or an empty string if there is not exactly one."""
         streams = self.bag.streams
         topics = [item.topic for item in streams if not takers[item.topic] and self._fits(item, subscriber)]
         rivals = [item for item in self.subscribers if _meant(item) == _meant(subscriber)]
@@ -93,7 +93,7 @@ class _Routing:
         return self._is_of(stream, subscriber) and self.bag.form.ros == subscriber.frame.ros
 
     def _is_of(self, stream: Stream, subscriber: Topic) -> bool:
-        """Whether a stream's message has the name of the subscriber's, in either version of ROS."""
+        """Return whether a stream's message has the name of the subscriber's, in either version of ROS."""
         name = _message(stream)
         return name is not None and _present(name, self.bag.form.ros) == _meant(subscriber)
 
@@ -121,7 +121,7 @@ class _Routing:
         return ""
 
     def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
-        """The bag's signatures for a message: the recorded one and, since some writers err, the definition's."""
+        """Return the bag's signatures for a message: the recorded one and, since some writers err, the definition's."""
         said = [stream.signature] if _is_signature(stream.signature) else []
         if stream.definition and (defined := signature_of_text(message, stream.definition, self.bag.form.ros)):
             said.append(defined)
@@ -129,7 +129,7 @@ class _Routing:
 
 
 def _message(stream: Stream) -> MessageName | None:
-    """The message of a stream; None if a specification cannot name it."""
+    """Return the message of a stream, or None if a specification cannot name it."""
     try:
         return parse_name(stream.type)
     except InputError:
@@ -141,7 +141,7 @@ def _meant(topic: Topic) -> MessageName:
 
 
 def _present(name: MessageName, ros: Middleware) -> MessageName:
-    """The current name of a message that may have been renamed."""
+    """Return the current name of a message that may have been renamed."""
     return ros.aliases.get(name, name)
 
 
@@ -150,14 +150,14 @@ def _spelled(stream: Stream) -> str:
 
 
 def _is_signature(text: str) -> bool:
-    """Whether the text is a signature; ROS 1 has `*` for any message, and old bags of ROS 2 have none."""
+    """Return whether the text is a signature; ROS 1 has `*` for any message, and old bags of ROS 2 have none."""
     return text.startswith("RIHS01_") or re.fullmatch(r"[0-9a-f]{32}", text) is not None
 
 
 def read_bag(
     path: Path, subscribers: Sequence[Topic], hint: str = BAGS
 ) -> Iterator[tuple[Topic, bytes, dict[str, Any]]]:
-    """Yield subscriber, payload and decoded message of all routed messages, in order of time. Raises `InputError`."""
+    """Yield subscriber, payload and decoded message of all routed messages, in order of time. May raise `InputError`."""
     with open_bag(path, hint) as bag:
         routes = routes_of(bag, subscribers)
         for stream, route in routes.items():

@@ -39,7 +39,7 @@ class RecordedTopic:
 
     @classmethod
     def of(cls, name: str, definitions: Definitions) -> RecordedTopic:
-        """The topic of the last message in `definitions`, which contains all nested messages."""
+        """Return the topic of the last message in `definitions`, which contains all nested messages."""
         message = list(definitions)[-1]
         kind = definitions[message].kind
         type_ = f"{message.package}/{kind}/{message.name}"
@@ -71,7 +71,7 @@ class BagWriter:
 
 
 def form_of(path: Path) -> Form | None:
-    """The format that a bag's ending implies, or None."""
+    """Return the format that a bag's ending implies, or None."""
     return _FILES.get(path.suffix)
 
 
@@ -92,7 +92,7 @@ def _is_of_bag(file: Path) -> bool:
 def write_bag(path: Path, form: Form, topics: Sequence[RecordedTopic]) -> Iterator[BagWriter]:
     """Write a bag with some topics; if the context ends without an error, the bag replaces what is at `path`.
 
-    Raises `InputError` if it cannot be written.
+    Raise `InputError` if it cannot be written.
     """
     try:
         with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:

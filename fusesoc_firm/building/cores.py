@@ -36,7 +36,7 @@ class ProjectCore:
 
 
 def project_cores() -> list[ProjectCore]:
-    """Every core in FuseSoC's libraries, as `fusesoc` finds them in the current folder, sorted by name."""
+    """Return every core in FuseSoC's libraries, as `fusesoc` finds them in the current folder, sorted by name."""
     from fusesoc.fusesoc import Fusesoc
 
     found = Fusesoc(configuration()).get_cores()
@@ -44,9 +44,9 @@ def project_cores() -> list[ProjectCore]:
 
 
 def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
-    """A core and all cores that any of its targets depends on, sorted by name.
+    """Return a core and all cores that any of its targets depends on, sorted by name.
 
-    Raises `InputError` if the core or one of its dependencies is missing.
+    Raise `InputError` if the core or one of its dependencies is missing.
     """
     fusesoc, top = _found(core)
     needed: dict[str, Path] = {}
@@ -57,7 +57,7 @@ def dependencies(core: str) -> tuple[ProjectCore, list[ProjectCore]]:
 
 
 def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str | None]) -> dict[str, str]:
-    """The cores that are touched or depend on a touched core, each with the reason, in the order of `cores`.
+    """Return the cores that are touched or depend on a touched core, each with the reason, in the order of `cores`.
 
     `touches` returns the part of a core that is touched, or None.
     """
@@ -75,9 +75,9 @@ def affected(cores: Iterable[ProjectCore], touches: Callable[[ProjectCore], str 
 
 
 def changed_files(revision: str, folder: Path) -> list[Path]:
-    """The absolute paths of the repository's files that differ from a revision, including new and removed ones.
+    """Return the absolute paths of the repository's files that differ from a revision, including new and removed ones.
 
-    The repository is the one that contains `folder`. Raises `InputError` if the repository or the revision is missing.
+    The repository is the one that contains `folder`. Raise `InputError` if the repository or the revision is missing.
     """
     root = Path(_git(folder, "rev-parse", "--show-toplevel").rstrip("\n"))
     # Resolved to a commit, so that a leading dash cannot be read as an option.
@@ -98,9 +98,9 @@ def _git(folder: Path, *arguments: str) -> str:
 
 
 def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list[str]]) -> str:
-    """The dependencies of a core's target in Graphviz's language: cores, generated cores, and their inputs.
+    """Return the dependencies of a core's target in Graphviz's language: cores, generated cores, and their inputs.
 
-    Raises `InputError` if the core, the target or a dependency is missing.
+    Raise `InputError` if the core, the target or a dependency is missing.
     """
     fusesoc, top = _found(core)
     cores = solved(fusesoc, top, target)
@@ -136,9 +136,9 @@ def configuration() -> Any:
 
 
 def solved(fusesoc: Any, top: Any, target: str) -> list[tuple[Any, Mapping[str, Any]]]:
-    """All cores of a target with their flags, dependencies first and the core itself last.
+    """Return all cores of a target with their flags, dependencies first and the core itself last.
 
-    Raises `InputError` if the target or a dependency is missing.
+    Raise `InputError` if the target or a dependency is missing.
     """
     from fusesoc.coremanager import DependencyError
 
@@ -205,22 +205,22 @@ def _call(vlnv: str, instance: str, generator: str, folder: Path | str, paramete
 
 
 def _names(core: CoreFile) -> list[str]:
-    """The core's own name and the virtual names that it provides."""
+    """Return the core's own name and the virtual names that it provides."""
     return [_short(str(name)) for name in (core.data.get("name", ""), *(core.data.get("virtual") or ()))]
 
 
 def _listed(section: Mapping[str, Any], key: str) -> list[Any]:
-    """A list in a section, including additions to an inherited list."""
+    """Return a list in a section, including additions to an inherited list."""
     return [item for name in (key, f"{key}_append") for item in section.get(name) or ()]
 
 
 def _file(item: object) -> str:
-    """The name of a file, with or without attributes."""
+    """Return the name of a file, with or without attributes."""
     return str(next(iter(item)) if isinstance(item, dict) else item)
 
 
 def _words(item: object) -> list[str]:
-    """The words of a text under all flags: `target_sim ? (x)` gives x. Text that FuseSoC rejects is unchanged."""
+    """Return the words of a text under all flags: `target_sim ? (x)` gives x. Text that FuseSoC rejects is unchanged."""
     from fusesoc.capi2.exprs import parse
 
     def words(tree: Iterable[Any]) -> Iterator[str]:

@@ -55,7 +55,7 @@ class FolderLock:
     _watched: tuple[Owner, int, float] | None = field(default=None, init=False)
 
     def acquire(self) -> Owner | None:
-        """Take the lock and return None, or return the current owner at once. Raises `OSError`."""
+        """Take the lock and return None, or return the current owner at once. May raise `OSError`."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         mine = Owner(secrets.token_hex(8), _machine(), os.getpid(), _started(os.getpid()), socket.gethostname())
         new = self.path.with_name(f"{self.path.name}.{mine.token}")
@@ -75,7 +75,7 @@ class FolderLock:
             new.unlink(missing_ok=True)
 
     def beat(self) -> bool:
-        """Show that the owner is alive; False if it has lost the lock."""
+        """Show that the owner is alive; return False if it has lost the lock."""
         if self._mine is None or _owner(self.path) != self._mine:
             return False
         with suppress(FileNotFoundError):
@@ -109,7 +109,7 @@ class FolderLock:
 
 
 def _owner(path: Path) -> Owner | None:
-    """The owner of the lock; None if it is free."""
+    """Return the owner of the lock, or None if it is free."""
     try:
         return Owner(**json.loads(path.read_text(encoding="utf-8")))
     except FileNotFoundError:
@@ -120,7 +120,7 @@ def _owner(path: Path) -> Owner | None:
 
 
 def _machine() -> str:
-    """An id of the machine, or of a container, in which process numbers differ."""
+    """Return an id of the machine, or of a container, in which process numbers differ."""
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
         return f"{boot} {Path('/proc/self/ns/pid').readlink()}"
@@ -129,7 +129,7 @@ def _machine() -> str:
 
 
 def _started(process: int) -> str:
-    """The start time of a process, as the system counts it; "" if the process does not exist."""
+    """Return the start time of a process, as the system counts it; "" if the process does not exist."""
     try:
         # The fields follow the name in parentheses, which may contain blanks.
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]

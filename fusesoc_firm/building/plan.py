@@ -45,7 +45,7 @@ class Plan:
     builds: tuple[Build, ...]
 
     def generator_calls(self) -> list[GeneratorCall]:
-        """All generator calls, each once. Raises `InputError` if a dependency is missing."""
+        """Return all generator calls, each once. Raise `InputError` if a dependency is missing."""
         found: dict[tuple[str, str, str], GeneratorCall] = {}
         for build in self.builds:
             for core, flags in self._cores(build):
@@ -71,9 +71,9 @@ class Plan:
 
 
 def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | None = None) -> Plan:
-    """A plan of all targets of all cores, each once, with FuseSoC's configuration in the current folder.
+    """Return a plan of all targets of all cores, each once, with FuseSoC's configuration in the current folder.
 
-    Raises `InputError` with all unknown cores and targets.
+    Raise `InputError` with all unknown cores and targets.
     """
     from fusesoc.fusesoc import Fusesoc
 
@@ -94,7 +94,7 @@ def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | N
 
 
 def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnostics) -> str | None:
-    """The full name of a core; a name without a colon is the bare name, as for `fusesoc run`.
+    """Return the full name of a core; a name without a colon is the bare name, as for `fusesoc run`.
 
     For an unknown core, the cores with all the targets are listed.
     """
@@ -115,7 +115,7 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
 
 
 def _flags(fusesoc: Any, name: str, target: str, faults: Diagnostics) -> dict[str, Any] | None:
-    """The flags of a target; None, with a fault added, if it cannot be built."""
+    """Return the flags of a target; None, with a fault added, if it cannot be built."""
     core = fusesoc.get_core(name)
     known = core.get_data({}).targets
     if target not in known:

@@ -88,7 +88,7 @@ class Pool:
 
 
 def _holds(item: _Running) -> bool:
-    """Whether a build still holds its folder's lock; renews the lock from time to time."""
+    """Return whether a build still holds its folder's lock; renews the lock from time to time."""
     if time.monotonic() - item.beaten < BEAT_SECONDS:
         return True
     item.beaten = time.monotonic()

@@ -56,7 +56,7 @@ def save_time(answer: Answer) -> None:
 
 
 def _answering(launcher: Any, answer: Answer) -> type:
-    """A subclass of FuseSoC's launcher of generators, which calls `answer` first."""
+    """Return a subclass of FuseSoC's launcher of generators, which calls `answer` first."""
 
     class Launcher(launcher):  # type: ignore[misc]
         def run(self) -> None:
@@ -84,7 +84,7 @@ def _end_with(alive: int) -> None:
 
 
 def last_lines(path: Path, count: int) -> list[str]:
-    """The last lines of a log; empty if there is no log."""
+    """Return the last lines of a log, or an empty list if there is no log."""
     try:
         return path.read_text(encoding="utf-8", errors="replace").splitlines()[-count:]
     except FileNotFoundError:

@@ -81,7 +81,7 @@ def _build(arguments: argparse.Namespace) -> None:
 
 
 def _report(outcomes: Sequence[Outcome], seconds: float) -> None:
-    """Print the results of the builds. Raises `InputError` if one failed."""
+    """Print the results of the builds. Raise `InputError` if one failed."""
     from fusesoc_firm.text.outputs import shown
 
     failed = [outcome for outcome in outcomes if not outcome.is_good]

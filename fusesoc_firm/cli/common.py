@@ -95,7 +95,7 @@ def load(arguments: argparse.Namespace, *, needs_sources: bool = True) -> Loaded
 
 
 def core_folders(names: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
-    """Return the folders of message cores that FuseSoC knows here. Raises `InputError`."""
+    """Return the folders of message cores that FuseSoC knows here. May raise `InputError`."""
     # Import FuseSoC only when it is needed.
     from fusesoc_firm.plugin.project import message_folders
 

@@ -57,7 +57,7 @@ class ConfigFile(Section):
 def read_config(path: Path, faults: Diagnostics) -> ConfigFile:
     """Read the configuration in a file and note all faults in it.
 
-    Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
+    Raise `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
     text = read_yaml(path, str(path), faults)
     if text.root is None or is_null(text.root):

@@ -43,7 +43,7 @@ def publisher_entity(frame: Frame, suffix: str = "", prefix: str = "") -> str:
 
 
 def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Context:
-    """The configuration of `entity` (default: `subscriber_entity`) for a stream of `width` bits."""
+    """Return the configuration of `entity` (default: `subscriber_entity`) for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -66,7 +66,7 @@ def subscriber_configuration(frame: Frame, width: int, entity: str = "") -> Cont
 
 
 def _states(last_position: int) -> Context:
-    """The position values that do not represent beats; they share the shortest prefix of ones that no beat has.
+    """Return the position values that do not represent beats; they share the shortest prefix of ones that no beat has.
 
     Below this prefix, bit 2 tells whether the frame has ended; bits 1 and 0 hold a code.
     """
@@ -84,7 +84,7 @@ def _states(last_position: int) -> Context:
 
 
 def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Context:
-    """The configuration of `entity` (default: `publisher_entity`) for a stream of `width` bits."""
+    """Return the configuration of `entity` (default: `publisher_entity`) for a stream of `width` bits."""
     check_fixed_size(frame)
     check_width(width)
     _check_size(frame)
@@ -108,7 +108,7 @@ def publisher_configuration(frame: Frame, width: int, entity: str = "") -> Conte
 
 
 def _first_position(stream: Stream) -> int:
-    """A publisher's first position; on an 8-bit stream, it aligns the payload's first byte to a multiple of four.
+    """Return a publisher's first position; on an 8-bit stream, it aligns the payload's first byte to a multiple of four.
 
     Four payload bytes then share a LUT of the multiplexer, and the constant bytes before them need no LUT. This saves
     a third of the LUTs.
@@ -146,7 +146,7 @@ def _common(frame: Frame, stream: Stream, entity: str, direction: str) -> Contex
 
 
 def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
-    """The beats that carry the length, with the bytes of each legal length in them.
+    """Return the beats that carry the length, with the bytes of each legal length in them.
 
     The legal lengths are the payload's length and, where writers append bytes, a few larger values. Bit k of `match` is
     high while the received length can still be the payload's length plus k.
@@ -167,7 +167,7 @@ def _length_beats(frame: Frame, stream: Stream) -> list[Context]:
 
 
 def _length_checks(length: int, beat: int, stream: Stream) -> list[Context]:
-    """The checks of a length's bytes on a beat; a present byte that differs rules the length out."""
+    """Return the checks of a length's bytes on a beat; a present byte that differs rules the length out."""
     return [
         _byte_check(stream, stream.length_start + index, byte)
         for index, byte in enumerate(length.to_bytes(LENGTH_BYTES, "little"))
@@ -180,7 +180,7 @@ def _prefix_bytes(frame: Frame, stream: Stream) -> list[tuple[int, int]]:
 
 
 def _byte_check(stream: Stream, byte: int, value: int) -> Context:
-    """The check that a byte of the stream has a value; the byte is present if its lane's `tkeep` is set."""
+    """Return the check that a byte of the stream has a value; the byte is present if its lane's `tkeep` is set."""
     lane = stream.lane(byte)
     return {
         "beat": is_beat(stream.beat(byte), stream.beat(byte)),
@@ -192,7 +192,7 @@ def _byte_check(stream: Stream, byte: int, value: int) -> Context:
 
 
 def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
-    """The end of a frame whose length sets bit `number` of `match`; None if there is only one legal length."""
+    """Return the end of a frame whose length sets bit `number` of `match`, or None if there is only one legal length."""
     lane = stream.lane(last_byte)
     return {
         "number": number,
@@ -203,14 +203,14 @@ def _end(stream: Stream, last_byte: int, number: int | None) -> Context:
 
 
 def _field_slices(frame: Frame, stream: Stream, stores: Sequence[Store]) -> list[Context]:
-    """The pieces of a port that are contiguous in a store."""
+    """Return the pieces of a port that are contiguous in a store."""
     places, registers = StoreMap(stream, stores), [f"fields{suffix}_r" for suffix in store_names(stores)]
     slices = (piece for port in field_ports(frame) for piece in slices_of(port))
     return [stored for piece in slices for stored in stored_slices(piece, places, registers)]
 
 
 def _publisher_pieces(frame: Frame, start: int, size: int) -> list[Context]:
-    """The parts of a frame after its id, with their values; bits count from `start` bytes before the frame.
+    """Return the parts of a frame after its id, with their values; bits count from `start` bytes before the frame.
 
     The parts are header, constant bytes, fields, and zeros up to `size` bytes.
     """
@@ -237,7 +237,7 @@ def _literal(data: bytes) -> str:
 
 
 def _constant_bytes(frame: Frame) -> Iterator[tuple[int, bytes]]:
-    """The parts of the payload that no port drives, with the bytes that a publisher sends there.
+    """Yield the parts of the payload that no port drives, with the bytes that a publisher sends there.
 
     These bytes are the prefix, the defaults of unused fields, and zeros elsewhere. The bytes are split into rows; a
     long run of zeros is a single part.

@@ -57,7 +57,7 @@ def constants_package(name: MessageName, ros: Middleware | None = None, prefix: 
 
 
 def constants_configuration(name: MessageName, definitions: Definitions, package: str) -> dict[str, Any]:
-    """The configuration of a message's package; `definitions` hold the message and all nested messages."""
+    """Return the configuration of a message's package; `definitions` hold the message and all nested messages."""
     placed = list(_placed(name, definitions))
     texts = [item for item in placed if isinstance(item.constant.type, StringType)]
     numbers = [item for item in placed if not isinstance(item.constant.type, StringType)]
@@ -81,7 +81,7 @@ def constants_configuration(name: MessageName, definitions: Definitions, package
 
 
 def _placed(name: MessageName, definitions: Definitions) -> Iterator[_Placed]:
-    """The constants of a message, then those of each nested message once, in the order of the fields."""
+    """Yield the constants of a message, then those of each nested message once, in the order of the fields."""
     messages: list[MessageName] = []
     _collect(name, definitions, messages)
     for message in messages:
@@ -100,7 +100,7 @@ def _collect(name: MessageName, definitions: Definitions, found: list[MessageNam
 
 
 def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
-    """A number or a bool as the bits at a port."""
+    """Return a number or a bool as the bits at a port."""
     wire = ros.rules.scalars[str(item.constant.type)]
     digits = struct.pack(f">{wire.code}", item.constant.value).hex()
     is_bit = wire.bits == 1
@@ -113,14 +113,14 @@ def _value(item: _Placed, name: str, ros: Middleware) -> dict[str, Any]:
 
 
 def _numbers(values: list[dict[str, Any]]) -> dict[str, Any]:
-    """The constants in columns; if a line would be too long, every comment goes above its constant."""
+    """Return the constants in columns; if a line would be too long, every comment goes above its constant."""
     columns = {key: max((len(item[key]) for item in values), default=0) for key in ("name", "type", "value", "comment")}
     aligned = [{**item, **{key: item[key].ljust(columns[key]) for key in ("name", "type")}} for item in values]
     return {"values": aligned, "is_above": sum(columns.values()) + len("  constant  :  := ; -- ") > _LONGEST_LINE}
 
 
 def _text(item: _Placed, names: Sequence[str]) -> list[dict[str, Any]]:
-    """The three constants of a text: the string, its length, and its bytes as a converter's stream carries them."""
+    """Return the three constants of a text: the string, its length, and its bytes as a converter's stream carries them."""
     characters = str(item.constant.value).encode()
     data = _wire_bytes(item)
     count = len(data) // (WIDE_CHARACTER.size if _is_wide(item) else CHARACTER.size)
@@ -139,7 +139,7 @@ def _is_wide(item: _Placed) -> bool:
 
 
 def _wire_bytes(item: _Placed) -> bytes:
-    """The bytes of the text on the wire, without the length before it and the terminator after it."""
+    """Return the bytes of the text on the wire, without the length before it and the terminator after it."""
     text = str(item.constant.value)
     if not _is_wide(item):
         return text.encode()
@@ -148,7 +148,7 @@ def _wire_bytes(item: _Placed) -> bytes:
 
 
 def _declaration(name: str, type_: str, pieces: list[str]) -> dict[str, Any]:
-    """A constant whose value is `pieces` joined with `&`, on one line or several."""
+    """Return a constant whose value is `pieces` joined with `&`, on one line or several."""
     lines = wrapped(pieces, "&", _LONGEST_EXPRESSION)
     length = len("  constant  :  := ;") + len(name) + len(type_) + len(lines[0])
     return {
@@ -183,5 +183,5 @@ def _bytes(data: bytes) -> list[str]:
 
 
 def _decimal(value: bool | float) -> str:
-    """A number as ROS writes it."""
+    """Return a number as ROS writes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

@@ -18,7 +18,7 @@ _NAME = re.compile(r"^    (\w+) +: ", re.MULTILINE)
 
 
 def interface_configuration(name: str, converter: str, vhdl: str, message: str) -> dict[str, Any]:
-    """The configuration of the entity `name`, which wraps the entity `converter`; `vhdl` is the converter's text."""
+    """Return the configuration of the entity `name`, which wraps the entity `converter`; `vhdl` is the converter's text."""
     generics, ports = _declarations(vhdl, "generic"), _declarations(vhdl, "port")
     port_names = _NAME.findall(ports)
     (label,) = distinct_identifiers([("u_converter",)], reserved=port_names)
@@ -35,7 +35,7 @@ def interface_configuration(name: str, converter: str, vhdl: str, message: str) 
 
 
 def _declarations(vhdl: str, kind: str) -> str:
-    """The lines of an entity's list of generics or ports; "" if the entity has no such list."""
+    """Return the lines of an entity's list of generics or ports; "" if the entity has no such list."""
     entity = vhdl.partition("\nentity ")[2].partition("\nend entity;")[0] + "\n"
     found = re.search(_LIST.format(kind), entity, re.MULTILINE | re.DOTALL)
     return found[1] if found else ""

@@ -21,7 +21,7 @@ def check_fixed_size(frame: Frame) -> None:
 
 
 def _variable_parts(nodes: Sequence[Node]) -> Iterator[Data | Loop]:
-    """The parts of variable length; for a fixed array, the variable parts in its elements."""
+    """Yield the parts of variable length; for a fixed array, the variable parts in its elements."""
     for node in nodes:
         if isinstance(node, Loop) and node.count is not None:
             yield from _variable_parts(node.body)

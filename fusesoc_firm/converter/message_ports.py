@@ -60,7 +60,7 @@ class StreamPorts:
         return f"{self.name}_length"
 
     def axis(self, signal: str) -> str:
-        """The stream's `tdata`, `tkeep`, `tvalid`, `tlast` or `tready`."""
+        """Return the stream's `tdata`, `tkeep`, `tvalid`, `tlast` or `tready`."""
         return f"{self.name}_axis_{signal}"
 
 
@@ -113,30 +113,30 @@ class MessageSide:
     by_path: dict[tuple[str, Path], FieldPort | StreamPorts | ElementPorts] = field(compare=False, repr=False)
 
     def field(self, leaf: FrameField) -> FieldPort:
-        """The port of a leaf, or of any piece of the leaf."""
+        """Return the port of a leaf, or of any piece of the leaf."""
         found = self.by_path["field", leaf.path]
         assert isinstance(found, FieldPort)
         return found
 
     def stream(self, part: Data) -> StreamPorts:
-        """The ports of a string or an array of numbers."""
+        """Return the ports of a string or an array of numbers."""
         found = self.by_path["data", part.path]
         assert isinstance(found, StreamPorts)
         return found
 
     def element(self, loop: Loop) -> ElementPorts:
-        """The ports of an array of messages or strings."""
+        """Return the ports of an array of messages or strings."""
         found = self.by_path["loop", loop.path]
         assert isinstance(found, ElementPorts)
         return found
 
     def length(self, part: Data | Loop) -> str:
-        """The port that holds a part's number of elements."""
+        """Return the port that holds a part's number of elements."""
         return self.stream(part).length if isinstance(part, Data) else self.element(part).length
 
 
 def message_side(frame: Frame) -> MessageSide:
-    """The ports of a message of variable size."""
+    """Return the ports of a message of variable size."""
     program = subscriber_program(frame)
     naming = _Naming(program)
     naming.nodes(frame.nodes, ())
@@ -144,7 +144,7 @@ def message_side(frame: Frame) -> MessageSide:
 
 
 def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
-    """All ports of the message side except the handshake, in the order of declaration; streams have `width` bits."""
+    """Return all ports of the message side except the handshake, in the order of declaration; streams have `width` bits."""
     if frame.is_fixed_size:
         return tuple(MessagePort(port.name, port.width, port.comment) for port in field_ports(frame))
     found = [MessagePort("payload_length", LENGTH_BITS, "bytes of the payload")]
@@ -154,7 +154,7 @@ def message_ports(frame: Frame, width: int) -> tuple[MessagePort, ...]:
 
 
 def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[dict[str, str]]:
-    """The port declarations of the message side, in `direction`; reverse ports have the opposite direction."""
+    """Return the port declarations of the message side, in `direction`; reverse ports have the opposite direction."""
     opposite = {"in": "out", "out": "in"}[direction]
     return [
         {
@@ -168,7 +168,7 @@ def port_declarations(ports: Sequence[MessagePort], direction: str) -> list[dict
 
 
 def segment_count(frame: Frame) -> int:
-    """The width of `segment_valid`."""
+    """Return the width of `segment_valid`."""
     return 1 if frame.is_fixed_size else subscriber_program(frame).segments()
 
 
@@ -207,7 +207,7 @@ class _Naming:
             self.parts[key] = ports
 
     def name(self, names: Sequence[str], suffixes: Sequence[str]) -> str:
-        """The first of `a_b`, `a_b_2`, `a_b_3`, ... that gives every port an unused name."""
+        """Return the first of `a_b`, `a_b_2`, `a_b_3`, ... that gives every port an unused name."""
         base = identifier(*names)
         candidate, number = base, 2
         while any(self.is_taken(candidate + suffix) for suffix in suffixes):
@@ -249,7 +249,7 @@ def _words(part: Data | Loop) -> str:
 
 
 def _leaf_ports(side: MessageSide, node: Fixed, done: set[Path]) -> Iterator[MessagePort]:
-    """Each leaf once, even if padding separates the leaf's elements."""
+    """Yield each leaf once, even if padding separates the leaf's elements."""
     for leaf in node.fields:
         if leaf.count and leaf.is_used and leaf.path not in done:
             port = side.field(leaf)

@@ -66,7 +66,7 @@ class Order:
     prefix: str = ""
 
     def entity(self, frame: Frame, direction: str) -> str:
-        """The entity of a frame's converter."""
+        """Return the entity of a frame's converter."""
         return ENTITIES[direction](frame, prefix=self.prefix)
 
 
@@ -81,7 +81,7 @@ class Selection:
 def order_of_message(
     text: str, direction: str, width: int, library: MessageLibrary, selection: Selection | None = None
 ) -> Order:
-    """The converters of one message, or of the messages that the two ends of a service or an action exchange.
+    """Return the converters of one message, or of the messages that the two ends of a service or an action exchange.
 
     `direction` is a key of `ENTITIES`, or "both". `selection` selects fields and requires a single message. Raises
     `InputError`.
@@ -115,7 +115,7 @@ def _check_no_selection(selection: Selection, text: str) -> None:
 
 
 def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) -> Order:
-    """The converters listed in a configuration file; raises `InputError` with all faults of the file."""
+    """Return the converters listed in a configuration file; raise `InputError` with all faults of the file."""
     faults = Diagnostics()
     config = read_config(path, faults)
     found = [(entry, wanted) for entry in config.messages if (wanted := _wanted(entry, libraries, faults))]
@@ -131,7 +131,7 @@ def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) 
 def _wanted(
     entry: MessageInterfaces, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Wanted | None:
-    """The message of an item of the file; None if a fault was noted."""
+    """Return the message of an item of the file, or None if a fault was noted."""
     if not entry.type or not entry.name:
         return None
     library = libraries[MIDDLEWARES[entry.type]]
@@ -148,7 +148,7 @@ def _wanted(
 
 
 def _joined(messages: Iterable[Wanted]) -> tuple[Wanted, ...]:
-    """Each message once, with all interfaces of the message."""
+    """Return each message once, with all interfaces of the message."""
     joined: dict[tuple[Middleware, MessageName], Wanted] = {}
     for wanted in messages:
         first = joined.get((wanted.ros, wanted.message))

@@ -44,7 +44,7 @@ class FieldPort:
 
 
 def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
-    """A port for each used leaf that holds a value, in wire order; names do not depend on the selection of fields."""
+    """Return a port for each used leaf that holds a value, in wire order; names do not depend on the selection of fields."""
     fields = [field for field in frame.fields if field.count]
     numbered = (name for field in fields if _NUMBERED.fullmatch(name := identifier(*field.names)))
     names = distinct_identifiers((field.names for field in fields), reserved=[*_TAKEN, *numbered])
@@ -54,11 +54,11 @@ def field_ports(frame: Frame) -> tuple[FieldPort, ...]:
 
 
 def port_width(field: FrameField) -> int | None:
-    """The width of a leaf's port in bits; None for a single bool."""
+    """Return the width of a leaf's port in bits, or None for a single bool."""
     is_bit = field.type.bits == 1 and not field.is_array
     return None if is_bit else field.count * field.type.bits
 
 
 def ros_path(path: Path) -> str:
-    """A path as written in a definition, with the sizes of fixed arrays: `pose.covariance[36]`."""
+    """Return a path as written in a definition, with the sizes of fixed arrays: `pose.covariance[36]`."""
     return ".".join(step.name if step.count is None else f"{step.name}[{step.count}]" for step in path)

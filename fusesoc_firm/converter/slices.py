@@ -42,7 +42,7 @@ class Slice:
 
 
 def slices_of(port: FieldPort) -> Iterator[Slice]:
-    """The slices of a port that are contiguous in the payload, lowest bits first."""
+    """Yield the slices of a port that are contiguous in the payload, lowest bits first."""
     type_ = port.field.type
     low = 0
     for run in port.field.runs:
@@ -54,7 +54,7 @@ def slices_of(port: FieldPort) -> Iterator[Slice]:
 
 
 def windows_of(fields: Iterable[FrameField]) -> list[tuple[int, int]]:
-    """The positions of used fields in the payload, as sorted (first, end) offsets; adjacent ranges are merged."""
+    """Return the positions of used fields in the payload, as sorted (first, end) offsets; adjacent ranges are merged."""
     windows: list[tuple[int, int]] = []
     for first, end in sorted(
         (run.offset, run.offset + run.count * field.type.size)

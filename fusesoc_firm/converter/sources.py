@@ -29,7 +29,7 @@ class ConverterSource(NamedTuple):
 
 
 def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
-    """The subscriber `entity` (default: `subscriber_entity`) on `width` bits; raises `InputError` if unsupported."""
+    """Return the subscriber `entity` (default: `subscriber_entity`) on `width` bits; raise `InputError` if unsupported."""
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(SUBSCRIBER_TEMPLATE, subscriber_configuration(frame, width, entity))
@@ -43,7 +43,7 @@ def subscriber_source(frame: Frame, width: int, entity: str = "") -> ConverterSo
 
 
 def publisher_source(frame: Frame, width: int, entity: str = "") -> ConverterSource:
-    """The publisher `entity` (default: `publisher_entity`) on `width` bits; raises `InputError` if unsupported."""
+    """Return the publisher `entity` (default: `publisher_entity`) on `width` bits; raise `InputError` if unsupported."""
     check_width(width)
     if frame.is_fixed_size:
         return ConverterSource(PUBLISHER_TEMPLATE, publisher_configuration(frame, width, entity))

@@ -14,17 +14,17 @@ def vhdl_type(width: int | None) -> str:
 
 
 def bit(vector: str, number: int) -> str:
-    """A bit of a vector."""
+    """Return a bit of a vector."""
     return f"{vector}({number})"
 
 
 def bits(vector: str, high: int, low: int) -> str:
-    """A range of bits of a vector."""
+    """Return a range of bits of a vector."""
     return f"{vector}({high} downto {low})"
 
 
 def binary(value: int, width: int) -> str:
-    """A `width`-bit number as a literal."""
+    """Return a `width`-bit number as a literal."""
     return f'"{value:0{width}b}"'
 
 
@@ -34,12 +34,12 @@ def hexadecimal(data: bytes) -> str:
 
 
 def bits_of_bool(port: str) -> str:
-    """The byte that is sent for a bool's bit."""
+    """Return the byte that is sent for a bool's bit."""
     return f'"0000000" & {port}'
 
 
 def within(number: str, first: int, last: int) -> str:
-    """The condition that a number is in the range `first` to `last`."""
+    """Return the condition that a number is in the range `first` to `last`."""
     return f"{number} = {first}" if first == last else f"({number} >= {first} and {number} <= {last})"
 
 
@@ -55,10 +55,10 @@ def wrapped(operands: Iterable[str], operator: str, length: int) -> list[str]:
 
 
 def all_of(conditions: Iterable[str]) -> str:
-    """The expression that is '1' while all conditions are '1'."""
+    """Return the expression that is '1' while all conditions are '1'."""
     return " and ".join(conditions)
 
 
 def any_of(conditions: Iterable[str]) -> str:
-    """The condition that at least one of the conditions holds; "" if there are no conditions."""
+    """Return the condition that at least one of the conditions holds; "" if there are no conditions."""
     return " or\n        ".join(wrapped(conditions, "or", LINE))

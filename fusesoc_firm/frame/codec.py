@@ -13,5 +13,5 @@ __all__ = ["CodecError", "MessageValue", "decode", "encode", "pack_frame", "used
 
 
 def pack_frame(identifier: int, payload: bytes) -> bytes:
-    """The whole frame: id, length, payload."""
+    """Return the whole frame: id, length, payload."""
     return identifier.to_bytes(ID_BYTES, "little") + len(payload).to_bytes(LENGTH_BYTES, "little") + payload

@@ -21,7 +21,7 @@ def decode(frame: Frame, payload: bytes) -> dict[str, Any]:
 def used_bytes(frame: Frame, payload: bytes) -> bytes:
     """One byte for each byte of the payload: 1 for a value, a count or the prefix, 0 for padding.
 
-    Raises `CodecError` like `decode`.
+    Raise `CodecError` like `decode`.
     """
     used = bytearray(len(payload))
     for first, end in _read(frame, payload)[1]:
@@ -30,7 +30,7 @@ def used_bytes(frame: Frame, payload: bytes) -> bytes:
 
 
 def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int]]]:
-    """The message, and the ranges (first, end) of the payload that carry it."""
+    """Return the message, and the ranges (first, end) of the payload that carry it."""
     if frame.is_fixed_size and not 0 <= len(payload) - frame.payload_bytes <= frame.trailing_bytes:
         raise CodecError(f"{frame.message} takes {frame.payload_bytes} bytes, not {len(payload)}")
     checked = payload[: frame.checked_prefix]

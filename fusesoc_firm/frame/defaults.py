@@ -15,7 +15,7 @@ from fusesoc_firm.message.model import Scalar
 
 
 def default_bytes(node: Fixed) -> bytes:
-    """The bytes of a `Fixed` with all fields at their defaults; fields without a default, padding and prefix are zero.
+    """Return the bytes of a `Fixed` with all fields at their defaults; fields without a default, padding and prefix are zero.
 
     Every element of an array of messages has the defaults of its members.
     """
@@ -35,15 +35,15 @@ def default_elements(leaf: FrameField) -> Iterator[tuple[int, bytes]]:
 
 
 def default_payload(frame: Frame) -> bytes:
-    """The payload of a fixed-size message with all fields at their defaults."""
+    """Return the payload of a fixed-size message with all fields at their defaults."""
     payload = b"".join(default_bytes(node) for node in frame.nodes if isinstance(node, Fixed))
     return frame.prefix + payload[len(frame.prefix) :]
 
 
 def encode_used(frame: Frame, message: MessageValue) -> bytes:
-    """The payload that a publisher of the used fields sends; unused fields, which may be missing, have their defaults.
+    """Return the payload that a publisher of the used fields sends; unused fields, which may be missing, have their defaults.
 
-    Raises `CodecError` like `encode`.
+    Raise `CodecError` like `encode`.
     """
     if not frame.is_fixed_size:
         return encode(frame, _as_sent(frame.nodes, message, 0))
@@ -66,7 +66,7 @@ def completed(frame: Frame, message: MessageValue) -> MessageValue:
 
 
 def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
-    """A message, or an element `depth` names below it, with unused parts set to their defaults or empty."""
+    """Return a message, or an element `depth` names below it, with unused parts set to their defaults or empty."""
     sent: dict[str, Any] = deepcopy(dict(value)) if isinstance(value, Mapping) else {}
     for node in nodes:
         match node:
@@ -84,7 +84,7 @@ def _as_sent(nodes: Sequence[Node], value: Any, depth: int) -> Any:
 
 
 def _part_as_sent(node: Data | Loop) -> Any:
-    """The value sent for an unused part."""
+    """Return the value sent for an unused part."""
     if node.default is not None:
         return node.default
     if isinstance(node, Data):

@@ -24,7 +24,7 @@ from fusesoc_firm.message.wire import WireType
 
 
 def encode(frame: Frame, message: MessageValue) -> bytes:
-    """The payload of `message`; padding bytes are zero.
+    """Return the payload of `message`; padding bytes are zero.
 
     A missing field takes its default. Arrays are lists or tuples; `uint8` arrays may also be bytes.
 
@@ -108,7 +108,7 @@ def _pack_array(node: Data, value: Any) -> BytesLike:
 
 
 def _pack(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> bytes:
-    """The values in sequence. Raises `CodecError` for the first that does not fit."""
+    """Return the values in sequence. Raise `CodecError` for the first that does not fit."""
     try:
         return _packed(type_, values)
     except (struct.error, OverflowError, TypeError, ValueError):

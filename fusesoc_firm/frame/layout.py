@@ -38,7 +38,7 @@ from fusesoc_firm.message.wire import CHARACTER, WIDE_CHARACTER, WireRules, Wire
 
 
 def frame_of(name: MessageName, definitions: Definitions) -> Frame:
-    """The frame of message `name`; `definitions` contains it and all nested messages."""
+    """Return the frame of message `name`; `definitions` contains it and all nested messages."""
     definition = definitions[name]
     rules = definition.ros.rules
     walk = _Walk(_Types(rules, definitions), Position(rules.max_alignment, frozenset({0})), size=len(rules.prefix))
@@ -75,7 +75,7 @@ class _Types:
         return isinstance(type_, PrimitiveType)
 
     def behind(self, element: ElementType, position: Position, member: Field) -> Position:
-        """The position after an element of `member` that begins at `position`."""
+        """Return the position after an element of `member` that begins at `position`."""
         key = element, position
         if key not in self._ends:
             walk = _Walk(self, position, has_nodes=False)
@@ -84,7 +84,7 @@ class _Types:
         return self._ends[key]
 
     def steady(self, element: ElementType, position: Position, member: Field) -> Position:
-        """The smallest set of positions that includes the start of every array element if the first is at `position`.
+        """Return the smallest set of positions that includes the start of every array element if the first is at `position`.
 
         An element starts at the start of the array, or at the end of the previous element.
         """
@@ -134,7 +134,7 @@ class _Walk:
             self.member(member, path)
 
     def finish(self) -> tuple[Node, ...]:
-        """The nodes in wire order."""
+        """Return the nodes in wire order."""
         if self.size or self.leaves:
             fields = (
                 FrameField(path, leaf.type, tuple(leaf.runs), leaf.first, leaf.default)

@@ -75,26 +75,26 @@ class Length:
         return None if longest is None else self.prefix + longest
 
     def of(self, message: MessageValue) -> int:
-        """The number of bytes in a message. Raises `CodecError` for a part without a value or default."""
+        """Return the number of bytes in a message. Raise `CodecError` for a part without a value or default."""
         size = _Walk(_elements_of).behind(self.terms, 0, _Scope(message, 0))
         assert size is not None
         return self.prefix + size
 
 
 def length_of(frame: Frame) -> Length:
-    """The expression of a frame's payload."""
+    """Return the expression of a frame's payload."""
     prefix = len(frame.prefix)
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes)]))
 
 
 def sent_length_of(frame: Frame) -> Length:
-    """The length of the payload that a publisher sends: unused parts have their defaults or are empty."""
+    """Return the length of the payload that a publisher sends: unused parts have their defaults or are empty."""
     prefix = len(frame.prefix)
     return Length(prefix, _joined([Bytes(-prefix), *_terms(frame.nodes, is_sent=True)]))
 
 
 def _terms(nodes: Sequence[Node], *, is_sent: bool = False) -> tuple[Term, ...]:
-    """The terms of nodes; with `is_sent`, unused parts are constants."""
+    """Return the terms of nodes; with `is_sent`, unused parts are constants."""
     terms: list[Term] = []
     for node in nodes:
         match node:
@@ -114,12 +114,12 @@ def _terms(nodes: Sequence[Node], *, is_sent: bool = False) -> tuple[Term, ...]:
 
 
 def _gap(node: Data) -> Term:
-    """The gap between the count and the elements, if there are any."""
+    """Return the gap between the count and the elements, if there are any."""
     return Align(node.alignment) if node.padding is None else Bytes(node.padding)
 
 
 def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
-    """The terms of a part with a constant value; None means an element without a value."""
+    """Yield the terms of a part with a constant value; None means an element without a value."""
     if isinstance(node, Data):
         size = node.element.size
         count = len(value or ()) if node.kind is DataKind.ARRAY else len(units_of(node, value or "")) // size
@@ -139,7 +139,7 @@ def _constant_terms(node: Data | Loop, value: Any) -> Iterator[Term]:
 
 
 def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """The terms with adjacent bytes added up."""
+    """Return the terms with adjacent bytes added up."""
     joined: list[Term] = []
     for term in terms:
         last = joined[-1] if joined else None
@@ -151,7 +151,7 @@ def _joined(terms: Sequence[Term]) -> tuple[Term, ...]:
 
 
 def _stride(body: tuple[Term, ...]) -> int | None:
-    """The size of every element after the first.
+    """Return the size of every element after the first.
 
     After the widest padding, an element is aligned to its largest alignment. The element therefore ends at a position
     from which all following elements are padded alike.
@@ -174,7 +174,7 @@ class _Walk:
     _grown: dict[tuple[int, int], int | None] = field(default_factory=dict)
 
     def behind(self, terms: Sequence[Term], position: int, value: Any = None) -> int | None:
-        """The position after `terms`; None if the length is unlimited."""
+        """Return the position after `terms`, or None if the length is unlimited."""
         for term in terms:
             match term:
                 case Bytes(count):

@@ -223,7 +223,7 @@ class Frame:
 
 
 def names_of(path: Path) -> tuple[str, ...]:
-    """The names on a path."""
+    """Return the names on a path."""
     return tuple(step.name for step in path)
 
 

@@ -54,7 +54,7 @@ class _Leaf:
 
 
 def _leaves(frame: Frame) -> list[_Leaf]:
-    """The leaves; only those before the first variable part have an offset."""
+    """Return the leaves; only those before the first variable part have an offset."""
     leaves = []
     first = frame.nodes[0] if frame.nodes else None
     for node in all_nodes(frame.nodes):

@@ -97,7 +97,7 @@ class Bag:
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
         """Yield the messages of `topics` in order of time, up to but not including `stop` (ns).
 
-        Raises `InputError` if the bag is damaged.
+        Raise `InputError` if the bag is damaged.
         """
         numbers: dict[str, int] = {}
         for reader in self._readers:
@@ -124,19 +124,19 @@ class BagDefinitions:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a bag, judged by the file's name or the folder's contents."""
+    """Return whether a path is a bag, judged by the file's name or the folder's contents."""
     if path.is_dir():
         return (path / _METADATA).is_file() or any(file.suffix in _SUFFIXES[1:] for file in path.iterdir())
     return path.suffix in _SUFFIXES and path.is_file()
 
 
 def bag_files(path: Path) -> list[Path]:
-    """The files of a bag: all files in its folder (ROS 2), or the file itself."""
+    """Return the files of a bag: all files in its folder (ROS 2), or the file itself."""
     return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
 def definitions_in(path: Path) -> BagDefinitions:
-    """Return the message definitions in a bag; reads only the bag's index. Raises `InputError`.
+    """Return the message definitions in a bag; reads only the bag's index. May raise `InputError`.
 
     Types without a definition in ROS's `.msg` language are omitted.
     """
@@ -146,7 +146,7 @@ def definitions_in(path: Path) -> BagDefinitions:
 
 
 def _state(file: Path) -> tuple[str, int, int]:
-    """A tuple that changes when the file changes."""
+    """Return a tuple that changes when the file changes."""
     status = file.stat()
     return str(file.absolute()), status.st_size, status.st_mtime_ns
 
@@ -166,7 +166,7 @@ def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> Ba
 
 @contextmanager
 def open_bag(path: Path, hint: str = BAGS) -> Iterator[Bag]:
-    """Open a bag for reading within the context. Raises `InputError`, with `hint` if the path is not a bag."""
+    """Open a bag for reading within the context. Raise `InputError`, with `hint` if the path is not a bag."""
     with ExitStack() as stack:
         with _readable(path, hint):
             _check_journals(path)
@@ -207,7 +207,7 @@ def _is_ros1(path: Path) -> bool:
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """A sort key that orders `bag_10` after `bag_9`."""
+    """Return a sort key that orders `bag_10` after `bag_9`."""
     return [(int(digits or 0), text) for text, digits in re.findall(r"(\D*)(\d*)", path.name)]
 
 

@@ -48,7 +48,7 @@ class Extent:
     bytes: int = 0
 
     def joined(self, other: Extent) -> Extent:
-        """The extent of both messages, one after the other."""
+        """Return the extent of both messages, one after the other."""
         return Extent(
             max(self.levels, other.levels),
             self.fields + other.fields,
@@ -94,7 +94,7 @@ def _extent(definition: MessageDefinition, known: Mapping[MessageName, Extent]) 
 
 
 def _of_type(type_: FieldType, rules: WireRules, known: Mapping[MessageName, Extent]) -> Extent:
-    """The extent that a field of this type adds."""
+    """Return the extent that a field of this type adds."""
     match type_:
         case PrimitiveType(name) if name in rules.scalars:
             return Extent(0, 1, 1, rules.scalars[name].size)

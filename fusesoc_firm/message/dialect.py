@@ -25,11 +25,11 @@ class NameRule:
     description: str
 
     def accepts(self, name: str) -> bool:
-        """Whether all of `name` is legal."""
+        """Return whether all of `name` is legal."""
         return len(name) <= LONGEST_TEXT and self.pattern.fullmatch(name) is not None
 
     def fault(self, name: str, title: str) -> str:
-        """The fault of a name that is not accepted."""
+        """Return the fault of a name that is not accepted."""
         if len(name) > LONGEST_TEXT:
             return f"a {self.kind} has at most {LONGEST_TEXT} characters, not {len(name)}"
         return f"'{name}' is not a legal {self.kind} in {title}" if name else f"the {self.kind} is missing"

@@ -72,9 +72,9 @@ class MessageLibrary:
         self._put_before(dict.fromkeys(paths), self.ros.folders(environment) if environment is not None else [])
 
     def before(self, paths: Mapping[Path, SourceRef | None]) -> MessageLibrary:
-        """A copy with additional folders and bags, each with its source reference, that precede all others.
+        """Return a copy with additional folders and bags, each with its source reference, that precede all others.
 
-        Raises `InputError` like the constructor.
+        Raise `InputError` like the constructor.
         """
         if not paths:
             return self
@@ -83,15 +83,15 @@ class MessageLibrary:
         return other
 
     def names(self) -> list[MessageName]:
-        """All known messages, sorted."""
+        """Return all known messages, sorted."""
         return sorted(self._store.names | self._sources.keys())
 
     def interfaces(self) -> dict[Interface, Path]:
-        """All known services and actions, sorted by full name, and their files."""
+        """Return all known services and actions, sorted by full name, and their files."""
         return dict(sorted(self._interfaces.items(), key=lambda item: str(item[0])))
 
     def interface(self, name: MessageName, kind: InterfaceKind | None = None) -> Interface | None:
-        """The service or action of this name, or None; without `kind`, a message takes precedence over both."""
+        """Return the service or action of this name, or None; without `kind`, a message takes precedence over both."""
         if kind is None and self._is_message(name):
             return None
         kinds = (InterfaceKind.SERVICE, InterfaceKind.ACTION) if kind is None else (kind,)
@@ -99,7 +99,7 @@ class MessageLibrary:
         return next((interface for interface in named if interface in self._interfaces), None)
 
     def get(self, name: MessageName, source: SourceRef | None = None) -> MessageDefinition:
-        """The definition of a message requested at `source`; raises `InputError` with all faults in the file."""
+        """Return the definition of a message requested at `source`; raise `InputError` with all faults in the file."""
         diagnostics = Diagnostics()
         definition = self.find(name, diagnostics, source)
         diagnostics.raise_if_any()
@@ -121,9 +121,9 @@ class MessageLibrary:
         return definition
 
     def closure(self, name: MessageName, source: SourceRef | None = None) -> dict[MessageName, MessageDefinition]:
-        """The message and all nested messages, each after those that it contains.
+        """Return the message and all nested messages, each after those that it contains.
 
-        Raises `InputError` with every fault in every file, every unknown message and every cycle, and for a message
+        Raise `InputError` with every fault in every file, every unknown message and every cycle, and for a message
         that exceeds the limits in `bounds`.
         """
         return self.joint_closure((name,), source)
@@ -141,17 +141,17 @@ class MessageLibrary:
         return closure
 
     def origin(self, name: MessageName) -> str:
-        """The file of a known message, or the distribution that contains it, for people to read."""
+        """Return the file of a known message, or the distribution that contains it, for people to read."""
         return str(self._sources[name].paths[0]) if name in self._sources else self._store.title
 
     def content(self, name: MessageName) -> bytes:
-        """The unchanged source of a known message: the file's bytes, or the text in a bag or distribution."""
+        """Return the unchanged source of a known message: the file's bytes, or the text in a bag or distribution."""
         if source := self._sources.get(name):
             return source.texts[0].encode() if source.texts else read_regular(source.paths[0], MOST_FILE_BYTES)
         return self._store.text(name).encode()
 
     def files(self, names: Iterable[MessageName]) -> list[Input]:
-        """The files of these messages, in the order of names; messages in a distribution have no files.
+        """Return the files of these messages, in the order of names; messages in a distribution have no files.
 
         For a bag, only the part that defines the message counts.
         """
@@ -184,7 +184,7 @@ class MessageLibrary:
         self._places = [*places, *self._places]
 
     def _bag(self, path: Path, source: SourceRef | None, faults: Diagnostics) -> dict[MessageName, _Source]:
-        """The definitions in a bag; a `path` that is not a bag must serve another middleware's library."""
+        """Return the definitions in a bag; a `path` that is not a bag must serve another middleware's library."""
         # Imported only for bags: rosbags' readers are slow to import.
         from fusesoc_firm.message.bag_reader import definitions_in, is_bag
 
@@ -276,7 +276,7 @@ class MessageLibrary:
         return (f"did you mean '{nearest}'? " if nearest else "") + f"looked in: {places}{_FURTHER}"
 
     def _nearest(self, name: MessageName) -> str:
-        """The most likely meaning: the same type in another package, a misspelt primitive, or a similar name."""
+        """Return the most likely meaning: the same type in another package, a misspelt primitive, or a similar name."""
         same_type = [known for known in self.names() if known.name == name.name]
         if same_type:
             return str(same_type[0])
@@ -294,24 +294,24 @@ class Libraries(Mapping[Middleware, MessageLibrary]):
         self._made: dict[Middleware, MessageLibrary] = {}
 
     def __getitem__(self, ros: Middleware) -> MessageLibrary:
-        """The library of a middleware."""
+        """Return the library of a middleware."""
         if ros not in self._made:
             self._made[ros] = self._makers[ros]()
         return self._made[ros]
 
     def __iter__(self) -> Iterator[Middleware]:
-        """Every middleware."""
+        """Return every middleware."""
         return iter(self._makers)
 
     def __len__(self) -> int:
-        """The number of middlewares."""
+        """Return the number of middlewares."""
         return len(self._makers)
 
 
 def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, store: str | None) -> Libraries:
-    """The libraries of all middlewares.
+    """Return the libraries of all middlewares.
 
-    `store` is a distribution of one of them; the others keep their defaults. Raises `InputError` for an unknown one.
+    `store` is a distribution of one of them; the others keep their defaults. Raise `InputError` for an unknown one.
     """
     known = {ros: ros.distributions() for ros in middlewares()}
     if store is not None and not any(store in names for names in known.values()):
@@ -325,7 +325,7 @@ def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, stor
 
 
 def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
-    """The text of the files; adds a fault if a file cannot be read, differs from the first, or is not UTF-8."""
+    """Return the text of the files; adds a fault if a file cannot be read, differs from the first, or is not UTF-8."""
     contents = [_content(path, faults) for path in paths]
     if faults.found:
         return ""
@@ -341,7 +341,7 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
 
 
 def _content(path: Path, faults: Diagnostics) -> bytes:
-    """The bytes of a file; if it cannot be read, adds a fault and returns no bytes."""
+    """Return the bytes of a file; if it cannot be read, adds a fault and returns no bytes."""
     try:
         return read_regular(path, MOST_FILE_BYTES)
     except OSError as error:

@@ -27,10 +27,10 @@ class Store(Protocol):
         """The names of all messages in the store."""
 
     def text(self, name: MessageName) -> str:
-        """The definition of one of `names`."""
+        """Return the definition of one of `names`."""
 
     def file(self, name: MessageName) -> str:
-        """A substitute for the file's name in errors."""
+        """Return a substitute for the file's name in errors."""
 
 
 class Parse(Protocol):
@@ -107,15 +107,15 @@ def register(middleware: Middleware) -> None:
 
 
 def middleware_of(number: int) -> Middleware:
-    """The middleware with this number. Raises KeyError if it is not registered."""
+    """Return the middleware with this number. Raises KeyError if it is not registered."""
     return _registered[number]
 
 
 def middlewares() -> list[Middleware]:
-    """All registered middlewares, in the order of their numbers."""
+    """Return all registered middlewares, in the order of their numbers."""
     return [_registered[number] for number in sorted(_registered)]
 
 
 def known_suffixes() -> dict[str, InterfaceKind]:
-    """The suffixes of the files that define messages, for all middlewares."""
+    """Return the suffixes of the files that define messages, for all middlewares."""
     return {suffix: kind for middleware in _registered.values() for suffix, kind in middleware.suffixes.items()}

@@ -97,7 +97,7 @@ FieldType = ElementType | ArrayType | SequenceType
 
 
 def nested_message(kind: FieldType) -> MessageName | None:
-    """The message that a field of this type contains, directly or as array elements."""
+    """Return the message that a field of this type contains, directly or as array elements."""
     element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
     return element.name if isinstance(element, MessageType) else None
 

@@ -58,7 +58,7 @@ def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
 
 
 def dialect_of(ros: Middleware) -> Dialect:
-    """The rules of a middleware's `.msg` files."""
+    """Return the rules of a middleware's `.msg` files."""
     assert ros.dialect is not None, f"{ros.title} has no .msg files"
     return ros.dialect
 
@@ -92,12 +92,12 @@ def parse_sections(
 
 
 def service_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of a service's request and response in this middleware."""
+    """Return the names of a service's request and response in this middleware."""
     return _derived_names(name, ros, ("Request", "Response"))
 
 
 def action_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of an action's goal, result and feedback in this middleware."""
+    """Return the names of an action's goal, result and feedback in this middleware."""
     return _derived_names(name, ros, ("Goal", "Result", "Feedback"))
 
 
@@ -227,7 +227,7 @@ class _Reader:
         return ArrayType(element, length) if element and length is not None else None
 
     def _bound(self, piece: Piece) -> int | None:
-        """The number after the `<=` at the start of `piece`."""
+        """Return the number after the `<=` at the start of `piece`."""
         if not self._dialect.has_bounds:
             self._diagnostics.error(f"{self._dialect.title} has no bounds like '{piece.text}'", piece.source)
             return None

@@ -35,17 +35,17 @@ class Piece:
         return SourceRef(self.file, self.line, self.start + 1, self.line_text, max(1, self.end - self.start))
 
     def part(self, start: int, end: int | None = None) -> Piece:
-        """The characters `start` to `end` of this piece, counted from its start."""
+        """Return the characters `start` to `end` of this piece, counted from its start."""
         stop = self.end if end is None else self.start + end
         return Piece(self.file, self.line, self.line_text, self.start + start, stop)
 
     def strip(self) -> Piece:
-        """The piece without leading or trailing blanks."""
+        """Return the piece without leading or trailing blanks."""
         start = len(self.text) - len(self.text.lstrip())
         return self.part(start, max(start, len(self.text.rstrip())))
 
     def partition(self, separator: str) -> tuple[Piece, Piece]:
-        """The parts before and after the first `separator`, stripped; without a separator, the second part is empty."""
+        """Return the parts before and after the first `separator`, stripped; without a separator, the second part is empty."""
         before, found, _ = self.text.partition(separator)
         return self.part(0, len(before)).strip(), self.part(len(before) + len(found)).strip()
 

@@ -57,7 +57,7 @@ class Interface:
     has_events: bool
 
     def __str__(self) -> str:
-        """The full name, such as `std_srvs/srv/SetBool`."""
+        """Return the full name, such as `std_srvs/srv/SetBool`."""
         return f"{self.name.package}/{self.kind}/{self.name.name}"
 
     @property
@@ -99,7 +99,7 @@ class Interface:
         return MessageName(self.name.package, self.name.name + suffix)
 
     def _wrapper(self, suffix: str, text: str, file: str) -> MessageDefinition:
-        """A derived message; its fields are not in the file, so all refer to the start of the file."""
+        """Return a derived message; its fields are not in the file, so all refer to the start of the file."""
         # The only possible fault is in the name, and the sections report it.
         ignored = Diagnostics()
         definition = parse_message(text.format(self.name.name), self._suffixed(suffix), self.ros, file, ignored)

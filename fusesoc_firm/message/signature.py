@@ -52,12 +52,12 @@ _ONLY_MEMBER = ("structure_needs_at_least_one_member", PrimitiveType("uint8"))
 
 
 def signature(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The signature in the definitions' middleware; for ROS, see `md5` and `rihs01`."""
+    """Return the signature in the definitions' middleware; for ROS, see `md5` and `rihs01`."""
     return next(iter(definitions.values())).ros.signature(name, definitions, kind)
 
 
 def md5(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The MD5 sum of a ROS 1 message, service or action: 32 hexadecimal digits.
+    """Return the MD5 sum of a ROS 1 message, service or action: 32 hexadecimal digits.
 
     `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
     KeyError). ROS 1 defines no sum for an action; the sum of the `...Action` message, which contains the other six
@@ -90,7 +90,7 @@ def _md5_of(text: str) -> str:
 
 
 def rihs01(name: MessageName, definitions: Definitions, kind: InterfaceKind = InterfaceKind.MESSAGE) -> str:
-    """The hash of a ROS 2 message, service or action: `RIHS01_` and 64 hexadecimal digits.
+    """Return the hash of a ROS 2 message, service or action: `RIHS01_` and 64 hexadecimal digits.
 
     `definitions` contains the message, or the messages of the service or action, and all nested messages (otherwise
     KeyError).
@@ -177,7 +177,7 @@ def _described_field(
 
 
 def _array_of(kind: FieldType) -> tuple[PrimitiveType | StringType | MessageType, int, int]:
-    """The element of a type, the offset that an array adds to the element's type id, and the array's size or bound."""
+    """Return the element of a type, the offset that an array adds to the element's type id, and the array's size or bound."""
     if isinstance(kind, ArrayType):
         return kind.element, _ARRAY, kind.length
     if isinstance(kind, SequenceType):

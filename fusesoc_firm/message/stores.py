@@ -26,7 +26,7 @@ _NEXT_DEFINITION = "=" * 80
 
 
 def distributions(version: int) -> list[str]:
-    """The names of the distributions of a version, such as `jazzy`."""
+    """Return the names of the distributions of a version, such as `jazzy`."""
     prefix = _prefix(version)
     return sorted(store.value.removeprefix(prefix) for store in Stores if store.value.startswith(prefix))
 
@@ -43,7 +43,7 @@ class DistributionStore:
     """
 
     def __init__(self, version: int, distribution: str | None = None) -> None:
-        """`distribution` is one of `distributions`; None selects the default. Raises `InputError` for any other."""
+        """`distribution` is one of `distributions`; None selects the default. Raise `InputError` for any other."""
         chosen = _DEFAULTS[version] if distribution is None else distribution
         if chosen not in distributions(version):
             fail(f"'{chosen}' is not a distribution of ROS {version}", hint=nearest(chosen, distributions(version)))
@@ -67,12 +67,12 @@ class DistributionStore:
         return _ADDED.get(self._version, {})
 
     def text(self, name: MessageName) -> str:
-        """The definition of one of `names` as `.msg` text."""
+        """Return the definition of one of `names` as `.msg` text."""
         if name in self._added:
             return self._added[name]
         text, _ = self._typestore.generate_msgdef(f"{name.package}/msg/{name.name}", ros_version=self._version)
         return text.partition(_NEXT_DEFINITION)[0]
 
     def file(self, name: MessageName) -> str:
-        """A substitute for the file's name in errors."""
+        """Return a substitute for the file's name in errors."""
         return f"<{self.title}>/{name}"

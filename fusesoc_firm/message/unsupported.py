@@ -87,7 +87,7 @@ FEATURES = (
 
 
 def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
-    """The feature that a line (without its comment) uses, and the part of the line that uses it."""
+    """Return the feature that a line (without its comment) uses, and the part of the line that uses it."""
     for feature in FEATURES:
         if match := feature.form.match(code.text):
             return feature, code.part(0, match.end())
@@ -95,5 +95,5 @@ def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
 
 
 def unsupported_word(type_name: str) -> Feature | None:
-    """The unsupported feature that this type name suggests, or None."""
+    """Return the unsupported feature that this type name suggests, or None."""
     return next((feature for feature in FEATURES if type_name.lower() in feature.words), None)

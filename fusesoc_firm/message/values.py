@@ -28,7 +28,7 @@ _ELEMENT = re.compile(r"""\s*("(?:\\"|[^"])*+"|'(?:\\'|[^'])*+'|[^\s,"'](?:[^,]*
 def read_value(
     piece: Piece, kind: PrimitiveType | StringType, dialect: Dialect, diagnostics: Diagnostics
 ) -> Scalar | None:
-    """The value of a constant, a default or an element of a default; None if a fault was reported."""
+    """Return the value of a constant, a default or an element of a default, or None if a fault was reported."""
     try:
         return _scalar(piece.text, kind, dialect)
     except ValueError as fault:
@@ -38,7 +38,7 @@ def read_value(
 
 
 def read_default(piece: Piece, kind: FieldType, dialect: Dialect, diagnostics: Diagnostics) -> DefaultValue | None:
-    """The default value of a field; None if a fault was reported."""
+    """Return the default value of a field, or None if a fault was reported."""
     element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
     if isinstance(element, MessageType):
         diagnostics.error(f"a field of type {kind} has no default value", piece.source, "only primitive types have one")
@@ -70,7 +70,7 @@ def _array(
 
 
 def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
-    """The elements between the brackets; None if a fault was reported."""
+    """Return the elements between the brackets, or None if a fault was reported."""
     elements: list[Piece] = []
     position = 0
     while inner.text.strip():
@@ -94,7 +94,7 @@ def _count_fault(kind: ArrayType | SequenceType, count: int) -> str:
 
 
 def _scalar(text: str, kind: PrimitiveType | StringType, dialect: Dialect) -> Scalar:
-    """The value of `text`. Raises ValueError, which names the legal values."""
+    """Return the value of `text`. Raises ValueError, which names the legal values."""
     if isinstance(kind, StringType):
         return _string(text, kind, dialect)
     if kind.name == "bool":

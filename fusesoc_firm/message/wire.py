@@ -67,5 +67,5 @@ class WireRules:
     trailing_bytes: int
 
     def alignment(self, size: int) -> int:
-        """The alignment in bytes of a value of `size` bytes."""
+        """Return the alignment in bytes of a value of `size` bytes."""
         return min(size, self.max_alignment)

@@ -415,7 +415,7 @@ class Copies:
                 yield position, width
 
     def _is_used(self, declaration: re.Match[str], how: str) -> bool:
-        """Whether a constant is used outside its declaration in a form that matches `how`."""
+        """Return whether a constant is used outside its declaration in a form that matches `how`."""
         uses = re.compile(rf"\b(?:{'|'.join(re.split(_COMMA, declaration[2]))})\b{how}", re.IGNORECASE)
         found = (
             not source.dynamic & set(_NAME.findall((use["index"] or "").lower()))

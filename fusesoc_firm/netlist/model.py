@@ -55,7 +55,7 @@ class Instance:
         return [int(text.rpartition("=")[2]) for text in self.parameters]
 
     def input(self, index: int) -> Net:
-        """Return the net at an input. Raises `NetlistError` if nothing drives it."""
+        """Return the net at an input. Raise `NetlistError` if nothing drives it."""
         net = self.inputs[index]
         if net is None:
             raise self.error(f"nothing drives an input of '{self.name}'")

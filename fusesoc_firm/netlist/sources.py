@@ -208,7 +208,7 @@ def _without_added(line: str, mark: str) -> str:
 
 
 def use_numbers(files: Iterable[str]) -> bool:
-    """Whether any of these files names a type with wrong functions."""
+    """Return whether any of these files names a type with wrong functions."""
     return any(_TYPES.search(Path(file).read_bytes().decode("latin-1")) for file in files)
 
 

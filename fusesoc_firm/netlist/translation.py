@@ -122,7 +122,7 @@ def translator() -> list[Path]:
 def translate(translation: Translation, folder: Path) -> str:
     """Write the netlist, with GHDL's libraries in `folder`; return GHDL's warnings.
 
-    Raises `NetlistError`; then there is no netlist.
+    May raise `NetlistError`; then there is no netlist.
     """
     if absent := missing(["ghdl", *(translation.programs if starts_everything() else ())]):
         raise NetlistError(explanation(absent))
@@ -203,7 +203,7 @@ class _Ghdl:
     def check_constants(self, widths: set[int]) -> str:
         """Check the constants; return a warning if GHDL cannot evaluate them.
 
-        Raises `NetlistError` if GHDL turns a constant with one of these widths (in bits) into zero.
+        Raise `NetlistError` if GHDL turns a constant with one of these widths (in bits) into zero.
         """
         if not widths:
             return ""
@@ -224,7 +224,7 @@ class _Ghdl:
         return doubt
 
     def probed(self, copies: lost_constants.Copies) -> str:
-        """Return GHDL's output for the copies, after dropping the probes that GHDL rejects. Raises `NetlistError`."""
+        """Return GHDL's output for the copies, after dropping the probes that GHDL rejects. May raise `NetlistError`."""
         while True:
             written = copies.write()
             try:

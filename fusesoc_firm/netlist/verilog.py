@@ -72,7 +72,7 @@ Generics = Mapping[tuple[str, str], Mapping[str, str]]
 
 
 def write(modules: Modules, generics: Generics) -> str:
-    """Return the Verilog of all defined modules; raises `NetlistError` for gates without an equivalent in hardware."""
+    """Return the Verilog of all defined modules; raise `NetlistError` for gates without an equivalent in hardware."""
     defined = [module for module in modules.values() if module.is_defined]
     return "\n".join(_Writer(module, modules, generics).text() for module in reversed(defined))
 
@@ -97,7 +97,7 @@ def declaration(width: int) -> str:
 
 
 def constant(gate: Instance) -> str | None:
-    """Return the levels of a constant, highest bit first; None if the gate is not a constant."""
+    """Return the levels of a constant, highest bit first; return None if the gate is not a constant."""
     width = gate.outputs[0].width if gate.outputs else 0
     match gate.kind:
         case "$const_UB32" | "$const_0":
@@ -332,7 +332,7 @@ class _Writer:
         yield from self._assign(gate, _either(self.part(net, net.width - 1, 1), f"-{value}", value))
 
     def _modulus(self, gate: Instance) -> Iterator[str]:
-        """The remainder with the sign of the divisor."""
+        """Yield the remainder with the sign of the divisor."""
         left, right = gate.input(0), gate.input(1)
         a, b = (f"$signed({self.value(net)})" for net in (left, right))
         signs = " != ".join(self.part(net, net.width - 1, 1) for net in (left, right))

@@ -59,7 +59,7 @@ class BurstJoiner:
     def push(self, burst: bytes, tid: int | None = None) -> JoinedFrame | None:
         """Take a burst and return the frame that it completes, if any.
 
-        `tid` is the stream's `tid`, if the transport has one; it must equal the id. Raises `BurstError`.
+        `tid` is the stream's `tid`, if the transport has one; it must equal the id. May raise `BurstError`.
         """
         identifier = self._id(burst, tid)
         begun = self._begun.pop(identifier, None)
@@ -83,7 +83,7 @@ class BurstJoiner:
         return None
 
     def close(self) -> None:
-        """End the stream. Raises `BurstError` if a frame is incomplete."""
+        """End the stream. Raise `BurstError` if a frame is incomplete."""
         if not self._begun:
             return
         parts = ", ".join(f"{len(self._begun[identifier])} bytes of id {identifier}" for identifier in self.unfinished)
@@ -119,7 +119,7 @@ def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
     """Split a frame into bursts, as the Manager does: `runs` has the beats of each burst except the last one.
 
     This serves tests and models of the Manager. The meaningless bits of an extra beat are zero.
-    Raises `ValueError` if a run has no beats, or if the runs have more beats than the frame.
+    Raise `ValueError` if a run has no beats, or if the runs have more beats than the frame.
     """
     _check_width(width)
     beat_bytes = width // 8

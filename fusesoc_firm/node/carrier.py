@@ -48,7 +48,7 @@ class Carrier(Protocol):
     """Topics of a middleware. Subscribers and publishers are numbered separately, as in the description."""
 
     def receive(self) -> Iterator[Taken | Published]:
-        """Yield events until the carrier is closed or the middleware ends. Raises `CarrierError`."""
+        """Yield events until the carrier is closed or the middleware ends. May raise `CarrierError`."""
 
     def publish(self, topic: int, payload: bytes) -> None:
         """Publish a message; any thread may call this method. After the middleware has ended, messages are dropped."""
@@ -83,7 +83,7 @@ class RosCarrier:
     """A process that is a node of a running ROS; see `Carrier`."""
 
     def __init__(self, ros: int, description: NodeDescription, options: RosOptions) -> None:
-        """Start the process and wait until the ROS node is ready. Raises `CarrierError`. ROS 1 waits for its master."""
+        """Start the process and wait until the ROS node is ready. May raise `CarrierError`. ROS 1 waits for its master."""
         self.title = f"ROS {ros}"
         self._python = options.python or _python_of(ros)
         mine, its = socket.socketpair()
@@ -135,7 +135,7 @@ class RosCarrier:
         return subscribers, publishers
 
     def receive(self) -> Iterator[Taken | Published]:
-        """Yield events until the carrier is closed or ROS asks the node to end. Raises `CarrierError`."""
+        """Yield events until the carrier is closed or ROS asks the node to end. May raise `CarrierError`."""
         try:
             while parcel := self._channel.receive():
                 if parcel.kind == bridge.MESSAGE:
@@ -211,7 +211,7 @@ def ros_arguments(ros: int, arguments: Sequence[str]) -> Iterator[str]:
 
 @cache
 def _python_of(ros: int) -> str:
-    """Return the first Python that can import the modules of ROS. Raises `CarrierError`."""
+    """Return the first Python that can import the modules of ROS. May raise `CarrierError`."""
     module = _MODULES[ros]
     found = [shutil.which("python3"), "/usr/bin/python3", sys.executable]
     candidates = [path for path in dict.fromkeys(found) if path and Path(path).exists()]

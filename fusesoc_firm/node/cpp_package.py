@@ -60,7 +60,7 @@ def headers() -> list[Path]:
 def cpp_package(loaded: LoadedSystem, ros: Middleware | None = None) -> dict[str, str]:
     """Return the files of the node in C++ by path within the package.
 
-    Raises `InputError` if the system's topics do not share one version of ROS, or do not belong to `ros` if it is
+    Raise `InputError` if the system's topics do not share one version of ROS, or do not belong to `ros` if it is
     given.
     """
     description = describe(loaded)
@@ -95,7 +95,7 @@ def generated_files(loaded: LoadedSystem) -> dict[str, GeneratedFile]:
 
 
 def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
-    """Return the version of ROS that all topics share. Raises `InputError`."""
+    """Return the version of ROS that all topics share. May raise `InputError`."""
     found = description.versions
     if len(found) > 1:
         titles = " and ".join(middleware_of(version).title for version in found)
@@ -137,7 +137,7 @@ def _source(loaded: LoadedSystem, description: NodeDescription, dialect: _Dialec
 
 
 def _software(loaded: LoadedSystem, description: NodeDescription) -> dict[str, Any] | None:
-    """Return the ends of the messages of blocks in software; None if no such blocks run on this host."""
+    """Return the ends of the messages of blocks in software; return None if no such blocks run on this host."""
     ports = software_ports(loaded.system)
     if not ports.inputs:
         return None

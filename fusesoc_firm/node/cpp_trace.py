@@ -31,7 +31,7 @@ class _Step:
 
 
 def are_steps(table: Path) -> bool:
-    """Return whether a table has lines for steps. Raises `InputError` if it cannot be read."""
+    """Return whether a table has lines for steps. Raise `InputError` if it cannot be read."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             return tuple(next(csv.reader(file), ())) == COLUMNS
@@ -42,7 +42,7 @@ def are_steps(table: Path) -> bool:
 
 
 def write_ways(steps: Path, table: Path, description: NodeDescription) -> None:
-    """Write the table of the routes that these steps form. Raises `InputError`."""
+    """Write the table of the routes that these steps form. May raise `InputError`."""
     _Fold(description, [*_read(steps, description)]).write(table)
 
 

@@ -80,7 +80,7 @@ class NodeDescription:
 
 
 def describe(loaded: LoadedSystem) -> NodeDescription:
-    """Describe the node of a system. Raises `InputError` for a middleware other than ROS."""
+    """Describe the node of a system. Raise `InputError` for a middleware other than ROS."""
     system, software = loaded.system, loaded.system.software
     here = {block.block for block in software.blocks if block.type.accelerator.sources}
     subscribers, entering = _parted(system.subscribers, here)

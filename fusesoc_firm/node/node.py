@@ -97,7 +97,7 @@ class Node:
         software: NodeSoftware | None = None,
         trace: Trace | None = None,
     ) -> None:
-        """Open the transport. Raises `TransportError`."""
+        """Open the transport. May raise `TransportError`."""
         self.statistics = Statistics.of(description)
         self._description = description
         self._open_transport = open_transport
@@ -128,7 +128,7 @@ class Node:
     def run(self, carriers: Mapping[int, Carrier]) -> bool:
         """Work until `stop` or the end of a carrier; return whether all received messages have been processed.
 
-        `carriers` maps versions of ROS to the carriers of their topics; they stay open. Raises `TransportError` or
+        `carriers` maps versions of ROS to the carriers of their topics; they stay open. Raise `TransportError` or
         `CarrierError` if one of them fails for good.
         """
         self._carriers = carriers

@@ -25,7 +25,7 @@ def python_node(
     """Return the file by its name in `folder`.
 
     If the system has software, the node finds its functions through the specification and its messages in `paths`; both
-    paths are relative to the folder. Raises `InputError` if the system has no topic of `ros`.
+    paths are relative to the folder. Raise `InputError` if the system has no topic of `ros`.
     """
     description = describe(loaded)
     if ros is not None and ros.number not in description.versions:

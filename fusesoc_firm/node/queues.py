@@ -147,7 +147,7 @@ class SubscriberQueues(Generic[Item]):
 
         The item is not queued if a full queue drops the newest item, or stays full for `timeout` seconds (None: no
         limit).
-        Raises `ClosedError`, even during the wait, and `IndexError` for an unknown subscriber.
+        Raise `ClosedError`, even during the wait, and `IndexError` for an unknown subscriber.
         """
         if not 0 <= subscriber < len(self._queues):
             raise IndexError(f"subscriber is {subscriber}; legal: 0 to {len(self._queues) - 1}")
@@ -169,7 +169,7 @@ class SubscriberQueues(Generic[Item]):
     def get(self, timeout: float | None = None) -> tuple[int, Item]:
         """Return the next subscriber and its first item; wait at most `timeout` seconds (None: no limit).
 
-        Raises `EmptyError` on timeout, and `ClosedError` when the queues are closed and empty.
+        Raise `EmptyError` on timeout, and `ClosedError` when the queues are closed and empty.
         """
         with self._changed:
             self._changed.wait_for(lambda: self._closed or any(self._queues), timeout)

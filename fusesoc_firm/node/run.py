@@ -36,7 +36,7 @@ class RunOptions:
 def run_options(
     arguments: argparse.Namespace, rest: Sequence[str], description: NodeDescription, ros: int | None = None
 ) -> RunOptions:
-    """Return the options from a command line; `ros` selects a version, if given. Raises `InputError`."""
+    """Return the options from a command line; `ros` selects a version, if given. May raise `InputError`."""
     if ros is not None and ros not in description.versions:
         known = " and ".join(map(str, description.versions))
         hint = "the hardware handles one version: set it with 'middleware' of blocks and interfaces"
@@ -65,7 +65,7 @@ def run_node(
 ) -> None:
     """Run the node until Ctrl-C, SIGTERM or ROS ends it; a second Ctrl-C ends it at once.
 
-    `loaded` is the system, if it has software. Raises `InputError` if ROS or the hardware fails, or if received
+    `loaded` is the system, if it has software. Raise `InputError` if ROS or the hardware fails, or if received
     messages could not be processed in time.
     """
     settings = replace(options.settings, report=_say)

@@ -57,7 +57,7 @@ class NodeSoftware:
 def node_software(loaded: LoadedSystem, report: Callable[[InputError], None]) -> Iterator[NodeSoftware | None]:
     """Load a system's software, None if it has none. The sources can be imported within this context.
 
-    Raises `InputError`, also for a fault within a file.
+    Raise `InputError`, also for a fault within a file.
     """
     system, software = loaded.system, loaded.system.software
     if not any(block.type.accelerator.sources for block in software.blocks):

@@ -61,7 +61,7 @@ def software_ports(system: DerivedSystem) -> SoftwarePorts:
 
 
 def serve(system: DerivedSystem, folder: Path, taken: BinaryIO, given: BinaryIO) -> None:
-    """Process frames until the input ends. Raises `InputError` for a fault in a function or in the stream of frames.
+    """Process frames until the input ends. Raise `InputError` for a fault in a function or in the stream of frames.
 
     A payload that is not a message is reported on standard error and skipped.
     """

@@ -72,7 +72,7 @@ class Trace:
     """Writes the table; any thread may report events. Times count from the creation of the `Trace`."""
 
     def __init__(self, path: Path, description: NodeDescription, clock: Callable[[], int] = monotonic_ns) -> None:
-        """Create the file at `path`; `clock` gives ns. Raises `InputError`."""
+        """Create the file at `path`; `clock` gives ns. May raise `InputError`."""
         check_output(path)
         try:
             self._file = path.open("w", newline="", encoding="utf-8")

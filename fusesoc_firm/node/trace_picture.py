@@ -44,7 +44,7 @@ _METADATA: dict[str, dict[str, None]] = {
 def draw_trace(table: Path, picture: Path) -> None:
     """Draw a table that `Trace` has written: a row of panels for each route, wall time beside simulated time.
 
-    Raises `InputError` for another kind of file, an unknown picture format, and if matplotlib is missing.
+    Raise `InputError` for another kind of file, an unknown picture format, and if matplotlib is missing.
     """
     check_output(picture, SUFFIXES)
     ways = _ways(table)

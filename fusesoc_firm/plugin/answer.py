@@ -54,11 +54,11 @@ class Basis:
     reads: Reads = field(default_factory=Reads)
 
     def facts(self) -> list[Fact]:
-        """All facts of the basis."""
+        """Return all facts of the basis."""
         return [*self.further, *self.reads.facts()]
 
     def holds(self) -> bool:
-        """Whether no fact has changed since its use."""
+        """Return whether no fact has changed since its use."""
         return hold(self.facts(), self.run)
 
 
@@ -101,7 +101,7 @@ def answer_from_store(command: str, path: Path) -> bool:
 def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only_looked_up: bool = False) -> None:
     """Write the core for FuseSoC's file to the current folder, report it, and store a note for recall.
 
-    Raises `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
+    Raise `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
     """
     start = time.monotonic()
     # The code comes first, since its modules are imported from here on.
@@ -130,9 +130,9 @@ def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only
 def read_request(
     command: str, path: Path, generator: Generator, run: str | None = None, further: list[Fact] | None = None
 ) -> Request:
-    """The request in FuseSoC's file, with the folders of message cores generated in `run`, or in any run if None.
+    """Return the request in FuseSoC's file, with the folders of message cores generated in `run`, or in any run if None.
 
-    Facts about these are added to `further`. Raises `InputError`.
+    Facts about these are added to `further`. May raise `InputError`.
     """
     generated = path.absolute().parent.parent
 
@@ -145,7 +145,7 @@ def read_request(
 
 
 def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
-    """Derive the data of a request. Raises `InputError`."""
+    """Derive the data of a request. May raise `InputError`."""
     with noted(basis.reads):
         return generator.load(request)
 
@@ -153,9 +153,9 @@ def load(request: Request, generator: Generator, basis: Basis) -> LoadedRequest:
 def obtain(
     loaded: LoadedRequest, generator: Generator, basis: Basis, *, is_only_looked_up: bool = False
 ) -> tuple[Key, Entry]:
-    """The core for a request, from the store if possible, and its key.
+    """Return the core for a request, from the store if possible, and its key.
 
-    Raises `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
+    Raise `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
     """
 
     def build() -> Files:
@@ -191,15 +191,15 @@ def _key(loaded: LoadedRequest, generator: Generator, basis: Basis) -> Key:
 
 
 def _searched() -> list[str]:
-    """The environment's folders with message definitions."""
+    """Return the environment's folders with message definitions."""
     entries = [entry for name in SEARCHED for entry in os.environ.get(name, "").split(os.pathsep) if entry]
     return [folder for entry in entries for folder in (entry, str(Path(entry, "share")))]
 
 
 def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: str | None) -> tuple[Path, ...]:
-    """The folders below `generated` with the messages of cores, generated in `run`, or in any run if None.
+    """Return the folders below `generated` with the messages of cores, generated in `run`, or in any run if None.
 
-    Raises `InputError` for a core without such a folder, as when the requesting core does not depend on it.
+    Raise `InputError` for a core without such a folder, as when the requesting core does not depend on it.
     """
     faults = Diagnostics()
     found: list[Path] = []
@@ -216,7 +216,7 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
 
 
 def _check_locked(loaded: LoadedRequest) -> bool:
-    """Check a request against the lock files; return whether there are any. Raises `InputError` for differences."""
+    """Check a request against the lock files; return whether there are any. Raise `InputError` for differences."""
     request = loaded.request
     places: list[Path] = []
     if name := request.parameters.get("locked"):
@@ -247,7 +247,7 @@ def _check_declared(of_build: Reads, of_key: Reads) -> None:
 
 
 def _write(files: Files, request: Request, marks: str, run: str) -> None:
-    """Write a core to the current folder. Raises `InputError`."""
+    """Write a core to the current folder. May raise `InputError`."""
     try:
         found = write_core(files, request.vlnv, marks, run)
     except OSError as error:
@@ -264,7 +264,7 @@ def _write(files: Files, request: Request, marks: str, run: str) -> None:
 
 
 def _is_here() -> bool:
-    """Whether the current folder still exists."""
+    """Return whether the current folder still exists."""
     try:
         return bool(Path.cwd())
     except FileNotFoundError:
@@ -272,7 +272,7 @@ def _is_here() -> bool:
 
 
 def _name(path: Path, request: Request) -> str:
-    """An input's name in the key, which is the same for all copies of a project."""
+    """Return an input's name in the key, which is the same for all copies of a project."""
     folders = [folder for found in request.message_folders.found.values() for folder in found]
     for root in (request.files_root, *folders):
         if path.is_relative_to(root):
@@ -283,7 +283,7 @@ def _name(path: Path, request: Request) -> str:
 
 
 def _named_content(item: Input, request: Request) -> tuple[str, bytes | None]:
-    """An input's name in the key, and the content that the key covers."""
+    """Return an input's name in the key, and the content that the key covers."""
     if isinstance(item, Path):
         return _name(item, request), item.read_bytes() if item.is_file() else None
     return f"{_name(item.path, request)}:{item.name}", item.content

@@ -41,7 +41,7 @@ def build(
 ) -> Generator[Outcome, None, None]:
     """Yield each build's outcome as it finishes. On exit, all processes that it started are ended.
 
-    `tell` is called for builds that wait, `progress` during generation. Raises `InputError`, also for differences from
+    `tell` is called for builds that wait, `progress` during generation. Raise `InputError`, also for differences from
     the lock file of a core.
     """
     os.environ.setdefault(_LAUNCHER, shlex.join([sys.executable, "-m", "fusesoc_firm.cli", "tool"]))
@@ -68,7 +68,7 @@ def build(
 
 
 def _generators_run_here() -> bool:
-    """Whether generators run in the same Python as this process."""
+    """Return whether generators run in the same Python as this process."""
     chosen = os.environ.get("FUSESOC_FIRM_PYTHON")
     return not chosen or Path(chosen).absolute() == Path(sys.executable).absolute()
 

@@ -36,14 +36,14 @@ _WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
 
 
 def lock_path(core: ProjectCore) -> Path:
-    """The path of a core's lock file, next to its `.core` file."""
+    """Return the path of a core's lock file, next to its `.core` file."""
     return core.files[0].with_suffix(".lock")
 
 
 def lock_of(
     core: ProjectCore, depends: Iterable[ProjectCore], generated: Mapping[str, Sequence[LoadedRequest]]
 ) -> Lock:
-    """The definitions, cores and tools that a core now uses, directly or through the cores that it `depends` on.
+    """Return the definitions, cores and tools that a core now uses, directly or through the cores that it `depends` on.
 
     `generated` holds the derived requests of each core by its name. A message that two cores take from different places
     is listed for each.
@@ -63,13 +63,13 @@ def lock_of(
 
 
 def lock_text(lock: Lock) -> str:
-    """The text of the lock file."""
+    """Return the text of the lock file."""
     data = {kind: {name: dict(facts) for name, facts in items.items()} for kind, items in lock.items()}
     return _HEAD + yaml_dump(data)
 
 
 def read_lock(path: Path) -> Lock:
-    """Read a lock file. Raises `InputError` if it is unreadable or invalid."""
+    """Read a lock file. Raise `InputError` if it is unreadable or invalid."""
     try:
         data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
         return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
@@ -116,7 +116,7 @@ def _differences(locked: Lock, used: Lock) -> Iterator[str]:
 
 
 def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mapping[str, str]) -> Iterator[str]:
-    """The differences between a used item and its locked state."""
+    """Yield the differences between a used item and its locked state."""
     if was is None:
         yield f"{word} {name} is used, but not locked"
         return
@@ -126,7 +126,7 @@ def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mappin
 
 
 def _messages(loaded: LoadedRequest) -> dict[str, dict[str, str]]:
-    """The facts of each message that a request uses."""
+    """Return the facts of each message that a request uses."""
     return {
         f"{name} ({library.ros.title})": _message(name, library, loaded.request.files_root.resolve())
         for library, definitions in loaded.definitions()
@@ -151,7 +151,7 @@ def _message(name: MessageName, library: MessageLibrary, folder: Path) -> dict[s
 
 
 def _digest_of_core(core: ProjectCore, generated: Sequence[LoadedRequest]) -> str:
-    """The digest of a core's files and of the inputs of its generated cores, named relative to its `.core` file."""
+    """Return the digest of a core's files and of the inputs of its generated cores, named relative to its `.core` file."""
     folder = core.files[0].parent
     made_of = [item for loaded in generated for item in loaded.inputs]
     return _digest_of({_named(item, folder): _digest(item) for item in (*core.files, *made_of)})
@@ -162,7 +162,7 @@ def _digest_of(found: Mapping[str, str | None]) -> str:
 
 
 def _named(item: Input, folder: Path) -> str:
-    """An input's name relative to a folder."""
+    """Return an input's name relative to a folder."""
     if isinstance(item, Path):
         return os.path.relpath(item.resolve(), folder)
     return f"{os.path.relpath(item.path.resolve(), folder)}:{item.name}"

@@ -26,7 +26,7 @@ from fusesoc_firm.text.outputs import shown, write
 
 
 def graph(core: str, target: str) -> str:
-    """The dependencies of a core's target, in Graphviz's language. Raises `InputError`."""
+    """Return the dependencies of a core's target, in Graphviz's language. May raise `InputError`."""
 
     def sources(call: GeneratorCall) -> list[str]:
         request = _request(call)
@@ -37,7 +37,7 @@ def graph(core: str, target: str) -> str:
 
 
 def affected_since(revision: str) -> dict[str, str]:
-    """The cores that the edits since a revision affect, each with the reason. Raises `InputError`."""
+    """Return the cores that the edits since a revision affect, each with the reason. May raise `InputError`."""
     changed = dict.fromkeys(path.resolve() for path in changed_files(revision, Path.cwd()))
     return affected(project_cores(), _touched(changed))
 
@@ -45,7 +45,7 @@ def affected_since(revision: str) -> dict[str, str]:
 def check_locked(core: str) -> Path:
     """Compare a core, given by its name, with its lock file, and return the file's path.
 
-    Raises `InputError` with every difference, or if the lock file is missing.
+    Raise `InputError` with every difference, or if the lock file is missing.
     """
     found, depends = dependencies(core)
     path = lock_path(found)
@@ -55,7 +55,7 @@ def check_locked(core: str) -> Path:
 
 
 def write_lock(core: str) -> Path:
-    """Write the lock file of a core, given by its name. Raises `InputError`."""
+    """Write the lock file of a core, given by its name. May raise `InputError`."""
     found, depends = dependencies(core)
     path = lock_path(found)
     write(path, lock_text(_used(found, depends)))
@@ -63,7 +63,7 @@ def write_lock(core: str) -> Path:
 
 
 def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
-    """The folders of message cores in their original places, since no run has copied them."""
+    """Return the folders of message cores in their original places, since no run has copied them."""
     found: list[Path] = []
     cores = {name: core for core in project_cores() for name in core.names}
     for name, source in named.items():
@@ -76,7 +76,7 @@ def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
 
 
 def _used(core: ProjectCore, depends: Sequence[ProjectCore]) -> Lock:
-    """The definitions, cores and tools that a core uses now."""
+    """Return the definitions, cores and tools that a core uses now."""
     calls = {core.vlnv: [*_requests(core)]}
     for item in depends:
         # Only part of a dependency may be used here. If another part cannot be generated, FuseSoC's run reports it.
@@ -93,7 +93,7 @@ def _requests(core: ProjectCore) -> Iterator[LoadedRequest]:
 
 
 def _touched(changed: Collection[Path]) -> Callable[[ProjectCore], str | None]:
-    """A function that names the changed file by which a core itself is touched."""
+    """Return a function that names the changed file by which a core itself is touched."""
 
     def touched(core: ProjectCore) -> str | None:
         found = _first(changed, core.files)
@@ -110,7 +110,7 @@ def _first(changed: Collection[Path], files: Collection[Path]) -> Path | None:
 
 
 def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
-    """All inputs of a generated core, including our own files."""
+    """Return all inputs of a generated core, including our own files."""
     try:
         request = _request(call)
         if request is None:
@@ -124,14 +124,14 @@ def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
 
 
 def _request(call: GeneratorCall) -> Request | None:
-    """The request that FuseSoC would make; None for other generators."""
+    """Return the request that FuseSoC would make, or None for other generators."""
     if call.generator not in GENERATORS:
         return None
     return make_request(call, GENERATORS[call.generator].parameters, message_folders)
 
 
 def _input_files(request: Request) -> list[Path]:
-    """The files that a request depends on, even in part."""
+    """Return the files that a request depends on, even in part."""
     inputs = GENERATORS[request.command].load(request).inputs
     found = (item if isinstance(item, Path) else item.path for item in inputs)
     return [*dict.fromkeys(path.resolve() for path in found)]

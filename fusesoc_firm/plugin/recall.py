@@ -73,25 +73,25 @@ def answer(command: str, arguments: Sequence[str], run: str = "") -> bool:
 
 
 def call_digest(command: str, call: bytes) -> str:
-    """The name of a call's note: the digest of FuseSoC's file for the call and of the Python that answers."""
+    """Return the name of a call's note: the digest of FuseSoC's file for the call and of the Python that answers."""
     searched = [os.environ.get(name) for name in SEARCHED]
     python = [sys.version, os.uname().machine, _c_library(), _packages(), str(PACKAGE)]
     return digest_of([command, digest(call), searched, python])
 
 
 def messages_fact(generated: str, core: str, run: str) -> facts.Fact:
-    """A fact: the folders below `generated` with the messages of a core."""
+    """Return a fact: the folders below `generated` with the messages of a core."""
     name = json.dumps([generated, core])
     return "messages", name, state("messages", name, run)
 
 
 def hold(noted: Iterable[facts.Fact], run: str) -> bool:
-    """Whether all facts are in their recorded states."""
+    """Return whether all facts are in their recorded states."""
     return all(state(kind, name, run) == was for kind, name, was in noted)
 
 
 def state(kind: str, name: str, run: str) -> str | None:
-    """The current state of a fact; None if the object is missing or of another kind."""
+    """Return the current state of a fact, or None if the object is missing or of another kind."""
     try:
         if kind == "messages":
             generated, core = json.loads(name)
@@ -103,7 +103,7 @@ def state(kind: str, name: str, run: str) -> str | None:
 
 
 def _packages() -> list[list[object]]:
-    """Every installed version of the packages that we import, in each place of Python's path."""
+    """Return every installed version of the packages that we import, in each place of Python's path."""
     found: list[list[object]] = []
     for folder in sys.path:
         try:

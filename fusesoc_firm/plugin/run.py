@@ -35,7 +35,7 @@ Clash = tuple[str, str]
 
 
 def run_of(fusesoc: int) -> str:
-    """An id of this FuseSoC process's run that is unique on this machine."""
+    """Return an id of this FuseSoC process's run that is unique on this machine."""
     # The start time follows the name in parentheses, which may contain blanks.
     status = (read_file(f"/proc/{fusesoc}/stat") or b"").decode(errors="replace")
     return f"{fusesoc} {''.join(status.rpartition(')')[2].split()[19:20])}"
@@ -45,7 +45,7 @@ def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str
     """Write a generated core, by its full name, to the current folder; the last file is its `.core`.
 
     `messages_of` is the core whose messages these are, or "". If another core of the run defines a unit differently,
-    that clash is returned and nothing is written. Raises `OSError` with the absolute path that cannot be written.
+    that clash is returned and nothing is written. Raise `OSError` with the absolute path that cannot be written.
     """
     folder = os.getcwd()
     units = _units_of(files)
@@ -64,7 +64,7 @@ def write_core(files: Mapping[str, bytes], core: str, messages_of: str, run: str
 
 
 def message_folders(generated: str, core: str, run: str | None) -> list[str]:
-    """The folders in `generated` with the messages of a core (`vendor:library:name`), sorted; None means any run."""
+    """Return the folders in `generated` with the messages of a core (`vendor:library:name`), sorted; None means any run."""
     found = []
     for folder in _folders(generated):
         marked, _, of_run = _read(folder, _MESSAGES).partition("\n")
@@ -74,7 +74,7 @@ def message_folders(generated: str, core: str, run: str | None) -> list[str]:
 
 
 def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
-    """The design units in generated files by their VHDL names, each with the digest of its file."""
+    """Return the design units in generated files by their VHDL names, each with the digest of its file."""
     found: dict[str, str] = {}
     for name, content in files.items():
         if pattern := _PATTERNS.get(os.path.splitext(name)[1].lower()):
@@ -84,7 +84,7 @@ def _units_of(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _clash(folder: str, units: Mapping[str, str], run: str) -> Clash | None:
-    """The first unit that differs from a unit of the same name and run in a folder next to `folder`."""
+    """Return the first unit that differs from a unit of the same name and run in a folder next to `folder`."""
     for core, others in _others(folder, run):
         for unit, digest in others.items():
             if units.get(unit, digest) != digest:

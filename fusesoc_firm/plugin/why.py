@@ -54,7 +54,7 @@ class Names:
 
 
 def why(path: Path) -> list[Reason]:
-    """The origin of each line of a generated file in a build. Raises `InputError`."""
+    """Return the origin of each line of a generated file in a build. May raise `InputError`."""
     call, name = call_file(path)
     command = _generator(call)
     request = read_request(command, call, GENERATORS[command])
@@ -68,7 +68,7 @@ def why(path: Path) -> list[Reason]:
 
 
 def _generator(path: Path) -> str:
-    """The generator of a call. FuseSoC's file does not name it, but the requesting core does."""
+    """Return the generator of a call. FuseSoC's file does not name it, but the requesting core does."""
     call = read_call(path)
     generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
     if generator not in GENERATORS:
@@ -80,7 +80,7 @@ def _generator(path: Path) -> str:
 
 
 def _names(request: Request) -> Names:
-    """The names that a line of a generated core may contain."""
+    """Return the names that a line of a generated core may contain."""
     if request.command == "far":
         loaded = load_requested(request)
         return names_of(loaded.specification, loaded.messages())
@@ -90,9 +90,9 @@ def _names(request: Request) -> Names:
 def rendering_of(
     generate: Callable[[], GeneratedCore], name: str, text: str, inputs: Iterable[Input] = ()
 ) -> Rendering:
-    """The template and context of the file `name` in a generated core with these `inputs`.
+    """Return the template and context of the file `name` in a generated core with these `inputs`.
 
-    Raises `InputError` if no template generated the file, or if the generated text differs from `text`.
+    Raise `InputError` if no template generated the file, or if the generated text differs from `text`.
     """
     with recorded() as renderings:
         core = generate()
@@ -113,7 +113,7 @@ def rendering_of(
 
 
 def reasons(rendering: Rendering, names: Names) -> list[Reason]:
-    """The origin of each line."""
+    """Return the origin of each line."""
     lines = traced_lines(rendering)
     text = "\n".join(line.text for line in lines)
     # The file's own messages, for fields without a block before them.
@@ -125,7 +125,7 @@ def reasons(rendering: Rendering, names: Names) -> list[Reason]:
 
 
 def names_of(specification: Specification | None, messages: Iterable[Message]) -> Names:
-    """The names in a specification and in messages, each given with all nested definitions."""
+    """Return the names in a specification and in messages, each given with all nested definitions."""
     fields = {str(name): dict(_fields(name, definitions)) for name, definitions in messages}
     blocks: dict[str, SourceRef] = {}
     of_blocks: dict[str, dict[str, SourceRef]] = {}
@@ -142,7 +142,7 @@ def names_of(specification: Specification | None, messages: Iterable[Message]) -
 
 
 def _messages(name: str, specification: Specification | None) -> Iterator[str]:
-    """The messages of a block, as named in the specification."""
+    """Yield the messages of a block, as named in the specification."""
     assert specification is not None
     types = {str(item.name): item for item in specification.accelerators}
     for block in specification.blocks:
@@ -183,7 +183,7 @@ def _reason(line: TracedLine, context: Mapping[str, object], names: Names, own: 
 
 
 def _scope_blocks(scope: str, context: Mapping[str, object], names: Names) -> list[SourceRef]:
-    """The places of the blocks named in the innermost scope that names any; the whole file's scope does not count."""
+    """Return the places of the blocks named in the innermost scope that names any; the whole file's scope does not count."""
     data: object = context
     found: list[SourceRef] = []
     for key, number in _STEP.findall(scope):
@@ -204,14 +204,14 @@ def _words(text: str) -> list[str]:
 
 
 def _block(word: str, blocks: Iterable[str]) -> str | None:
-    """The block whose signal or instance this word names."""
+    """Return the block whose signal or instance this word names."""
     bare = word.removeprefix("u_")
     found = [block for block in blocks if bare == block or bare.startswith(f"{block}_")]
     return max(found, key=len, default=None)
 
 
 def _longest(word: str, fields: Mapping[str, SourceRef]) -> SourceRef | None:
-    """The place of the longest field that begins a word; `_length`, `_axis_tdata` and the like may follow."""
+    """Return the place of the longest field that begins a word; `_length`, `_axis_tdata` and the like may follow."""
     found = [field for field in fields if word == field or word.startswith(f"{field}_")]
     return fields[max(found, key=len)] if found else None
 
@@ -219,7 +219,7 @@ def _longest(word: str, fields: Mapping[str, SourceRef]) -> SourceRef | None:
 def call_file(path: Path) -> tuple[Path, str]:
     """FuseSoC's call of the generator that generated a file, and the file's name in the generated core.
 
-    The file is below `generator_cache`, or is its copy below `src`. Raises `InputError` if there is no such call.
+    The file is below `generator_cache`, or is its copy below `src`. Raise `InputError` if there is no such call.
     """
     path = path.absolute()
     places = [(folder, place) for folder in path.parents for place in (folder, *_caches(folder))]
@@ -234,7 +234,7 @@ def call_file(path: Path) -> tuple[Path, str]:
 
 
 def _caches(folder: Path) -> list[Path]:
-    """The folders in FuseSoC's cache for the core that was copied to `folder`."""
+    """Return the folders in FuseSoC's cache for the core that was copied to `folder`."""
     if folder.parent.name != "src":
         return []
     return sorted((folder.parent.parent / "generator_cache").glob(f"{folder.name}-*"))

@@ -44,7 +44,7 @@ class Source:
     duration: float | None = None
 
     def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
-        """The selected messages of some topics."""
+        """Return the selected messages of some topics."""
         first = bag.start + round(self.start * 10**9)
         stop = None if self.duration is None else first + round(self.duration * 10**9)
         return islice((item for item in bag.messages(topics, stop) if item.stamp >= first), self.limit)
@@ -81,7 +81,7 @@ def replay(
 ) -> None:
     """Replay a bag and print a summary; `start_simulator` is called after all other checks.
 
-    Raises `InputError`, also if a message was rejected; the responses to the others are then recorded.
+    Raise `InputError`, also if a message was rejected; the responses to the others are then recorded.
     """
     if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
         fail(f"{target.path} is the bag to replay; write to another")
@@ -207,7 +207,7 @@ class _Replay:
 
 
 def seconds(stamp: int) -> str:
-    """A time in ns as readable seconds, with all digits."""
+    """Return a time in ns as readable seconds, with all digits."""
     return f"{stamp // 10**9}.{stamp % 10**9:09d}"
 
 
@@ -231,7 +231,7 @@ def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
 
 
 def _form(target: Target, like: Form) -> Form:
-    """The format of the bag to write."""
+    """Return the format of the bag to write."""
     said = form_of(target.path)
     if target.form and said and target.form is not said:
         fail(f"the format of {target.path} is to be {target.form.value}, but its ending means {said.value}")
@@ -251,7 +251,7 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
 def _routes(
     bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
 ) -> dict[Stream, Route]:
-    """The route of each stream. Raises `InputError` if there is no route, or a requested topic is missing."""
+    """Return the route of each stream. Raise `InputError` if there is no route, or a requested topic is missing."""
     faults = Diagnostics()
     topics = {absolute_name(stream.topic) for stream in bag.streams}
     for item in subscribers:

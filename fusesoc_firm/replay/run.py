@@ -49,7 +49,7 @@ class Sent:
     last_cycle: int | None
 
     def latency(self, clock_hz: Fraction) -> int:
-        """The time in ns from the cause's first beat to the response's last; 0 if either bypassed the hardware."""
+        """Return the time in ns from the cause's first beat to the response's last; 0 if either bypassed the hardware."""
         if self.last_cycle is None or self.cause.first_cycle is None:
             return 0
         return round((self.last_cycle - self.cause.first_cycle) * 10**9 / clock_hz)
@@ -106,7 +106,7 @@ class SystemRun:
         return found
 
     def take(self, topic: Topic, payload: bytes, stamp: int) -> None:
-        """Send a message to the system and wait for the hardware to rest. Raises `StuckError` and `TransportError`.
+        """Send a message to the system and wait for the hardware to rest. Raise `StuckError` and `TransportError`.
 
         If the message is rejected, a fault is added.
         """
@@ -130,7 +130,7 @@ class SystemRun:
         return f"the system has not sent the rest of a frame of {', '.join(blocks)}" if blocks else ""
 
     def _reached(self, block: str) -> set[str]:
-        """A block and all blocks that its messages reach."""
+        """Return a block and all blocks that its messages reach."""
         found: set[str] = set()
         new = {block}
         while new:
@@ -209,12 +209,12 @@ class SystemRun:
 
 
 def published(system: DerivedSystem) -> list[Topic]:
-    """The topics that leave a system: the software's, and those of the hardware that software here does not use."""
+    """Return the topics that leave a system: the software's, and those of the hardware that software here does not use."""
     here = _software_here(system)
     converters = [item for item in system.publishers if not item.software or item.software.block not in here]
     return [*converters, *system.software.publishers]
 
 
 def _software_here(system: DerivedSystem) -> set[str]:
-    """The blocks whose functions are available here."""
+    """Return the blocks whose functions are available here."""
     return {block.block for block in system.software.blocks if block.type.accelerator.sources}

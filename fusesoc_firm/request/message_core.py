@@ -17,7 +17,7 @@ from fusesoc_firm.text.diagnostics import SourceRef, fail
 
 
 def folders(request: Request) -> list[Path]:
-    """The folders with a core's messages: the core's own folders, then the folders of the cores that it lists."""
+    """Return the folders with a core's messages: the core's own folders, then the folders of the cores that it lists."""
     paths = request.parameters["paths"] or []
     assert isinstance(paths, list)
     return [*(request.files_root / path for path in paths), *request.message_folders.of(request.listed("messages"))]
@@ -41,7 +41,7 @@ def _core(request: Request, found: list[tuple[str, Path]]) -> GeneratedCore:
 
 
 def request_place(request: Request) -> SourceRef | None:
-    """The place that names the first of a core's folders."""
+    """Return the place that names the first of a core's folders."""
     return next(iter(request.listed("paths").values()), None)
 
 

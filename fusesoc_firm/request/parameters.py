@@ -57,7 +57,7 @@ class Parameter:
 
 
 def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origin: RequestingCore) -> dict[str, Plain]:
-    """The value of every known parameter, given or default. Raises `InputError` with all faults."""
+    """Return the value of every known parameter, given or default. Raise `InputError` with all faults."""
     table = {parameter.name: parameter for parameter in known}
     replacing = {name: parameter.name for parameter in table.values() for name in parameter.replaces}
     faults = Diagnostics()

@@ -48,7 +48,7 @@ class MessageFolders:
         self._find = find
 
     def of(self, cores: Mapping[str, SourceRef | None]) -> list[Path]:
-        """The folders of some cores, each with its place. Raises `InputError` for an unknown core."""
+        """Return the folders of some cores, each with its place. Raise `InputError` for an unknown core."""
         for name, source in cores.items():
             if name not in self.found:
                 self.found[name] = self._find({name: source})
@@ -76,7 +76,7 @@ class Request:
         return self.vlnv.split(":")[2]
 
     def listed(self, parameter: str) -> dict[str, SourceRef | None]:
-        """The items of a list parameter, each with its place; empty if the parameter is not given."""
+        """Return the items of a list parameter, each with its place, or an empty dictionary if the parameter is not given."""
         items = self.parameters.get(parameter) or []
         assert isinstance(items, list)
         places = self.places.get(parameter, ())
@@ -122,9 +122,9 @@ class LoadedRequest:
 
 
 def as_files(core: GeneratedCore, request: Request) -> dict[str, bytes]:
-    """The files to write for FuseSoC, by path. The `.core` file is last: once it exists, all others must exist, too.
+    """Return the files to write for FuseSoC, by path. The `.core` file is last: once it exists, all others must exist, too.
 
-    Raises `InputError` for a name that is too long for a file.
+    Raise `InputError` for a name that is too long for a file.
     """
     contents = {_checked(path): _encoded(file.content) for path, file in core.files.items()}
     return contents | {f"{request.name}.core": core_text(core, request.vlnv).encode()}
@@ -139,7 +139,7 @@ def _checked(path: str) -> str:
 
 
 def core_text(core: GeneratedCore, vlnv: str) -> str:
-    """The `.core` file, which is always the same text for the same core."""
+    """Return the `.core` file, which is always the same text for the same core."""
     description = {
         "name": vlnv,
         "description": core.description,

@@ -36,19 +36,19 @@ class RequestingCore:
         return str(section.get("generator", ""))
 
     def instance(self) -> SourceRef | None:
-        """The place of the instance's name."""
+        """Return the place of the instance's name."""
         return self._place(0)
 
     def key(self, parameter: str) -> SourceRef | None:
-        """The place of a parameter's name or, if unknown, of the instance's name."""
+        """Return the place of a parameter's name or, if unknown, of the instance's name."""
         return self._place(0, "parameters", parameter) or self.instance()
 
     def value(self, parameter: str) -> SourceRef | None:
-        """The place of a parameter's value or, if unknown, of the instance's name."""
+        """Return the place of a parameter's value or, if unknown, of the instance's name."""
         return self._place(1, "parameters", parameter) or self.instance()
 
     def items(self, parameter: str) -> list[SourceRef]:
-        """The place of each item in a list; empty if the list was not found."""
+        """Return the place of each item in a list, or an empty list if the list was not found."""
         found = self._item("parameters", parameter)
         if self.core is None or not found or not isinstance(found[1], yaml.SequenceNode):
             return []

@@ -89,12 +89,12 @@ class Channel:
 
 
 def utilisation(tasks: Sequence[Task]) -> float:
-    """The channel's utilisation by the tasks (equation 4.1)."""
+    """Return the channel's utilisation by the tasks (equation 4.1)."""
     return sum(task.transfer_time / task.period for task in tasks)
 
 
 def overheads_of(policy: str, requesters: int, shortest_run: int = 1) -> Overheads:
-    """The overheads of a policy's cores (cores/sched).
+    """Return the overheads of a policy's cores (cores/sched).
 
     A scheduler that chooses among all requests at once needs one cycle, or two if it compares times. A scheduler with a
     queue accepts one request in each cycle. Each request may cause three operations of the queue: the request is
@@ -135,7 +135,7 @@ def analyse(policy: str, tasks: Sequence[Task], channel: Channel = Channel(), *,
 
 
 def luts(policy: str, requesters: int) -> int | None:
-    """The LUTs of a scheduler, plus the Manager's LUTs for bursts if the scheduler is preemptive.
+    """Return the LUTs of a scheduler, plus the Manager's LUTs for bursts if the scheduler is preemptive.
 
     The values are measured. If there is no measurement, the value from the dissertation's table 4.1 applies, which does
     not include bursts. The result is None if both are missing.
@@ -151,13 +151,13 @@ def luts(policy: str, requesters: int) -> int | None:
 
 
 def _burst_luts(measured: Areas, requesters: int) -> int | None:
-    """The Manager's LUTs for bursts; a difference of two mappings, which multiplexer mapping can make negative."""
+    """Return the Manager's LUTs for bursts; a difference of two mappings, which multiplexer mapping can make negative."""
     bursts, whole = (area.at(measured, design, requesters) for design in (area.MANAGER_PREEMPTIVE, area.MANAGER))
     return bursts.lut - whole.lut if bursts and whole else None
 
 
 def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
-    """The bytes that arrive while a task is late: the data of later requests, at most one beat in each cycle.
+    """Return the bytes that arrive while a task is late: the data of later requests, at most one beat in each cycle.
 
     The result never exceeds the rule of section 6.3.2: one byte for each cycle of the greatest lateness.
     """
@@ -172,7 +172,7 @@ def _buffer(task: Task, response: int | None, channel: Channel) -> int | None:
 
 
 def assign_priorities(policy: str, tasks: Sequence[Task], overheads: Overheads) -> tuple[Task, ...]:
-    """The tasks, the highest priority first.
+    """Return the tasks, the highest priority first.
 
     Deadline monotonic is optimal with preemption if no deadline is longer than its period (J. Leung and J. Whitehead,
     1982). Otherwise, priorities are assigned from the lowest up: each goes to a task that meets its deadline at this
@@ -226,7 +226,7 @@ def _lst(tasks: Sequence[Task], overheads: Overheads) -> list[int | None]:
 
 
 def _least(task: Task, lateness: float, counted: int) -> int:
-    """The smaller of two bounds; the first one limits the lateness of every task."""
+    """Return the smaller of two bounds; the first one limits the lateness of every task."""
     return counted if lateness == inf else min(task.deadline + floor(lateness), counted)
 
 
@@ -263,7 +263,7 @@ def choose(
     *,
     is_ordered: bool = False,
 ) -> Choice:
-    """Choose the best policy, with `is_ordered` as in `analyse`; raises `ValueError` for no tasks or equal names."""
+    """Choose the best policy, with `is_ordered` as in `analyse`; raise `ValueError` for no tasks or equal names."""
     if not tasks:
         raise ValueError("there are no tasks")
     if len({task.name for task in tasks}) < len(tasks):
@@ -333,7 +333,7 @@ _MERITS: Mapping[Criterion, Callable[[Analysis], str]] = {
 
 
 def end_of(analysis: Analysis) -> str:
-    """The greatest lateness relative to the deadline, in words."""
+    """Return the greatest lateness relative to the deadline, in words."""
     latest = analysis.latest
     name, lateness = latest.task.name, latest.lateness
     if lateness is None:

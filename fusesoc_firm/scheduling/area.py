@@ -37,7 +37,7 @@ Areas = Mapping[tuple[str, int], Area]
 
 @cache
 def measured() -> Areas:
-    """The areas by design and number of requesters; empty if nothing was measured."""
+    """Return the areas by design and number of requesters; empty if nothing was measured."""
     file = resources.files(__package__) / FILE
     return read(file.read_text(encoding="utf-8")) if file.is_file() else {}
 
@@ -56,6 +56,6 @@ def write(path: Path, areas: Areas) -> None:
 
 
 def at(areas: Areas, design: str, requesters: int) -> Area | None:
-    """The area for a number of requesters, or for the next larger known number; None if there is no such number."""
+    """Return the area for a number of requesters, or for the next larger known number, or None if there is no such number."""
     known = [number for name, number in areas if name == design and number >= requesters]
     return areas[design, min(known)] if known else None

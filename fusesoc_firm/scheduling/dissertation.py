@@ -25,6 +25,6 @@ class Dissertation:
 
 @cache
 def dissertation() -> Dissertation:
-    """All tables."""
+    """Return all tables."""
     file = resources.files(__package__) / "dissertation.yaml"
     return Dissertation(**yaml.safe_load(file.read_text(encoding="utf-8")))

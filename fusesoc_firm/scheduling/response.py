@@ -46,7 +46,7 @@ class Overheads:
     """Cycles that a task takes at least, however few beats it has."""
 
     def service(self, task: Task) -> int:
-        """The cycles of an uninterrupted task."""
+        """Return the cycles of an uninterrupted task."""
         return max(task.transfer_time, self.shortest_service)
 
     @property
@@ -56,7 +56,7 @@ class Overheads:
 
 
 def fixed_priority_preemptive(task: Task, higher: Sequence[Task], overheads: Overheads) -> int | None:
-    """The bound with these tasks of higher priority; None if they may take all the time.
+    """Return the bound with these tasks of higher priority, or None if they may take all the time.
 
     Each request of higher priority may interrupt once, which costs a resumption. The blocking run is one of lower
     priority, or the last run of the same requester's previous task, after which requests of higher priority may wait.
@@ -66,7 +66,7 @@ def fixed_priority_preemptive(task: Task, higher: Sequence[Task], overheads: Ove
 
 
 def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], overheads: Overheads) -> int | None:
-    """The bound without preemption; None if there is no bound.
+    """Return the bound without preemption, or None if there is no bound.
 
     If the tasks of this and of higher priorities leave some time, the bound is the greatest response in a busy period
     (the revised analysis of CAN). Otherwise a simpler bound applies, in which the requester's previous task may block
@@ -90,13 +90,13 @@ def fixed_priority(task: Task, higher: Sequence[Task], lower: Sequence[Task], ov
 
 
 def taking_turns(task: Task, others: Sequence[Task], overheads: Overheads) -> int:
-    """The bound under round robin and LRU: each other requester is served at most once before the task."""
+    """Return the bound under round robin and LRU: each other requester is served at most once before the task."""
     waits = overheads.acceptance + overheads.decision + sum(map(overheads.service, others))
     return waits + overheads.service(task)
 
 
 def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
-    """The greatest lateness of any task under EDF; infinite if the tasks exceed the channel's capacity.
+    """Return the greatest lateness of any task under EDF; infinite if the tasks exceed the channel's capacity.
 
     Shifting all deadlines by the same time does not change the order. So the greatest lateness is the smallest shift x
     for which the processor-demand test passes, that is, the greatest excess of the demand over the time. Deadlines
@@ -126,7 +126,7 @@ def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
 
 
 def _most_excess(tasks: Sequence[Task], services: Sequence[int], late: int, horizon: int) -> float:
-    """The greatest excess of the demand over the time, for the deadlines up to the horizon."""
+    """Return the greatest excess of the demand over the time, for the deadlines up to the horizon."""
     times, demands = [], []
     for task, service in zip(tasks, services, strict=True):
         releases = np.arange(0, horizon - task.deadline + late + 1, task.period)
@@ -140,7 +140,7 @@ def _most_excess(tasks: Sequence[Task], services: Sequence[int], late: int, hori
 
 
 def edf_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) -> int:
-    """A bound under EDF at any load: counts the tasks of other requesters that may have an earlier deadline.
+    """Return a bound under EDF at any load: counts the tasks of other requesters that may have an earlier deadline.
 
     For each requester, these are the task that is waiting, and the tasks that arrive early enough for their deadline
     not to be later.
@@ -153,7 +153,7 @@ def edf_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) ->
 
 
 def lst_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) -> int:
-    """A bound under LST at any load, by counting as under EDF.
+    """Return a bound under LST at any load, by counting as under EDF.
 
     The slack of a waiting task shrinks in every cycle, so a task that arrives late enough never has less slack. While a
     task is being sent, its slack is constant and the slack of other tasks shrinks, which extends the window in which
@@ -168,7 +168,7 @@ def lst_by_counting(task: Task, others: Sequence[Task], overheads: Overheads) ->
 
 
 def lst_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
-    """The greatest lateness of any task under LST, which is as optimal as EDF (A. Mok, 1983).
+    """Return the greatest lateness of any task under LST, which is as optimal as EDF (A. Mok, 1983).
 
     Optimality requires that the task of least slack runs in every cycle. Here a run lasts some cycles too long, and
     each other task may delay the late one in this way.
@@ -180,13 +180,13 @@ def lst_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
 
 
 def _interrupted_service(task: Task, overheads: Overheads) -> int:
-    """The cycles of a task with the most possible interruptions; each run but the first costs a resumption."""
+    """Return the cycles of a task with the most possible interruptions; each run but the first costs a resumption."""
     runs = -(-task.transfer_time // max(1, overheads.shortest_run))
     return overheads.service(task) + (runs - 1) * overheads.resume
 
 
 def _requests(window: int, period: int) -> int:
-    """The number of a requester's tasks: a waiting task, and the tasks that arrive within the window, if it is open."""
+    """Return the number of a requester's tasks: a waiting task, and the tasks that arrive within the window, if it is open."""
     return 1 + (window // period + 1 if window >= 0 else 0)
 
 
@@ -195,14 +195,14 @@ def _load(tasks: Sequence[Task], overheads: Overheads) -> float:
 
 
 def _start(before: int, higher: Sequence[Task], overheads: Overheads) -> int | None:
-    """The start of a task that cannot be interrupted; a request of higher priority in that very cycle is too late."""
+    """Return the start of a task that cannot be interrupted; a request of higher priority in that very cycle is too late."""
     return _fixed_point(before, higher, overheads, before=1)
 
 
 def _fixed_point(
     first: int, tasks: Sequence[Task], overheads: Overheads, before: int = 0, after: int = 0
 ) -> int | None:
-    """The least w = first + the service of all requests in w cycles, with simultaneous first requests.
+    """Return the least w = first + the service of all requests in w cycles, with simultaneous first requests.
 
     Further requests come with their periods. `before` widens the window, `after` lengthens each service. The result is
     None if there is no such w.

@@ -17,7 +17,7 @@ def environment_files(
 ) -> dict[PurePosixPath, GeneratedFile]:
     """Return the environment's files, in order, as files of the simulation core.
 
-    The test bench instantiates the entity named like the last file. Raises `InputError` for a file that cannot be part
+    The test bench instantiates the entity named like the last file. Raise `InputError` for a file that cannot be part
     of the environment.
     """
     taken = {

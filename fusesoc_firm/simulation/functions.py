@@ -32,7 +32,7 @@ Message = dict[str, Any]
 
 @contextmanager
 def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Iterator[None]:
-    """Let sources in `folder` import each other. Raises `InputError` if one imports an unlisted file."""
+    """Let sources in `folder` import each other. Raise `InputError` if one imports an unlisted file."""
     listed = {(folder / source).resolve(): item for item in accelerators for source in item.sources}
     owners = {path.parent: item for path, item in reversed(listed.items())}
     paths, known, writes = [*sys.path], {*sys.modules}, sys.dont_write_bytecode
@@ -85,7 +85,7 @@ class Functions:
 
     @classmethod
     def of(cls, software: Software, folder: Path, outside: Mapping[End, str] = MappingProxyType({})) -> Functions:
-        """Load all functions. Raises `InputError`, also for a fault within a file.
+        """Load all functions. Raise `InputError`, also for a fault within a file.
 
         Messages to a block without sources are dropped, unless `outside` has a name for it.
         """
@@ -117,7 +117,7 @@ class Functions:
         return self.run()
 
     def run(self) -> list[tuple[str, Message]]:
-        """Call each function whose messages are complete; return messages as `take` does. Raises `InputError`."""
+        """Call each function whose messages are complete; return messages as `take` does. May raise `InputError`."""
         for block in self.blocks:
             ends = [End(block.block, side.prefix) for side in block.type.inputs]
             while all(map(self._is_there, ends)):

@@ -48,7 +48,7 @@ def toolchain() -> dict[str, str]:
 
 
 def kernel_files(accelerator: AcceleratorType, folder: Path) -> dict[str, GeneratedFile]:
-    """Return the simulated kernel, and the library that it loads from the work folder. Raises `InputError`."""
+    """Return the simulated kernel, and the library that it loads from the work folder. May raise `InputError`."""
     configuration = kernel_configuration(accelerator)
     library = library_name(accelerator)
     shim = render(SHIM_TEMPLATE, configuration)

@@ -39,7 +39,7 @@ class Response:
 
 
 def responses(path: Path, stimuli: Sequence[Stimulus], publishers: Sequence[Topic]) -> list[Response]:
-    """Return the responses of the model in `path` to all stimuli. Raises `InputError`, also for faults in the model.
+    """Return the responses of the model in `path` to all stimuli. Raise `InputError`, also for faults in the model.
 
     The model may respond for each of `publishers`.
     """

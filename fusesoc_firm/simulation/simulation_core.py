@@ -44,7 +44,7 @@ def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
 
 
 def simulation_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
-    """Return the core, which complements the system's core from the same specification. Raises `InputError`."""
+    """Return the core, which complements the system's core from the same specification. May raise `InputError`."""
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "sim")
     stimuli = read_stimuli(_path(request, "stimuli"), stimulated(system))
@@ -74,7 +74,7 @@ def live_inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
 
 
 def live_core(request: Request, loaded: LoadedSystem) -> GeneratedCore:
-    """Return the core of a live simulation. Seed and rate of stalls are set at its start. Raises `InputError`."""
+    """Return the core of a live simulation. Seed and rate of stalls are set at its start. May raise `InputError`."""
     system = loaded.system
     _check_simulator(system, str(request.parameters["simulator"]), "live")
     environment = environment_files(_environment(request), system)

@@ -76,7 +76,7 @@ class BuiltSimulator:
 def build_simulator(
     spec: Path, tool: str | None = None, *, build_root: Path | None = None, sources: CoreSources | None = None
 ) -> BuiltSimulator:
-    """Build a simulator of a specification's system, or rebuild its changed parts. Raises `InputError`.
+    """Build a simulator of a specification's system, or rebuild its changed parts. May raise `InputError`.
 
     All systems and tools share `build_root`; its default is a folder of the user's cache. `sources` applies only if no
     core beside the specification names it.
@@ -191,7 +191,7 @@ def _words(work: Path, tool: str) -> list[str]:
 
 
 def _live(tool: str) -> Live:
-    """Return the tool's support for live simulation. Raises `InputError` if the tool has no support."""
+    """Return the tool's support for live simulation. Raise `InputError` if the tool has no support."""
     if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
         fail(f"unknown simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
     return live

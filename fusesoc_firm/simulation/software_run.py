@@ -54,7 +54,7 @@ def answered(system: DerivedSystem) -> list[Topic]:
 def traffic(system: DerivedSystem, folder: Path, stimuli: Sequence[Stimulus], responses: Sequence[Response]) -> Traffic:
     """Return the messages to and from the hardware when its software, with sources in `folder`, takes part.
 
-    Raises `InputError` for messages missing in stimuli or model, and for faults of the software.
+    Raise `InputError` for messages missing in stimuli or model, and for faults of the software.
     """
     _check_complete(system, stimuli, responses)
     caused: dict[int | None, list[Response]] = {}

@@ -38,7 +38,7 @@ class Stimulus:
 
 
 def read_stimuli(path: Path, subscribers: Sequence[Topic]) -> list[Stimulus]:
-    """Return all messages of a file or bag in order. Raises `InputError`, also for a file without messages."""
+    """Return all messages of a file or bag in order. Raise `InputError`, also for a file without messages."""
     if not path.exists():
         fields = "{<field>: <value>, ...}"
         items = ", ".join(f"'- {subscriber.block}: {fields}'" for subscriber in subscribers[:_SHOWN])

@@ -43,7 +43,7 @@ class UserFunction:
 
 
 def load_function(path: Path, name: str, what: str, parameters: str, hint: str) -> UserFunction:
-    """Load the function `name` of a file. Raises `InputError`; `parameters` and `hint` describe the correct form."""
+    """Load the function `name` of a file. May raise `InputError`; `parameters` and `hint` describe the correct form."""
     spec = importlib.util.spec_from_file_location(_MODULE, path)
     if spec is None or spec.loader is None or not path.is_file():
         fail(

@@ -157,7 +157,7 @@ class _Reader:
 
 
 def _value(text: str, type_: WireType) -> bool | int | float:
-    """Return the value of a word. Raises `ValueError` with the legal values if the word is not one of them."""
+    """Return the value of a word. Raise `ValueError` with the legal values if the word is not one of them."""
     if type_.code == "?":
         return _boolean(text)
     return _float(text, type_) if type_.code in "fd" else _integer(text, type_)

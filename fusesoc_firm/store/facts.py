@@ -24,12 +24,12 @@ Fact = tuple[str, str, str | None]
 
 
 def facts(kind: str, names: Iterable[str]) -> list[Fact]:
-    """The facts of a kind, in their current state."""
+    """Return the facts of a kind, in their current state."""
     return [(kind, name, state(kind, name)) for name in names]
 
 
 def state(kind: str, name: str) -> str | None:
-    """The current state of a fact; None if the object is missing. Raises `ValueError` for an impossible name."""
+    """Return the current state of a fact, or None if the object is missing. Raise `ValueError` for an impossible name."""
     if kind == "file":
         content = read_file(name)
         return None if content is None else digest(content)

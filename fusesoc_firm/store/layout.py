@@ -55,12 +55,12 @@ def default_root(environment: Mapping[str, str] = os.environ) -> str:
 
 
 def place(digest: str, suffix: str) -> str:
-    """The path in a store of the file for a digest."""
+    """Return the path in a store of the file for a digest."""
     return f"{LAYOUT}/{digest[:2]}/{digest}{suffix}"
 
 
 def write(root: str, name: str, data: bytes) -> None:
-    """Store data with its digest. Raises `OSError`."""
+    """Store data with its digest. May raise `OSError`."""
     whole = digest(data).encode() + b"\n" + data
     if len(whole) > _most(name):
         raise OSError(EFBIG, os.strerror(EFBIG))
@@ -68,18 +68,18 @@ def write(root: str, name: str, data: bytes) -> None:
 
 
 def write_json(root: str, name: str, data: object) -> None:
-    """Store plain data as JSON. Raises `OSError`."""
+    """Store plain data as JSON. May raise `OSError`."""
     write(root, name, json.dumps(data).encode())
 
 
 def write_entry(root: str, name: str, about: Mapping[str, str], files: Mapping[str, bytes]) -> None:
-    """Store generated files with a description of their request. Raises `OSError`."""
+    """Store generated files with a description of their request. May raise `OSError`."""
     header = {"about": dict(about), "files": [[path, len(content)] for path, content in files.items()]}
     write(root, name, b"".join([json.dumps(header).encode(), b"\n", *files.values()]))
 
 
 def read_note(root: str, name: str) -> dict[str, Any] | None:
-    """The note of a call: `key`, `facts`, `name`, `core` and `marks`; None if it is missing or damaged."""
+    """Return the note of a call: `key`, `facts`, `name`, `core` and `marks`, or None if it is missing or damaged."""
     note = _plain(_read(root, name))
     if not isinstance(note, dict) or not {"key", "facts", *_WORDS} <= note.keys():
         return None
@@ -88,7 +88,7 @@ def read_note(root: str, name: str) -> dict[str, Any] | None:
 
 
 def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] | None:
-    """The description of the request, and the files in order of generation; None if missing or damaged."""
+    """Return the description of the request, and the files in order of generation, or None if missing or damaged."""
     line, _, contents = (_read(root, name) or b"").partition(b"\n")
     header = _plain(line)
     about = header.get("about") if isinstance(header, dict) else None
@@ -105,7 +105,7 @@ def read_entry(root: str, name: str) -> tuple[dict[str, str], dict[str, bytes]] 
 
 
 def is_whole(root: str, name: str) -> bool:
-    """Whether a stored file is undamaged."""
+    """Return whether a stored file is undamaged."""
     reads: dict[str, Callable[[str, str], object]] = {ENTRY: read_entry, CALL: read_note}
     return reads[name[name.rindex(".") :]](root, name) is not None
 
@@ -121,17 +121,17 @@ def mark_used(root: str, *names: str) -> None:
 
 
 def digest_of(data: object) -> str:
-    """The SHA-256 of plain data."""
+    """Return the SHA-256 of plain data."""
     return digest(json.dumps(data, sort_keys=True).encode())
 
 
 def digest(data: bytes) -> str:
-    """The SHA-256 of bytes."""
+    """Return the SHA-256 of bytes."""
     return hashlib.sha256(data).hexdigest()
 
 
 def _read(root: str, name: str) -> bytes | None:
-    """The data stored under its digest; None if it is missing or damaged."""
+    """Return the data stored under its digest, or None if it is missing or damaged."""
     found = shared_files.read(root, name, _most(name))
     if found is None:
         return None
@@ -144,7 +144,7 @@ def _most(name: str) -> int:
 
 
 def _plain(data: bytes | None) -> object:
-    """The data in a JSON text; None if it is invalid or nested too deep."""
+    """Return the data in a JSON text, or None if it is invalid or nested too deep."""
     if not data or len(data) > _MOST_PLAIN_BYTES:
         return None
     try:
@@ -166,14 +166,14 @@ def _is_digest(text: object) -> bool:
 
 
 def _are_facts(facts: object) -> bool:
-    """Whether each item has a kind, a name and a state."""
+    """Return whether each item has a kind, a name and a state."""
     return isinstance(facts, list) and all(
         isinstance(fact, list) and len(fact) == _FACT_PARTS and _are_texts(fact[:2]) for fact in facts
     )
 
 
 def _lengths(listed: object) -> dict[str, int] | None:
-    """The length of each file by path; None if a length or a path is illegal."""
+    """Return the length of each file by path, or None if a length or a path is illegal."""
     lengths: dict[str, int] = {}
     for item in listed if isinstance(listed, list) else [None]:
         if not isinstance(item, list) or len(item) != _FILE_PARTS or type(item[1]) is not int or item[1] < 0:
@@ -185,7 +185,7 @@ def _lengths(listed: object) -> dict[str, int] | None:
 
 
 def _is_path(path: object) -> bool:
-    """Whether a relative path leads directly to a file below its base folder."""
+    """Return whether a relative path leads directly to a file below its base folder."""
     if not isinstance(path, str):
         return False
     try:
@@ -198,5 +198,5 @@ def _is_path(path: object) -> bool:
 
 
 def _folders(paths: Iterable[str]) -> set[str]:
-    """All folders above these paths."""
+    """Return all folders above these paths."""
     return {path[:place] for path in paths for place, letter in enumerate(path) if letter == "/"}

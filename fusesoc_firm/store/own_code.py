@@ -25,12 +25,12 @@ _STARTED = time.time_ns()
 
 
 def digest(package: Path = PACKAGE) -> str:
-    """The SHA-256 of the names and contents of all our files; every copy of the package has the same digest."""
+    """Return the SHA-256 of the names and contents of all our files; every copy of the package has the same digest."""
     return _digest(package, state(package))
 
 
 def state(package: Path = PACKAGE) -> str:
-    """A value that changes when one of our files is edited, added or removed.
+    """Return a value that changes when one of our files is edited, added or removed.
 
     The value is computed from names, sizes and times, which is many times faster than `digest`. If a file is so new at
     the start of this process that its time may be unreliable, the file's content is used instead.
@@ -45,13 +45,13 @@ def state(package: Path = PACKAGE) -> str:
 
 
 def names(package: Path = PACKAGE) -> list[str]:
-    """The names of our files relative to the package, sorted."""
+    """Return the names of our files relative to the package, sorted."""
     return sorted(name for name, _ in _files(str(package)))
 
 
 @lru_cache(maxsize=1)
 def _digest(package: Path, _state: str) -> str:
-    """The digest of our files; `_state` invalidates the cache."""
+    """Return the digest of our files; `_state` invalidates the cache."""
     found = {name: _content(entry.path) for name, entry in _files(str(package))}
     return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()
 

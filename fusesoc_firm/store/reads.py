@@ -71,7 +71,7 @@ class Reads:
         _note_state(self.files, "file", path)
 
     def facts(self) -> list[Fact]:
-        """All recorded files, parts and folders."""
+        """Return all recorded files, parts and folders."""
         kinds = {"file": self.files, "part": self.parts, "folder": self.folders}
         return [(kind, path, was) for kind, found in kinds.items() for path, was in found.items()]
 
@@ -136,7 +136,7 @@ def _is_read(mode: object, flags: object) -> bool:
 
 
 def _of_uri(name: object) -> object:
-    """The path in a database's name, which may be a URI."""
+    """Return the path in a database's name, which may be a URI."""
     text = os.fsdecode(name) if isinstance(name, str | bytes) else ""
     return text.removeprefix("file:").partition("?")[0] if text.startswith("file:") else name
 
@@ -170,7 +170,7 @@ def _is_below(path: str, folders: Iterable[str]) -> bool:
 
 
 def _is_of_package(path: str, reads: Reads) -> bool:
-    """Whether a file belongs to a package that Python finds elsewhere."""
+    """Return whether a file belongs to a package that Python finds elsewhere."""
     for folder in reads.python_path:
         if path.startswith(f"{folder}{os.sep}"):
             if os.path.basename(folder) in _PACKAGE_FOLDERS:

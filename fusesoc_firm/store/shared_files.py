@@ -48,7 +48,7 @@ def read(root: str, name: str, most: int) -> bytes | None:
 
 
 def write_whole(root: str, name: str, data: bytes) -> None:
-    """Write a temporary file next to the target, then rename it; creates missing folders. Raises `OSError`."""
+    """Write a temporary file next to the target, then rename it; creates missing folders. May raise `OSError`."""
     for _ in range(_TRIES - 1):
         # Another process may remove the folder, or files in it.
         with suppress(FileNotFoundError):
@@ -59,7 +59,7 @@ def write_whole(root: str, name: str, data: bytes) -> None:
 def open_lock(root: str, name: str) -> int:
     """Open a file to be locked; creates it if it is missing, and keeps its content.
 
-    Raises `OSError`, also if the name belongs to another kind of file.
+    Raise `OSError`, also if the name belongs to another kind of file.
     """
     for _ in range(_TRIES - 1):
         with suppress(FileNotFoundError):
@@ -68,7 +68,7 @@ def open_lock(root: str, name: str) -> int:
 
 
 def state(root: str, name: str) -> os.stat_result | None:
-    """The state of a path, without following a link; None if the path is missing or inaccessible."""
+    """Return the state of a path, without following a link, or None if the path is missing or inaccessible."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             return os.stat(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
@@ -77,7 +77,7 @@ def state(root: str, name: str) -> os.stat_result | None:
 
 
 def listed(root: str, name: str) -> list[tuple[str, os.stat_result]]:
-    """The entries of each subfolder, with their states, and any other file found in place of a subfolder."""
+    """Return the entries of each subfolder, with their states, and any other file found in place of a subfolder."""
     found = []
     for inner, status in _entries(root, name) if _is_folder(root, name) else [(name, state(root, name))]:
         if status is not None:
@@ -86,13 +86,13 @@ def listed(root: str, name: str) -> list[tuple[str, os.stat_result]]:
 
 
 def mark_used(root: str, name: str) -> None:
-    """Set the time of a file, or of a link itself, to now. Raises `OSError`."""
+    """Set the time of a file, or of a link itself, to now. May raise `OSError`."""
     with _opened(root, os.path.dirname(name)) as folder:
         os.utime(os.path.basename(name), dir_fd=folder, follow_symlinks=False)
 
 
 def remove(root: str, name: str) -> int:
-    """Remove a file, or a folder with its contents; returns the number of bytes removed. Raises `OSError`."""
+    """Remove a file, or a folder with its contents; return the number of bytes removed. May raise `OSError`."""
     try:
         with _opened(root, os.path.dirname(name)) as folder:
             return _remove(os.path.basename(name), folder)

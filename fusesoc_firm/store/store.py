@@ -108,20 +108,20 @@ class Store:
                 layout.write_json(self._root, place(call, CALL), note)
 
     def entries(self) -> list[StoredFile]:
-        """All entries, the most recently used first."""
+        """Return all entries, the most recently used first."""
         return [file for file in self._files() if file.name.endswith(ENTRY)]
 
     def size(self) -> int:
-        """The number of bytes that count against the limit."""
+        """Return the number of bytes that count against the limit."""
         return sum(file.size for file in self._files())
 
     def is_writable(self) -> bool:
-        """Whether this user may add entries; also True if the store's folder is missing."""
+        """Return whether this user may add entries; also True if the store's folder is missing."""
         there = next((folder for folder in (self.root / LAYOUT, self.root) if os.access(folder, os.F_OK)), None)
         return there is None or os.access(there, os.W_OK)
 
     def remove_damaged(self) -> list[Path]:
-        """Remove damaged files and those that cannot belong to a store, and return them. Raises `OSError`."""
+        """Remove damaged files and those that cannot belong to a store, and return them. May raise `OSError`."""
         damaged = []
         for name, status in self._listed():
             is_kept = name.endswith(KEPT)
@@ -135,7 +135,7 @@ class Store:
     def shrink(self, limit: int) -> int:
         """Remove the least recently used files until at most `limit` bytes are left; return the bytes removed.
 
-        Raises `OSError`.
+        May raise `OSError`.
         """
         total = removed = 0
         for file in self._files():
@@ -145,7 +145,7 @@ class Store:
         return removed
 
     def clean(self) -> int:
-        """Remove the whole store, including former versions; return the number of bytes removed. Raises `OSError`."""
+        """Remove the whole store, including former versions; return the number of bytes removed. May raise `OSError`."""
         return sum(shared_files.remove(self._root, layout) for layout in (*_FORMER_LAYOUTS, LAYOUT))
 
     def _find(self, key: Key) -> Files | None:
@@ -196,7 +196,7 @@ class Store:
                     shared_files.remove(self._root, name)
 
     def _files(self) -> list[StoredFile]:
-        """The files that count against the limit, the most recently used first."""
+        """Return the files that count against the limit, the most recently used first."""
         found = [
             StoredFile(name, status.st_size, status.st_mtime)
             for name, status in self._listed()
@@ -213,7 +213,7 @@ class Store:
 
 
 def default_store(environment: Mapping[str, str] = os.environ) -> Store:
-    """The store selected by the environment variables. Raises `InputError` if the limit is not a size."""
+    """Return the store selected by the environment variables. Raise `InputError` if the limit is not a size."""
     limit = environment.get("FUSESOC_FIRM_CACHE_SIZE") or _DEFAULT_LIMIT
     if (size := parse_size(limit)) is None:
         fail(
@@ -224,13 +224,13 @@ def default_store(environment: Mapping[str, str] = os.environ) -> Store:
 
 
 def parse_size(text: str) -> int | None:
-    """The number of bytes in a text, with K, M, G or T for powers of 1024; None if it is invalid."""
+    """Return the number of bytes in a text, with K, M, G or T for powers of 1024, or None if it is invalid."""
     found = re.fullmatch(r"(\d+)([KMGT]?)", text.strip().upper())
     return int(found[1]) * _UNITS[found[2]] if found else None
 
 
 def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | None], code: str) -> str:
-    """The digest of everything that determines the result of `request` (plain data).
+    """Return the digest of everything that determines the result of `request` (plain data).
 
     `inputs` holds the bytes of each file by name, None for missing files; `code` is the digest of our own files.
     """
@@ -248,12 +248,12 @@ def request_digest(request: Mapping[str, object], inputs: Mapping[str, bytes | N
 
 @cache
 def _version(package: str) -> str:
-    """The version of an imported package, cached: the look-up takes longer than the rest of a key."""
+    """Return the version of an imported package, cached: the look-up takes longer than the rest of a key."""
     return version(package)
 
 
 def _locked(root: str, name: str) -> tuple[int, bool]:
-    """Open and lock a file; return the handle and whether the lock is held. Raises `OSError`.
+    """Open and lock a file; return the handle and whether the lock is held. May raise `OSError`.
 
     The previous holder may have removed the file in the meantime. If the file system has no locks, or only locks within
     one machine, the worst result is a duplicate build.

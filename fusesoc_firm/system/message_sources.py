@@ -31,7 +31,7 @@ class MessageSources:
 
 
 def core_of(spec: Path) -> CoreFile | None:
-    """The core next to a specification that uses and can simulate the specification; None if there is no such core."""
+    """Return the core next to a specification that uses and can simulate the specification, or None if there is no such core."""
     # Path.resolve() raises a different error for a cyclic link.
     spec = Path(os.path.realpath(spec))
     for path in sorted(spec.parent.glob("*.core")):
@@ -47,7 +47,7 @@ def core_of(spec: Path) -> CoreFile | None:
 def sources_of(
     spec: Path, paths: Sequence[Path] = (), distro: str | None = None, core_folders: CoreFolders = no_core_folders
 ) -> MessageSources:
-    """The command's arguments, followed by the sources of the core next to a specification.
+    """Return the command's arguments, followed by the sources of the core next to a specification.
 
     If messages come from a core that FuseSoC does not know here, the build reports it.
     """
@@ -68,19 +68,19 @@ def load_beside(
     needs_sources: bool = True,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """The system of a specification, for a command with the arguments `paths` and `distro`; raises `InputError`."""
+    """Return the system of a specification, for a command with the arguments `paths` and `distro`; may raise `InputError`."""
     sources = sources_of(spec, paths, distro, core_folders)
     known = libraries(sources.paths, os.environ, sources.distro)
     return load_system(spec, known, needs_sources=needs_sources, core_folders=core_folders)
 
 
 def known_names(spec: Path, own: Sequence[str], sources: MessageSources, core_folders: CoreFolders) -> list[str]:
-    """All messages that a specification at `spec` with `own` paths can name, sorted; raises `InputError`."""
+    """Return all messages that a specification at `spec` with `own` paths can name, sorted; may raise `InputError`."""
     known = libraries(sources.paths, os.environ, sources.distro)
     found = with_paths(known, dict.fromkeys(own), spec.parent, core_folders, Diagnostics())
     return sorted({str(name) for library in found.values() for name in library.names()})
 
 
 def _words(value: object) -> list[str]:
-    """A list of words; empty for any other value, which the build reports."""
+    """Return a list of words; empty for any other value, which the build reports."""
     return [item for item in value if isinstance(item, str)] if isinstance(value, list) else []

@@ -35,7 +35,7 @@ class SourceRef:
         return f"{self.file}:{self.line}:{self.column}"
 
     def excerpt(self) -> str:
-        """The line with a caret under the place; empty if the text is unknown."""
+        """Return the line with a caret under the place, or an empty string if the text is unknown."""
         if not self.text:
             return ""
         number = f"{self.line:5d}"
@@ -48,7 +48,7 @@ class SourceRef:
 
 
 def byte_place(file: str, data: bytes, position: int) -> SourceRef:
-    """The place of a byte in a binary file; the column counts bytes."""
+    """Return the place of a byte in a binary file; the column counts bytes."""
     line_start = data.rfind(b"\n", 0, position) + 1
     return SourceRef(file, data.count(b"\n", 0, position) + 1, position - line_start + 1)
 
@@ -135,7 +135,7 @@ def fail(message: str, source: SourceRef | None = None, hint: str = "") -> NoRet
 
 
 def nearest(word: str, choices: Iterable[str]) -> str:
-    """A hint for an unknown word: the nearest legal word, or all legal words if none is near."""
+    """Return a hint for an unknown word: the nearest legal word, or all legal words if none is near."""
     legal = sorted(set(choices))
     if near := closest(word, legal):
         return f"did you mean '{near}'?"
@@ -146,7 +146,7 @@ def nearest(word: str, choices: Iterable[str]) -> str:
 
 
 def closest(word: str, choices: Iterable[str]) -> str | None:
-    """The word that was probably meant, regardless of case; None if none is near."""
+    """Return the word that was probably meant, regardless of case, or None if none is near."""
     lowered = {choice.lower(): choice for choice in sorted(set(choices))}
     # Swapped letters are nearer than a missing letter: `clocsk` is `clocks`, not `clock`.
     close = [choice for choice in lowered if sorted(choice) == sorted(word.lower())]

@@ -17,7 +17,7 @@ _POLL_SECONDS = 0.02
 
 @contextmanager
 def locked(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Wait for the lock of an existing file or folder, and hold it. Creates no file. Raises `OSError`."""
+    """Wait for the lock of an existing file or folder, and hold it. Creates no file. May raise `OSError`."""
     handle = os.open(path, os.O_RDONLY)
     try:
         take(handle)
@@ -27,7 +27,7 @@ def locked(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def take(handle: int, seconds: float | None = None) -> bool:
-    """Lock an open file until it is closed; False if another process holds the lock for `seconds`.
+    """Lock an open file until it is closed; return False if another process holds the lock for `seconds`.
 
     Without a limit it waits indefinitely. On a file system without locks, every lock counts as taken.
     """

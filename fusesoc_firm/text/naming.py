@@ -69,7 +69,7 @@ _UNDERSCORES = re.compile(r"_{2,}")
 
 
 def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None:
-    """Return the reason that `text` cannot be a name or a description, and what is legal; None if `text` is valid.
+    """Return the reason that `text` cannot be a name or a description, and what is legal; return None if `text` is valid.
 
     The text appears in comments, strings, labels and messages, so it must be one printable line. It must not contain
     control characters, Unicode line ends, lone surrogates, or characters that change the writing direction.
@@ -95,7 +95,7 @@ def identifier(*parts: str, avoid: Container[str] = KEYWORDS, suffix: str = "fie
 
 
 def distinct_identifiers(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
-    """An identifier for each name, in order; they differ from each other and from `reserved`, regardless of case.
+    """Return an identifier for each name, in order; they differ from each other and from `reserved`, regardless of case.
 
     VHDL does not distinguish `Stamp` from `stamp`; ROS does. If a name clashes with an earlier name or with a port of
     the entity, it gets the first free suffix of `_2`, `_3`, ...
@@ -125,7 +125,7 @@ def _distinct(bases: Iterable[str], reserved: Iterable[str]) -> list[str]:
 
 
 def is_prefix(text: str) -> bool:
-    """Whether a text may prefix the names of design units."""
+    """Return whether a text may prefix the names of design units."""
     return len(text) <= _LONGEST_PREFIX and _PREFIX.fullmatch(text) is not None
 
 

@@ -36,7 +36,7 @@ def check_parent(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder for a command's output, with its parents. Raises `InputError`."""
+    """Create a folder for a command's output, with its parents. May raise `InputError`."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -44,7 +44,7 @@ def make_folder(path: Path) -> None:
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file for the user, and create any missing parent folders. Raises `InputError`."""
+    """Write a file for the user, and create any missing parent folders. May raise `InputError`."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.encode() if isinstance(content, str) else content)

@@ -36,7 +36,7 @@ class Question:
     check: Callable[[str], str | None] = lambda _: None
 
     def fault(self, answer: str) -> str | None:
-        """The fault in an answer, or None."""
+        """Return the fault in an answer, or None."""
         if not answer:
             return f"'{self.name}' is needed: {self.meaning}" if self.is_required and not self.default else None
         if self.is_choice and answer not in self.words:
@@ -68,7 +68,7 @@ class PipeAsker:
         self._output = output
 
     def ask(self, question: Question) -> str:
-        """Return the answer in the next line. Raises `InputError` for an invalid or missing answer."""
+        """Return the answer in the next line. Raise `InputError` for an invalid or missing answer."""
         line, text = next(self._answers, (0, ""))
         if not line:
             fail(f"the answers end before '{question.name}': {question.meaning}")

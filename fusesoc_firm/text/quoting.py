@@ -39,7 +39,7 @@ def lines_of(text: str) -> list[str]:
 
 
 def c_string(text: str) -> str:
-    """A string literal of C and C++ with UTF-8 bytes; the escapes are octal, since hexadecimal escapes have no end."""
+    """Return a string literal of C and C++ with UTF-8 bytes; the escapes are octal, since hexadecimal escapes have no end."""
     letters = "".join(map(_c_byte, text.encode("utf-8", "surrogateescape")))
     # The second of two question marks could begin a trigraph.
     escaped = _SECOND_QUESTION_MARK.sub(r"\\?", letters)
@@ -53,7 +53,7 @@ def _c_byte(byte: int) -> str:
 
 
 def python_string(text: str) -> str:
-    """A string literal of Python, in double quotes unless more than a trailing newline needs an escape."""
+    """Return a string literal of Python, in double quotes unless more than a trailing newline needs an escape."""
     body = text.removesuffix("\n")
     if not body.isprintable() or {'"', "\\"} & {*body}:
         return repr(text)
@@ -61,7 +61,7 @@ def python_string(text: str) -> str:
 
 
 def tcl_word(text: str) -> str:
-    """A word of Tcl that evaluates to `text`: nothing is substituted, and surrounding braces stay balanced."""
+    """Return a word of Tcl that evaluates to `text`: nothing is substituted, and surrounding braces stay balanced."""
     if _PLAIN_WORD.fullmatch(text):
         return text
     return f'"{"".join(map(_tcl_character, text))}"'
@@ -82,7 +82,7 @@ def yaml_scalar(text: str) -> str:
 
 
 def yaml_list(texts: Iterable[str]) -> str:
-    """A YAML list of strings on one line."""
+    """Return a YAML list of strings on one line."""
     words = [*texts]
     return _yaml(words, "".join(words))
 
@@ -106,12 +106,12 @@ def plot_text(text: str) -> str:
 
 
 def make_prerequisite(name: str) -> str:
-    """A file's name as a prerequisite in a makefile."""
+    """Return a file's name as a prerequisite in a makefile."""
     return re.sub("[ #:]", r"\\\g<0>", name).replace("$", "$$")
 
 
 def make_argument(text: str) -> str:
-    """An argument of a command in a makefile's recipe, escaped for Make and then for a shell."""
+    """Return an argument of a command in a makefile's recipe, escaped for Make and then for a shell."""
     return shlex.quote(text).replace("$", "$$")
 
 

@@ -127,7 +127,7 @@ class _Scope:
 
 
 def render(template_name: str, context: Mapping[str, object], templates: Path = TEMPLATES) -> str:
-    """The text of `templates/<template_name>.mustache` for `context`.
+    """Return the text of `templates/<template_name>.mustache` for `context`.
 
     The context may contain only dict, list, str, int, bool and None. If template and context do not match, raises
     `TemplateError`, which names template, key and scope.
@@ -155,7 +155,7 @@ def recorded() -> Iterator[dict[str, Rendering]]:
 
 
 def traced_lines(rendering: Rendering) -> list[TracedLine]:
-    """Each line of the rendered text, with its origin."""
+    """Return each line of the rendered text, with its origin."""
     name = rendering.template
     expansion = _TracedExpansion(TEMPLATES, _quotes(name))
     marked = expansion.expand(_parse_marked(name, TEMPLATES), _Scope(rendering.context), True)
@@ -172,7 +172,7 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
 
 
 def template_text(name: str, templates: Path = TEMPLATES) -> str:
-    """The text of `templates/<name>.mustache`. Raises `OSError`."""
+    """Return the text of `templates/<name>.mustache`. May raise `OSError`."""
     return (templates / f"{name}.mustache").read_text(encoding="utf-8")
 
 
@@ -184,7 +184,7 @@ class _Expansion:
     quotes: Mapping[str, Quote]
 
     def expand(self, nodes: tuple[_Node, ...], scope: _Scope, is_taken: bool) -> str:
-        """The text of `nodes`; if `is_taken` is false, only look up every key and return no text."""
+        """Return the text of `nodes`; if `is_taken` is false, only look up every key and return no text."""
         text = "".join([self._node(node, scope, is_taken) for node in nodes])
         return text if is_taken else ""
 
@@ -277,7 +277,7 @@ def _look_up(key: str, scope: _Scope) -> object:
 
 
 def _quotes(template_name: str) -> Mapping[str, Quote]:
-    """The quoting functions of a template's language: `vhdl/board.vhd`, or `board/pcf`."""
+    """Return the quoting functions of a template's language: `vhdl/board.vhd`, or `board/pcf`."""
     return QUOTES.get(template_name.rpartition("/")[2].rpartition(".")[2], {})
 
 
@@ -320,7 +320,7 @@ def _in_columns(text: str) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """The aligned lines of rows, in which cells alternate with the minimum length of the cell before."""
+    """Yield the aligned lines of rows, in which cells alternate with the minimum length of the cell before."""
     widths: dict[int, int] = {}
     for row in rows:
         for number, (cell, least) in enumerate(zip(row[:-1:2], row[1::2], strict=True)):
@@ -349,7 +349,7 @@ def _require_plain(value: object, path: str) -> None:
 
 @cache
 def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file."""
+    """Return the tree of a template file."""
     try:
         return _tree(name, template_text(name, templates))
     except OSError as error:
@@ -357,7 +357,7 @@ def _parse(name: str, templates: Path) -> tuple[_Node, ...]:
 
 
 def _parse_marked(name: str, templates: Path) -> tuple[_Node, ...]:
-    """The tree of a template file with a mark at the start of every non-blank line that produces output."""
+    """Return the tree of a template file with a mark at the start of every non-blank line that produces output."""
     lines = template_text(name, templates).split("\n")
     marked = [
         line if not line.strip() or _STANDALONE.fullmatch(line) else f"\ue000{name}.mustache:{number}:\ue001{line}"
@@ -375,7 +375,7 @@ def _tree(name: str, text: str) -> tuple[_Node, ...]:
 
 
 def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
-    """The nodes up to the end of the current section of `tokens`, or of the file."""
+    """Return the nodes up to the end of the current section of `tokens`, or of the file."""
     nodes: list[_Node] = []
     for kind, key in tokens:
         match kind:
@@ -394,7 +394,7 @@ def _nodes(tokens: Iterator[tuple[str, str]]) -> tuple[_Node, ...]:
 
 
 def _value(key: str) -> _Node:
-    """The node of a value tag: `x`, `comment x`, `x-1`, or the start of a column."""
+    """Return the node of a value tag: `x`, `comment x`, `x-1`, or the start of a column."""
     if key == _PARTED_KEY:
         return _Literal(_PARTED)
     if column := _COLUMN_KEY.fullmatch(key):

@@ -17,7 +17,7 @@ _WORD = {"type": ["string", "number", "boolean"]}
 
 
 def json_schema(section: type[Section], title: str) -> Schema:
-    """The schema of a file with one section, in JSON Schema's draft 2020-12."""
+    """Return the schema of a file with one section, in JSON Schema's draft 2020-12."""
     definitions: dict[str, Schema] = {}
     _define(section, definitions)
     return {
@@ -48,7 +48,7 @@ def _define(section: type[Section], definitions: dict[str, Schema]) -> None:
 
 
 def _spelt(name: str, entry: Key) -> Schema:
-    """A schema that requires the key in exactly one of its spellings."""
+    """Return a schema that requires the key in exactly one of its spellings."""
     ways = [{"required": [spelling]} for spelling in (name, *entry.aliases)]
     found = ways[0] if len(ways) == 1 else {"oneOf": ways}
     if entry.unless is None:
@@ -58,7 +58,7 @@ def _spelt(name: str, entry: Key) -> Schema:
 
 
 def _property(entry: Key) -> Schema:
-    """The schema of a key's value; unless the key is required, it may be null."""
+    """Return the schema of a key's value; unless the key is required, it may be null."""
     value = _value(entry)
     legal = value if entry.is_required else {"anyOf": [value, {"type": "null"}]}
     return {"description": entry.meaning, **legal}

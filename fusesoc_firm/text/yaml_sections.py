@@ -34,7 +34,7 @@ class Section:
     places: Mapping[str, SourceRef] = dataclasses.field(default_factory=dict, compare=False, repr=False)
 
     def place(self, field: str) -> SourceRef:
-        """The place of the value of a field's key, or the place of the section if the key is missing."""
+        """Return the place of the value of a field's key, or the place of the section if the key is missing."""
         return self.places.get(field, self.source)
 
 
@@ -60,12 +60,12 @@ class Key:
     rule: TextRule = text_fault
 
     def is_needed(self, others: Mapping[str, object]) -> bool:
-        """Whether the key is required, given the values of the `others` as words."""
+        """Return whether the key is required, given the values of the `others` as words."""
         return self.is_required and (self.unless is None or others.get(self.unless[0]) != self.unless[1])
 
 
 def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
-    """A field of a section; unless `is_required`, a missing key has the value `default`."""
+    """Return a field of a section; unless `is_required`, a missing key has the value `default`."""
     made = Key(meaning, **facts)
     if made.form in ("sections", "texts"):
         default = ()
@@ -73,7 +73,7 @@ def key(meaning: str, *, default: Any = None, **facts: Any) -> Any:
 
 
 def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
-    """The field name and `Key` of each key, by its name in the file, in the grammar's order."""
+    """Return the field name and `Key` of each key, by its name in the file, in the grammar's order."""
     return {
         (field.metadata["key"].name or field.name): (field.name, field.metadata["key"])
         for field in dataclasses.fields(section)
@@ -82,7 +82,7 @@ def keys_of(section: type[Section]) -> dict[str, tuple[str, Key]]:
 
 
 def keys_only_of(section: type[Section], kind: str) -> list[str]:
-    """The names of the keys that are limited to this kind of item."""
+    """Return the names of the keys that are limited to this kind of item."""
     return [name for name, (_, entry) in keys_of(section).items() if entry.only_of == kind]
 
 
@@ -102,7 +102,7 @@ class _Reader:
     faults: Diagnostics
 
     def section(self, section: type[S], node: yaml.Node, what: str) -> S:
-        """The section with all readable keys, and empty values for required keys that are missing or unreadable."""
+        """Return the section with all readable keys, and empty values for required keys that are missing or unreadable."""
         before = len(self.faults.found)
         source = self.file.source(node)
         if not isinstance(node, yaml.MappingNode):
@@ -120,7 +120,7 @@ class _Reader:
         return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
-        """The nodes of the known keys with a value, by the key's main name."""
+        """Return the nodes of the known keys with a value, by the key's main name."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
         meant: set[str] = set()
@@ -142,7 +142,7 @@ class _Reader:
         return {name: value for name, value in given.items() if not is_null(value) or name in needed}
 
     def _value(self, entry: Key, node: yaml.Node, name: str) -> Any:
-        """The value of a key in its form, or None if it is invalid."""
+        """Return the value of a key in its form, or None if it is invalid."""
         match entry.form:
             case "section":
                 return self.section(_section_type(entry), node, f"'{name}'")
@@ -197,13 +197,13 @@ class _Reader:
 
 
 def _needed(known: Mapping[str, tuple[str, Key]], given: Mapping[str, yaml.Node]) -> list[str]:
-    """The names of the keys that are required in addition to the given keys."""
+    """Return the names of the keys that are required in addition to the given keys."""
     words = {name: value.value for name, value in given.items()}
     return [name for name, (_, entry) in known.items() if entry.is_needed(words)]
 
 
 def _blanks(section: type[Section], source: SourceRef) -> dict[str, Any]:
-    """An empty value for each required field."""
+    """Return an empty value for each required field."""
     blanks: dict[str, Any] = {}
     for field, entry in keys_of(section).values():
         if entry.is_required:
@@ -226,7 +226,7 @@ def _empty(section: type[S], source: SourceRef) -> S:
 
 
 def _words_of_keys(section: type[Section]) -> str:
-    """The keys that a section requires or, if it requires none, the keys that it may have."""
+    """Return the keys that a section requires or, if it requires none, the keys that it may have."""
     keys = keys_of(section)
     required = [name for name, (_, entry) in keys.items() if entry.is_required]
     return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"

@@ -110,14 +110,14 @@ class YamlText:
     is_cut: bool = False
 
     def source(self, node: yaml.Node) -> SourceRef:
-        """The place of a node; for a multi-line node, the first line is shown."""
+        """Return the place of a node; for a multi-line node, the first line is shown."""
         start, end = node.start_mark, node.end_mark
         text = self.lines[start.line] if start.line < len(self.lines) else ""
         last = end.column if end.line == start.line else len(text.rstrip())
         return SourceRef(self.file, start.line + 1, start.column + 1, text, max(1, last - start.column))
 
     def text(self, node: yaml.ScalarNode) -> Text:
-        """A scalar's characters, regardless of its YAML type."""
+        """Return a scalar's characters, regardless of its YAML type."""
         return Text(str(node.value), self.source(node))
 
 
@@ -126,7 +126,7 @@ def read_yaml(
 ) -> YamlText:
     """Read a file within `bounds`, called `file` in messages.
 
-    Raises `InputError` if the file cannot be read or is not YAML. With `faults`, invalid YAML is reported there
+    Raise `InputError` if the file cannot be read or is not YAML. With `faults`, invalid YAML is reported there
     instead, and the part above it is returned.
     """
     name = file or str(path)
@@ -191,7 +191,7 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
 
 
 def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
-    """The indentations of a line and of the blocks open above it; empty if the line matches one of those blocks."""
+    """Return the indentations of a line and of the blocks open above it, or an empty string if the line matches one of those blocks."""
     indent = len(lines[number]) - len(lines[number].lstrip(" "))
     # The first word of each open block by its indentation, the outermost first.
     open_blocks: dict[int, str] = {}
@@ -206,7 +206,7 @@ def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
 
 
 def _block_begins(line: str) -> Iterator[tuple[int, str]]:
-    """The column, from 0, and the first word of each block that may begin in a line: several after an item's dash."""
+    """Yield the column, from 0, and the first word of each block that may begin in a line: several after an item's dash."""
     position = 0
     while found := _BLOCK_BEGIN.match(line, position):
         yield found.start(1), found[1]
@@ -216,7 +216,7 @@ def _block_begins(line: str) -> Iterator[tuple[int, str]]:
 
 
 def _composed(text: str, bounds: Bounds = SMALL) -> yaml.Node | None:
-    """The root node of a text. Raises `yaml.MarkedYAMLError` with the message of PyYAML's own parser."""
+    """Return the root node of a text. Raise `yaml.MarkedYAMLError` with the message of PyYAML's own parser."""
     with suppress(yaml.YAMLError):
         return _composed_by(getattr(yaml, "CSafeLoader", yaml.SafeLoader), text, bounds)
     return _composed_by(yaml.SafeLoader, text, bounds)
@@ -233,7 +233,7 @@ def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
 
 
 def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
-    """The root node of the lines above a fault, or above the construct still open there; None if there is none."""
+    """Return the root node of the lines above a fault, or above the construct still open there, or None if there is none."""
     for mark in (error.problem_mark, error.context_mark):
         if mark is not None:
             with suppress(yaml.YAMLError, TooLargeError):
@@ -242,7 +242,7 @@ def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node 
 
 
 def integer(text: str) -> int:
-    """The integer value of a plain scalar of at most `LONGEST_NUMBER` characters. Raises `ValueError`."""
+    """Return the integer value of a plain scalar of at most `LONGEST_NUMBER` characters. May raise `ValueError`."""
     if len(text) > LONGEST_NUMBER:
         raise ValueError(f"more than {LONGEST_NUMBER} characters")
     value = yaml.safe_load(text)
@@ -252,7 +252,7 @@ def integer(text: str) -> int:
 
 
 def yaml_data(text: str) -> Any:
-    """The mappings, lists and scalars in a text. Raises `yaml.YAMLError` for invalid values."""
+    """Return the mappings, lists and scalars in a text. Raise `yaml.YAMLError` for invalid values."""
     try:
         return data_of(_composed(text, LARGE))
     except TooLargeError as error:
@@ -260,7 +260,7 @@ def yaml_data(text: str) -> Any:
 
 
 def data_of(root: yaml.Node | None) -> Any:
-    """The data in a node and its children. Raises `yaml.YAMLError` for invalid values."""
+    """Return the data in a node and its children. Raise `yaml.YAMLError` for invalid values."""
     try:
         return None if root is None else yaml.SafeLoader("").construct_document(root)
     except (ValueError, TypeError, LookupError, OverflowError) as error:
@@ -274,12 +274,12 @@ def yaml_dump(data: Any) -> str:
 
 
 def is_null(node: yaml.Node) -> bool:
-    """Whether a key has no value, like `type:` in listing 6.1 of the dissertation."""
+    """Return whether a key has no value, like `type:` in listing 6.1 of the dissertation."""
     return isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:null"
 
 
 def kind(node: yaml.Node) -> str:
-    """The kind of a node for messages: its word, "a list", "a mapping" or "nothing"."""
+    """Return the kind of a node for messages: its word, "a list", "a mapping" or "nothing"."""
     if is_null(node):
         return "nothing"
     if isinstance(node, yaml.MappingNode):

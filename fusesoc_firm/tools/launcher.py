@@ -32,7 +32,7 @@ _NOTED = "FIRM_NOTED"
 
 
 def launch(program: str, arguments: Sequence[str]) -> int:
-    """Run a program until it ends, and return the exit status. Raises `InputError` if it is not installed."""
+    """Run a program until it ends, and return the exit status. Raise `InputError` if it is not installed."""
     path = find(program)
     if path is None:
         fail(f"the program '{program}' is not installed", hint=ways(program))
@@ -76,7 +76,7 @@ def _leave_to_the_shell(arguments: Sequence[str], noted: Path) -> None:
 
 
 def starts_everything() -> bool:
-    """Whether this package starts the build's programs, rather than a launcher that may find them elsewhere."""
+    """Return whether this package starts the build's programs, rather than a launcher that may find them elsewhere."""
     words = os.environ.get("EDALIZE_LAUNCHER", "").split()
     return not words or words[-1] == "tool"
 

@@ -15,15 +15,15 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def library_root() -> Path:
-    """The folder for `fusesoc library add firm FOLDER`, absolute."""
+    """Return the folder for `fusesoc library add firm FOLDER`, absolute."""
     return _PACKAGE / "library"
 
 
 def demos_root() -> Path:
-    """The folder of the demo systems, for `fusesoc library add firm_demos FOLDER`, absolute."""
+    """Return the folder of the demo systems, for `fusesoc library add firm_demos FOLDER`, absolute."""
     return _PACKAGE / "demos"
 
 
 def docs_root() -> Path:
-    """The folder of the documentation, absolute."""
+    """Return the folder of the documentation, absolute."""
     return _PACKAGE / "docs"

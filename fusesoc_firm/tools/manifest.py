@@ -33,7 +33,7 @@ def note(program: str, folder: Path) -> None:
 
 
 def read(folder: Path) -> dict[str, dict[str, str]]:
-    """The facts of each tool in a folder's manifest; empty if the manifest is missing or unreadable."""
+    """Return the facts of each tool in a folder's manifest, or an empty dictionary if the manifest is missing or unreadable."""
     try:
         tools = json.loads((folder / FILE).read_text(encoding="utf-8"))["tools"]
     except (OSError, ValueError, LookupError, TypeError):

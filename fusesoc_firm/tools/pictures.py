@@ -27,7 +27,7 @@ def check_picture(path: Path | None, form: str | None) -> None:
 
 
 def draw(dot: str, path: Path | None, form: str | None) -> None:
-    """Write a DOT graph as a picture to `path`, or print it in `form`, by default SVG. Raises `InputError`."""
+    """Write a DOT graph as a picture to `path`, or print it in `form`, by default SVG. May raise `InputError`."""
     if path:
         write(path, picture(dot, path.suffix.removeprefix(".")))
     else:
@@ -35,7 +35,7 @@ def draw(dot: str, path: Path | None, form: str | None) -> None:
 
 
 def picture(dot: str, form: str) -> bytes:
-    """Convert a DOT graph to `svg`, `png`, `pdf` or `dot`. Raises `InputError` if Graphviz is missing."""
+    """Convert a DOT graph to `svg`, `png`, `pdf` or `dot`. Raise `InputError` if Graphviz is missing."""
     if form == "dot":
         return dot.encode()
     try:

@@ -71,7 +71,7 @@ _OWN = "fusesoc-firm"
 
 
 def find(program: str) -> Path | None:
-    """The path of a program, or None."""
+    """Return the path of a program, or None."""
     known = PROGRAMS.get(program, Program())
     beside = Path(sys.executable).parent
     if found := shutil.which(program):
@@ -84,7 +84,7 @@ def find(program: str) -> Path | None:
 
 
 def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({})) -> tuple[str, ...]:
-    """The programs that Edalize's tool starts with these options, as far as known."""
+    """Return the programs that Edalize's tool starts with these options, as far as known."""
     if tool == "nextpnr":
         return tuple(filter(None, [_NEXTPNR.get(str(options.get("arch")))]))
     if tool == "verilator" and options.get("mode") == "lint-only":
@@ -93,18 +93,18 @@ def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({}))
 
 
 def missing(programs: Iterable[str]) -> list[str]:
-    """The programs that are not installed."""
+    """Return the programs that are not installed."""
     return [program for program in programs if find(program) is None]
 
 
 def simulation_programs(simulator: str) -> tuple[str, ...]:
-    """The programs that a simulation needs, including GHDL if it requires a netlist."""
+    """Return the programs that a simulation needs, including GHDL if it requires a netlist."""
     known = SIMULATORS[simulator]
     return known.programs if known.reads_vhdl else ("ghdl", *known.programs)
 
 
 def ways(program: str) -> str:
-    """The commands or instructions for installing a missing program."""
+    """Return the commands or instructions for installing a missing program."""
     known = PROGRAMS.get(program, Program())
     found = [f"apt-get install --no-install-recommends {known.debian}"] if known.debian else []
     found += [f"pip install {known.pypi}"] if known.pypi else []
@@ -119,7 +119,7 @@ def explanation(programs: Iterable[str]) -> str:
 
 
 def facts_of(program: str, path: Path) -> dict[str, str]:
-    """The identity of a program: the version that it prints, and the SHA-256 of the program's file or package."""
+    """Return the identity of a program: the version that it prints, and the SHA-256 of the program's file or package."""
     known = PROGRAMS.get(program, Program())
     if package := _package(known, path):
         # A script contains the environment's path, and the program takes seconds to print its version.
@@ -138,7 +138,7 @@ def installed_programs() -> Iterator[tuple[str, Path]]:
 
 
 def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
-    """The versions of these Python packages; for our own, also a digest of the files, which change between versions."""
+    """Return the versions of these Python packages; for our own, also a digest of the files, which change between versions."""
     found = {name: {"version": metadata.version(name)} for name in names}
     if _OWN in found:
         from fusesoc_firm.store.own_code import digest
@@ -148,7 +148,7 @@ def packages(names: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def _digest(path: Path) -> str:
-    """The SHA-256 of a file; for a script, without its first line, which contains the interpreter's path."""
+    """Return the SHA-256 of a file; for a script, without its first line, which contains the interpreter's path."""
     content = path.read_bytes()
     return hashlib.sha256(content.partition(b"\n")[2] if content.startswith(b"#!") else content).hexdigest()
 

@@ -74,12 +74,12 @@ SIMULATORS: dict[str, Simulator] = {
 
 
 def default_simulator(*, has_verilog: bool = False, is_live: bool = False) -> str:
-    """The first simulator that can simulate a system with or without Verilog accelerators."""
+    """Return the first simulator that can simulate a system with or without Verilog accelerators."""
     return next(iter(fitting(has_verilog=has_verilog, is_live=is_live)))
 
 
 def fitting(*, has_verilog: bool = False, is_live: bool = False) -> dict[str, Simulator]:
-    """The simulators that can simulate a system with or without Verilog accelerators; none reads both languages."""
+    """Return the simulators that can simulate a system with or without Verilog accelerators; none reads both languages."""
     return {
         name: item
         for name, item in SIMULATORS.items()

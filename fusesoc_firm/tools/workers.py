@@ -74,7 +74,7 @@ def cluster_workers(address: str) -> Iterator[Workers]:
     Each end of a connection runs code from the other end. With tls://, both ends authenticate each other by the
     certificates in Dask's configuration. Without tls://, a warning is printed unless the scheduler is on this machine.
 
-    Raises `InputError` if the cluster does not respond, has no suitable workers, or is lost.
+    Raise `InputError` if the cluster does not respond, has no suitable workers, or is lost.
     """
     try:
         # Dask's type hints are incomplete.
@@ -101,7 +101,7 @@ def cluster_workers(address: str) -> Iterator[Workers]:
 
 
 def _security(distributed: Any, address: str) -> Any:
-    """The security settings of a connection to the scheduler. Raises `InputError` if certificates are missing."""
+    """Return the security settings of a connection to the scheduler. Raise `InputError` if certificates are missing."""
     protocol, _, place = address.rpartition("://")
     if protocol != "tls":
         if protocol in _OPEN_PROTOCOLS and not _is_here(place):
@@ -127,7 +127,7 @@ def _security(distributed: Any, address: str) -> Any:
 
 
 def _is_here(place: str) -> bool:
-    """Whether the host in `host:port` is a loopback address."""
+    """Return whether the host in `host:port` is a loopback address."""
     host = place.rpartition(":")[0].strip("[]")
     try:
         return host == "localhost" or ip_address(host).is_loopback
@@ -136,7 +136,7 @@ def _is_here(place: str) -> bool:
 
 
 def _connected(distributed: Any, address: str, security: Any) -> Any:
-    """A client of the scheduler. Raises `InputError` if the scheduler does not respond."""
+    """Return a client of the scheduler. Raise `InputError` if the scheduler does not respond."""
     try:
         return distributed.Client(address, timeout=_CONNECT_SECONDS, security=security)
     # Dask raises the last two for an invalid configuration.

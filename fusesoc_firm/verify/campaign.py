@@ -46,7 +46,7 @@ class Entry:
 def select(library: MessageLibrary, patterns: Sequence[str]) -> list[MessageName]:
     """Return the sorted messages that names, or patterns with `*` and `?`, select; all if there are no patterns.
 
-    A service or an action selects its messages. Raises `InputError` for a name or pattern without a match, and for
+    A service or an action selects its messages. Raise `InputError` for a name or pattern without a match, and for
     every fault in the definitions of a named message.
     """
     if not patterns:
@@ -76,7 +76,7 @@ def _named(library: MessageLibrary, full_name: str) -> Sequence[MessageName]:
 
 
 def run(library: MessageLibrary, names: Iterable[MessageName], settings: Settings, workers: Workers) -> Iterator[Entry]:
-    """Verify messages; yield an entry for each as it is done. Raises `InputError` if none can be verified here."""
+    """Verify messages; yield an entry for each as it is done. Raise `InputError` if none can be verified here."""
     tasks = _Tasks(library, settings)
     for task, result in workers.run(verify, tasks.of(names)):
         yield from tasks.finished

@@ -40,7 +40,7 @@ class Places:
 def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: Settings, places: Places) -> None:
     """Verify messages and print the results.
 
-    Raises `InputError` if one fails, or if none could be verified.
+    Raise `InputError` if one fails, or if none could be verified.
     """
     if settings.width not in WIDTHS:
         legal = ", ".join(map(str, WIDTHS))

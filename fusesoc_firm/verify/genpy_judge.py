@@ -33,7 +33,7 @@ def version() -> str:
 
 
 def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
-    """Return the payload of each value. Raises `NoJudgementError` if genpy rejects the message."""
+    """Return the payload of each value. Raise `NoJudgementError` if genpy rejects the message."""
     server = _server()
     assert server is not None, "ask is_installed() first"
     texts = {str(other): plain_text(definition) for other, definition in definitions.items()}

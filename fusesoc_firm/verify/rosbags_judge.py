@@ -39,7 +39,7 @@ def version() -> str:
 
 
 def serialise(name: MessageName, definitions: Definitions, values: Sequence[MessageValue]) -> list[bytes]:
-    """Return the payload of each value; CDR padding is zero. Raises `NoJudgementError` if rosbags cannot read it."""
+    """Return the payload of each value; CDR padding is zero. Raise `NoJudgementError` if rosbags cannot read it."""
     ros = definitions[name].ros
     texts = {other: plain_text(definition) for other, definition in definitions.items()}
     if ros is ROS1:
@@ -58,7 +58,7 @@ class _Store:
         self._texts: dict[MessageName, str] = {}
 
     def holding(self, texts: Mapping[MessageName, str]) -> Typestore:
-        """Return a store with exactly these definitions for these names. Raises `NoJudgementError`."""
+        """Return a store with exactly these definitions for these names. May raise `NoJudgementError`."""
         if any(self._texts.get(name, text) != text for name, text in texts.items()):
             self._store, self._texts = get_typestore(Stores.EMPTY), {}
         for name, text in texts.items():

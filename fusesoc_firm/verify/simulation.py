@@ -88,7 +88,7 @@ def write_frames(folder: Path, stimuli: Sequence[bytes], answers: Sequence[bytes
 
 @cache
 def ghdl() -> str:
-    """Return the path of GHDL. Raises `InputError` if it is not installed."""
+    """Return the path of GHDL. Raise `InputError` if it is not installed."""
     path = shutil.which("ghdl")
     if path is None:
         fail("GHDL is not installed, and messages are verified in simulation", hint="apt-get install ghdl-mcode")

@@ -54,7 +54,7 @@ class Task:
         return self.definitions[self.name].ros
 
     def chance(self) -> random.Random:
-        """The random numbers of this message, which do not depend on the other messages of a campaign."""
+        """Return the random numbers of this message, which do not depend on the other messages of a campaign."""
         return random.Random(f"{self.seed} {self.name} {self.ros.number}")
 
 
@@ -75,7 +75,7 @@ class Result:
 
 
 def verify(task: Task) -> Result:
-    """Verify a message. Raises `InputError` only for a fault that affects every message: GHDL is not installed."""
+    """Verify a message. Raise `InputError` only for a fault that affects every message: GHDL is not installed."""
     library = firm_library()
     started = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="firm_verify_") as name:

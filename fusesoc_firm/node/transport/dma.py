@@ -126,7 +126,7 @@ class DmaTransport:
     """A transport over AXI DMA."""
 
     def __init__(self, device: DmaDevice, buffers: DmaBuffers | None = None, longest: int = 2**26) -> None:
-        """Reset the engine and thereby the system. No burst has more than `longest` bytes. Raises `TransportError`."""
+        """Reset the engine and thereby the system. No burst has more than `longest` bytes. May raise `TransportError`."""
         self._device = device
         self._longest = longest
         self._buffers = buffers or DmaBuffers()
@@ -149,7 +149,7 @@ class DmaTransport:
         self._start()
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; wait while all buffers are in use. Raises `TransportError`."""
+        """Send a whole frame; wait while all buffers are in use. May raise `TransportError`."""
         with self._sending:
             rest, mark = memoryview(frame), START_OF_FRAME
             while rest:
@@ -203,7 +203,7 @@ class DmaTransport:
         self.close()
 
     def _buffer_bytes(self) -> int:
-        """Return the size of each buffer. Raises `TransportError` if it, or the number of buffers, is illegal."""
+        """Return the size of each buffer. Raise `TransportError` if it, or the number of buffers, is illegal."""
         count, size = self._buffers.send + self._buffers.receive, self._buffers.size
         room = len(self._device.memory) - count * DESCRIPTOR_BYTES
         most = min(max(0, room) // max(1, count), LENGTH) // _ALIGNMENT * _ALIGNMENT

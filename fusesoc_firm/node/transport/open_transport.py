@@ -20,7 +20,7 @@ LEGAL = "pipe:COMMAND, uart:DEVICE:BAUD[:rtscts], dma:UIO:BUFFER[:poll]"
 
 
 def open_transport(address: str, pace: Pace | None = None, observe: Callable[[Event], None] | None = None) -> Transport:
-    """Open the transport with an address; `pace` and `observe` are for a simulator. Raises `TransportError`.
+    """Open the transport with an address; `pace` and `observe` are for a simulator. May raise `TransportError`.
 
     A simulator's command is split into words as by a shell, with quotes but no other special characters.
     """

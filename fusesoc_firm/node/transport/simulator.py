@@ -70,7 +70,7 @@ class Simulator:
     """
 
     def __init__(self, command: Sequence[str], folder: Path | None = None) -> None:
-        """Start `command` in `folder`. Raises `TransportError`."""
+        """Start `command` in `folder`. May raise `TransportError`."""
         self.cycle = 0
         self.quiet = 0
         self._printed = tempfile.TemporaryFile()  # noqa: SIM115
@@ -102,20 +102,20 @@ class Simulator:
         return self._process.pid
 
     def request(self, frame: bytes) -> None:
-        """Append a frame to the frames to send to the system. Raises `TransportError`."""
+        """Append a frame to the frames to send to the system. May raise `TransportError`."""
         if not 1 <= len(frame) <= MOST_CYCLES:
             raise ValueError(f"a frame of {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
         self._write(b"F" + len(frame).to_bytes(4, "little"), frame)
 
     def run(self, cycles: int) -> list[Event]:
-        """Run for `cycles`, or until the end of the first cycle with an event. Raises `TransportError`."""
+        """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""
         if not 0 <= cycles <= MOST_CYCLES:
             raise ValueError(f"{cycles} cycles; legal: 0 to {MOST_CYCLES}")
         self._write(b"R" + cycles.to_bytes(4, "little"))
         return self._events()
 
     def quit(self) -> None:
-        """End the simulation. Raises `TransportError` if it does not end normally."""
+        """End the simulation. Raise `TransportError` if it does not end normally."""
         self._write(b"Q")
         self._events()
         status = self._wait()
@@ -194,7 +194,7 @@ class Simulator:
         return self._fail(f"the simulator sent 0x{kind.hex()} where a report begins")
 
     def _wait(self) -> int | None:
-        """Return the exit status of the simulator; None if it does not end."""
+        """Return the exit status of the simulator; return None if it does not end."""
         try:
             return self._process.wait(_END_SECONDS)
         except subprocess.TimeoutExpired:
@@ -242,7 +242,7 @@ class SimulatorTransport:
     ) -> None:
         """`start` creates the simulator; the thread calls `observe`, which must not raise, with every event.
 
-        Raises `TransportError` if the simulator cannot be started.
+        Raise `TransportError` if the simulator cannot be started.
         """
         self._start = start
         self._pace = pace or Pace()
@@ -261,7 +261,7 @@ class SimulatorTransport:
         self._thread.start()
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; wait while the system is not ready. Raises `TransportError`."""
+        """Send a whole frame; wait while the system is not ready. May raise `TransportError`."""
         with self._changed:
             self._changed.wait_for(lambda: self._is_over or self._frames < self._pace.most_frames)
             if self._is_closed:

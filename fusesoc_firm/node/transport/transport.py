@@ -40,12 +40,12 @@ class Transport(Protocol):
     """One thread may send while another receives; closing ends both."""
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; return when the hardware, or a bounded buffer, has it. Raises `TransportError`."""
+        """Send a whole frame; return when the hardware, or a bounded buffer, has it. May raise `TransportError`."""
 
     def receive(self, timeout: float | None = None) -> Burst | None:
         """Return the next burst; None after `timeout` seconds (None: no limit), or when the transport is closed.
 
-        Raises `TransportError`, in particular `TransportResetError` if incomplete frames must be dropped.
+        Raise `TransportError`, in particular `TransportResetError` if incomplete frames must be dropped.
         """
 
     def is_at_rest(self) -> bool | None:

@@ -42,7 +42,7 @@ class UartTransport:
     ) -> None:
         """Open `device`, with flow control by RTS and CTS if it `has_flow_control`, else at the line's full rate.
 
-        No payload has more than `longest` bytes. Raises `TransportError`.
+        No payload has more than `longest` bytes. May raise `TransportError`.
         """
         self._device = device
         self._longest = longest
@@ -72,9 +72,9 @@ class UartTransport:
             raise TransportError(f"{device} is not a serial line: {error.args[-1]}") from None
 
     def send(self, frame: bytes) -> None:
-        """Send a whole frame; wait while the line is busy or held. Raises `TransportError`.
+        """Send a whole frame; wait while the line is busy or held. May raise `TransportError`.
 
-        Raises `TransportResetError` if a break ends the frame.
+        Raise `TransportResetError` if a break ends the frame.
         """
         rest = memoryview(frame)
         with self._sending:
@@ -90,7 +90,7 @@ class UartTransport:
                     rest = rest[self._write(rest) :]
 
     def receive(self, timeout: float | None = None) -> Burst | None:
-        """Return the next frame as a burst. Raises `TransportError`, `TransportResetError` for illegal bytes."""
+        """Return the next frame as a burst. Raise `TransportError`, `TransportResetError` for illegal bytes."""
         with self._receiving:
             return self._receive(timeout)
 

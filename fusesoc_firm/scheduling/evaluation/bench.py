@@ -60,7 +60,7 @@ class Places:
 def bench(selection: Selection, places: Places) -> None:
     """Evaluate, print a summary, and write the outputs that `places` requests.
 
-    Raises `InputError` before any evaluation if a place cannot be written.
+    Raise `InputError` before any evaluation if a place cannot be written.
     """
     _check(places)
     settings = selection.settings
@@ -156,7 +156,7 @@ Times are in clock cycles; docs/explanation/scheduler-evaluation.md defines the 
 
 
 def _of_all(settings: Settings) -> str:
-    """The settings that all evaluations share, if they differ from section 4.3."""
+    """Return the settings that all evaluations share, if they differ from section 4.3."""
     found = f"seed {settings.seed}, {settings.distribution} distribution"
     if settings.shortest_run > 1:
         found += f", a shortest run of {settings.shortest_run} beats"
@@ -181,7 +181,7 @@ def _summary(evaluation: chapter.Evaluation, data_set: str) -> str:
 
 
 def _all_values(evaluation: chapter.Evaluation) -> str:
-    """A row for each evaluation and a column for each metric; NaN becomes an empty cell."""
+    """Return a row for each evaluation and a column for each metric; NaN becomes an empty cell."""
     lines = [",".join(("data_set", "policy", "requesters", *METRICS))]
     for key, means in evaluation.means.items():
         values = ("" if means[name] != means[name] else f"{means[name]:.6g}" for name in METRICS)
@@ -190,7 +190,7 @@ def _all_values(evaluation: chapter.Evaluation) -> str:
 
 
 def names_of(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
-    """The names in a comma-separated list; raises `InputError` for an unknown name."""
+    """Return the names in a comma-separated list; raise `InputError` for an unknown name."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in legal:
@@ -199,7 +199,7 @@ def names_of(text: str, legal: Sequence[str], what: str) -> tuple[str, ...]:
 
 
 def numbers_of(text: str, most: int = 256) -> tuple[int, ...]:
-    """The numbers of accelerators in a comma-separated list, sorted; raises `InputError` for an illegal number."""
+    """Return the numbers of accelerators in a comma-separated list, sorted; raise `InputError` for an illegal number."""
     found = set()
     for word in text.split(","):
         if not word.strip().isdecimal() or not 1 <= int(word) <= most:

@@ -31,15 +31,15 @@ class Evaluation:
     areas: Areas
 
     def value(self, data_set: str, policy: str, requesters: int, metric: str) -> float:
-        """The mean of a metric; NaN if the metric was not evaluated."""
+        """Return the mean of a metric; NaN if the metric was not evaluated."""
         return self.means.get(Key(data_set, policy, requesters), {}).get(metric, math.nan)
 
     def requesters(self, data_set: str) -> tuple[int, ...]:
-        """The evaluated numbers of accelerators."""
+        """Return the evaluated numbers of accelerators."""
         return tuple(sorted({key.requesters for key in self.means if key.data_set == data_set}))
 
     def policies(self, data_set: str) -> tuple[str, ...]:
-        """The evaluated policies, in the order of the tables."""
+        """Return the evaluated policies, in the order of the tables."""
         found = {key.policy for key in self.means if key.data_set == data_set}
         return tuple(name for name in TABLE_ORDER if name in found)
 
@@ -115,7 +115,7 @@ def _spread_table(
 
 
 def _verdict(ours: float, theirs: float) -> str:
-    """The comparison of our value with the dissertation's value, for metrics where smaller is better."""
+    """Return the comparison of our value with the dissertation's value, for metrics where smaller is better."""
     if math.isnan(ours) or math.isnan(theirs):
         return UNKNOWN
     if abs(ours - theirs) <= _EQUAL:
@@ -150,7 +150,7 @@ def _comparison_table(evaluation: Evaluation) -> Table:
 
 
 def _criteria(evaluation: Evaluation, number: int) -> Iterator[tuple[str, str, Callable[[str], float]]]:
-    """The key, title and score of each criterion; the smallest score is the best."""
+    """Yield the key, title and score of each criterion; the smallest score is the best."""
 
     def area(policy: str, part: str) -> float:
         found = evaluation.areas.get((policy, number))
@@ -169,7 +169,7 @@ def _criteria(evaluation: Evaluation, number: int) -> Iterator[tuple[str, str, C
 
 
 def _best(scores: Mapping[str, float]) -> list[str]:
-    """All policies with the best score; empty if a score is unknown."""
+    """Return all policies with the best score, or an empty list if a score is unknown."""
     if not scores or any(math.isnan(score) for score in scores.values()):
         return []
     least = min(scores.values())

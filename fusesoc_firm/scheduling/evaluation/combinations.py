@@ -30,7 +30,7 @@ TOP = "lru"
 
 
 def combined(policies: tuple[str, str], generics: Generics) -> Combined:
-    """The model of a combination whose two halves have the requesters in their original order."""
+    """Return the model of a combination whose two halves have the requesters in their original order."""
     half = generics.requesters // 2
     parts = (slice(0, half), slice(half, None))
     groups = [make_model(policy, generics.part(part)) for policy, part in zip(policies, parts, strict=True)]

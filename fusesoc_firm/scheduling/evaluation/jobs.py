@@ -31,11 +31,11 @@ class Settings:
     resume_beats: int = 0
 
     def sets_of(self, data_set: str) -> int:
-        """The number of sets of a data set that are simulated."""
+        """Return the number of sets of a data set that are simulated."""
         return self.sets or DATA_SETS[data_set].sets
 
     def cycles_of(self, data_set: str) -> int:
-        """The number of cycles of each set's simulation."""
+        """Return the number of cycles of each set's simulation."""
         return self.cycles or DATA_SETS[data_set].cycles
 
 
@@ -66,7 +66,7 @@ class Outcome:
 
 
 def model_of(policy: str, workload: Workload, shortest_run: int = 1) -> SchedulerModel:
-    """The model of a policy or a combination for a workload.
+    """Return the model of a policy or a combination for a workload.
 
     The period of a requester is the least time between its requests, which is its implicit deadline.
     """
@@ -89,7 +89,7 @@ def evaluate(job: Job) -> Outcome:
 
 
 def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence[int], settings: Settings) -> list[Job]:
-    """A job for each combination, longest jobs first, so that no worker finishes long after the others.
+    """Return a job for each combination, longest jobs first, so that no worker finishes long after the others.
 
     The combined schedulers of figure 4.18 are included if all their components are.
     """
@@ -106,5 +106,5 @@ def jobs(data_sets: Iterable[str], policies: Sequence[str], requesters: Sequence
 
 
 def run(to_do: Iterable[Job], workers: Workers) -> Iterator[Outcome]:
-    """The outcome of each job, in the order of completion."""
+    """Return the outcome of each job, in the order of completion."""
     return (outcome for _, outcome in workers.run(evaluate, to_do))

@@ -54,7 +54,7 @@ class Metrics:
     """The same of the cycles in which somebody asked, in percent."""
 
     def means(self) -> dict[str, float]:
-        """The mean of each metric over the sets with a value; NaN if no set has a value."""
+        """Return the mean of each metric over the sets with a value; NaN if no set has a value."""
         return {each.name: _mean(getattr(self, each.name)) for each in fields(self)}
 
 
@@ -62,7 +62,7 @@ METRICS = tuple(each.name for each in fields(Metrics))
 
 
 def measure(trace: Trace) -> Metrics:
-    """The metrics of a simulation."""
+    """Return the metrics of a simulation."""
     tasks, sets, requesters = trace.tasks, trace.workload.sets, trace.workload.requesters
     done = tasks.is_finished
     of_set, of_requester = tasks.set[done], tasks.requester[done]
@@ -101,14 +101,14 @@ class _Spread:
 
 
 def _distinct(of_set: Times, of_requester: Times, sets: int, requesters: int) -> Values:
-    """The number of distinct requesters in each set."""
+    """Return the number of distinct requesters in each set."""
     found = np.zeros((sets, requesters), np.bool_)
     found[of_set, of_requester] = True
     return np.asarray(found.sum(axis=1), float)
 
 
 def _preemptions(trace: Trace, completed: Times) -> Values:
-    """The preemptions per completed task, averaged over the accelerators that completed a task.
+    """Return the preemptions per completed task, averaged over the accelerators that completed a task.
 
     Preemptions of unfinished tasks count too.
     """
@@ -120,7 +120,7 @@ def _preemptions(trace: Trace, completed: Times) -> Values:
 
 
 def _ratio(numerator: Any, denominator: Any) -> Values:
-    """The element-wise quotient; NaN for a zero denominator."""
+    """Return the element-wise quotient; NaN for a zero denominator."""
     ratio: Values = np.where(denominator > 0, numerator / np.maximum(denominator, 1), np.nan)
     return ratio
 

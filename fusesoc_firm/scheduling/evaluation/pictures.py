@@ -21,7 +21,7 @@ _METADATA = {"png": {"Software": None}, "svg": {"Date": None}}
 
 
 def are_possible() -> bool:
-    """Whether matplotlib is installed."""
+    """Return whether matplotlib is installed."""
     return find_spec("matplotlib") is not None
 
 

@@ -169,7 +169,7 @@ class _Environment:
         self.preemptions[done] = 0
 
     def trace(self, cycles: int) -> Trace:
-        """The tasks noted so far, including unfinished tasks that have begun."""
+        """Return the tasks noted so far, including unfinished tasks that have begun."""
         cut = np.flatnonzero(self.grant >= 0)
         cut_short = (cut, self.arrival[cut], self.grant[cut], np.full(cut.size, -1), self.preemptions[cut])
         columns = [np.concatenate(column) for column in zip(*self.finished, cut_short, strict=True)]

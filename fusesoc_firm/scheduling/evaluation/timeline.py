@@ -57,7 +57,7 @@ class Timeline:
         return f"figure_{self.number.replace('.', '_')}"
 
     def csv(self) -> str:
-        """The timeline as CSV, with a row for each cycle."""
+        """Return the timeline as CSV, with a row for each cycle."""
         names = [f"request_{index}" for index in range(len(self.requests))]
         lines = [",".join(["cycle", *names, "granted"])]
         for cycle, granted in enumerate(self.granted):
@@ -77,7 +77,7 @@ def timelines() -> tuple[Timeline, Timeline]:
 
 
 def record(policy: str, workload: Workload, cycles: int) -> tuple[tuple[tuple[bool, ...], ...], tuple[int, ...]]:
-    """The requests and grants of the workload's first set; all accelerators request in cycle 1."""
+    """Return the requests and grants of the workload's first set; all accelerators request in cycle 1."""
     recorder = Recorder(model_of(policy, workload))
     simulate(recorder, workload, cycles, np.ones_like(workload.frequencies))
     requests = np.array(recorder.request)[:, 0, :].T

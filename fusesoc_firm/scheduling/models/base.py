@@ -64,7 +64,7 @@ class Generics:
         return self.periods if self.deadlines is None else self.deadlines
 
     def part(self, requesters: slice) -> Generics:
-        """The generics for a subset of the requesters."""
+        """Return the generics for a subset of the requesters."""
         deadlines, transfer_times = (
             None if times is None else times[:, requesters] for times in (self.deadlines, self.transfer_times)
         )
@@ -98,13 +98,13 @@ class Scheduler(ABC):
         """
 
     def _without_granted(self, request: Bools, without: Bools) -> Bools:
-        """A copy of `request` (B, N) without the granted requester's request where `without` (B,) is true."""
+        """Return a copy of `request` (B, N) without the granted requester's request where `without` (B,) is true."""
         eligible = request.copy()
         eligible[self._members, self.grant_select] &= ~without
         return eligible
 
     def _of_granted(self, request: Bools) -> Bools:
-        """Whether the granted requester requests, (B,)."""
+        """Return whether the granted requester requests, (B,)."""
         return request[self._members, self.grant_select]
 
     def _grant(self, choice: Ints, where: Bools) -> None:

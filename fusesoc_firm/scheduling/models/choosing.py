@@ -22,7 +22,7 @@ class ChoosingScheduler(Scheduler):
 
     @abstractmethod
     def _choose(self, eligible: Bools) -> Ints:
-        """The chosen requester, (B,), among those in `eligible` (B, N); arbitrary where none is eligible."""
+        """Return the chosen requester, (B,), among those in `eligible` (B, N); arbitrary where none is eligible."""
 
     def _note_completed(self, finished: Bools) -> None:
         """Note a completed task of the granted requester where `finished` (B,) is true; runs before the choice."""

@@ -18,12 +18,12 @@ _SHORTEST_TIME, _LONGEST_TIME = 8, 31  # bits
 
 
 def index_bits(requesters: int) -> int:
-    """The bits of an index, at least 1, as computed by the function of the same name in firm_axis_pkg."""
+    """Return the bits of an index, at least 1, as computed by the function of the same name in firm_axis_pkg."""
     return max(1, (requesters - 1).bit_length())
 
 
 def rows_and_columns(requesters: int) -> tuple[int, int]:
-    """The numbers of rows and columns of requesters, as computed by the functions in firm_sched_queue_pkg."""
+    """Return the numbers of rows and columns of requesters, as computed by the functions in firm_sched_queue_pkg."""
     bits = index_bits(requesters)
     column_bits = max(1, bits // 2)
     rows: int = 2 ** max(1, bits - column_bits)
@@ -139,7 +139,7 @@ class Queue(ABC):
 
     @abstractmethod
     def ready(self, pop: Bools) -> Bools:
-        """Whether an item can enter in this cycle."""
+        """Return whether an item can enter in this cycle."""
 
     @abstractmethod
     def step(self, insert: Bools, index: Ints, key: Ints, pop: Bools) -> None:
@@ -241,11 +241,11 @@ class Keys(ABC):
 
     @abstractmethod
     def read(self, wanted: Bools, index: Ints, finished: Bools) -> tuple[Ints, Bools]:
-        """The keys of tasks that leave the arrivals in this cycle, and where these keys are valid."""
+        """Return the keys of tasks that leave the arrivals in this cycle, and where these keys are valid."""
 
     @abstractmethod
     def advance(self, oldest: tuple[tuple[Bools, Ints], ...], is_clearing: bool) -> Bools:
-        """Whether time advances; `oldest` are pairs of the keys that must not become too old and their valid bits."""
+        """Return whether time advances; `oldest` are pairs of the keys that must not become too old and their valid bits."""
 
     @abstractmethod
     def step(self, advance: Bools, wanted: Bools, finished: Bools, finished_id: Ints) -> None:
@@ -291,7 +291,7 @@ class Times(Keys):
 
 
 def is_overdue(key: Ints, now: Ints, eighth: int) -> Bools:
-    """Whether keys are two eighths of the range before `now`, each truncated to whole eighths of 2**`eighth` cycles."""
+    """Return whether keys are two eighths of the range before `now`, each truncated to whole eighths of 2**`eighth` cycles."""
     overdue: Bools = (now >> eighth) - (key >> eighth) >= 2
     return overdue
 

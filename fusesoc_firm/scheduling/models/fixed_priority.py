@@ -41,10 +41,10 @@ class PreemptiveFixedPriority(Scheduler):
 
 
 def fixed_priority(generics: Generics) -> Scheduler:
-    """The non-preemptive scheduler."""
+    """Return the non-preemptive scheduler."""
     return FixedPriority(generics.batch, generics.requesters)
 
 
 def fixed_priority_preemptive(generics: Generics) -> Scheduler:
-    """The preemptive scheduler."""
+    """Return the preemptive scheduler."""
     return PreemptiveFixedPriority(generics.batch, generics.requesters, generics.shortest_run)

@@ -10,7 +10,7 @@ from fusesoc_firm.scheduling.models.parallel import Parallel
 def lst(generics: Generics) -> Scheduler:
     """Compares few requesters in parallel; with more requesters, tasks wait in a heap.
 
-    Raises `ValueError` without transfer times.
+    Raise `ValueError` without transfer times.
     """
     if generics.transfer_times is None:
         raise ValueError("transfer_times is None; legal: the beats of each requester's tasks")

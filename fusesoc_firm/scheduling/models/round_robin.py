@@ -26,5 +26,5 @@ class RoundRobin(ChoosingScheduler):
 
 
 def round_robin(generics: Generics) -> Scheduler:
-    """A scheduler with as many turns as requesters."""
+    """Return a scheduler with as many turns as requesters."""
     return RoundRobin(generics.batch, generics.requesters)

@@ -48,7 +48,7 @@ _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.,:+/()-]*")
 
 
 def word_fault(text: str) -> tuple[str, str] | None:
-    """The reason why `text` is not a legal name of an FPGA, a family or a pin; None if it is."""
+    """Return the reason why `text` is not a legal name of an FPGA, a family or a pin, or None if it is."""
     if fault := text_fault(text):
         return fault
     legal = "legal are letters, digits, blanks and '_.,:+/()-', a letter or digit first"
@@ -106,22 +106,22 @@ class _Port:
     source: SourceRef | None
 
     def bits(self) -> list[str]:
-        """All bits; each bit has a separate place on the board."""
+        """Return all bits; each bit has a separate place on the board."""
         return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
 
 
 def boards() -> tuple[str, ...]:
-    """The names of the package's boards."""
+    """Return the names of the package's boards."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 
 
 def board_path(name: str, folder: Path) -> Path:
-    """The file of the package's board of this name, or a file below `folder`."""
+    """Return the file of the package's board of this name, or a file below `folder`."""
     return folder / name if name.endswith((".yaml", ".yml")) else FOLDER / f"{name}.yaml"
 
 
 def read_board(name: str, folder: Path = Path()) -> Board:
-    """Read the board file that `board_path` identifies; raises `InputError`."""
+    """Read the board file that `board_path` identifies; may raise `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
         fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
@@ -172,7 +172,7 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
 
 
 def on_board(specification: Specification, board: Board) -> Specification:
-    """The specification of the system on the board, with the board's interconnect.
+    """Return the specification of the system on the board, with the board's interconnect.
 
     On a board without a processor, the clock pin determines the frequency of clk. On other boards, a PLL provides the
     frequency that the specification requests.
@@ -212,12 +212,12 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
 
 
 def board_entity(system: DerivedSystem, board: Board) -> str:
-    """The top-level entity of a system on a board; next to a processor, the name of the block design."""
+    """Return the top-level entity of a system on a board; next to a processor, the name of the block design."""
     return system.entity if board.flow == QUARTUS else f"{system.name}_{board.name}"
 
 
 def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
-    """The configuration of the top level and of its constraints."""
+    """Return the configuration of the top level and of its constraints."""
     assert system.link is not None
     clock_hz = system.link.clock_hz
     ports = {pin.port.lower() for pin in board.pins}
@@ -255,7 +255,7 @@ def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
 
 
 def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
-    """The accelerators' pins with their names and bits at the top level."""
+    """Return the accelerators' pins with their names and bits at the top level."""
     names = top_level_pins(system)
     return [
         _Port(

@@ -15,7 +15,7 @@ from fusesoc_firm.text.render import Context
 
 
 def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -> Context:
-    """The configuration; `clock` is the frequency of clk in Hz, and a processor names its clocks itself."""
+    """Return the configuration; `clock` is the frequency of clk in Hz, and a processor names its clocks itself."""
     clocks = [("clk", clock), *((item.port, item.frequency) for item in system.clocks)]
     if board.processor:
         name = PROCESSORS[str(board.processor)].timing_clock
@@ -37,5 +37,5 @@ def clocks_configuration(system: DerivedSystem, board: Board, clock: Fraction) -
 
 
 def period(frequency: Fraction) -> str:
-    """The period in ns of a frequency in Hz."""
+    """Return the period in ns of a frequency in Hz."""
     return f"{float(10**9 / frequency):.3f}"

@@ -71,7 +71,7 @@ class Wiring:
         )
 
     def _connect(self, block: Block, outgoing: Outgoing) -> bool:
-        """Make one connection; False if it is impossible, with the fault noted."""
+        """Make one connection; return False if it is impossible, with the fault noted."""
         if not self._are_known(block, outgoing):
             return False
         pairs = self._pairs(block, outgoing)
@@ -115,7 +115,7 @@ class Wiring:
         return block.name in self.outputs and name in self.inputs
 
     def _pairs(self, block: Block, outgoing: Outgoing) -> dict[Pair, frozenset[Names]]:
-        """The pairs of sides with the same message, each with the fields that this connection carries."""
+        """Return the pairs of sides with the same message, each with the fields that this connection carries."""
         gives, takes = self.outputs[block.name], self.inputs[outgoing.name]
         alike = [(given, taken) for given in gives for taken in takes if given.kind == taken.kind]
         if not alike:
@@ -142,12 +142,12 @@ class Wiring:
         return pairs
 
     def _rivals(self, outgoing: Outgoing, pair: Pair, names: Iterable[Names]) -> tuple[Names, Outgoing] | None:
-        """A field that another connection already drives, with that connection."""
+        """Return a field that another connection already drives, with that connection."""
         driven = self.driven.get(self._sink(outgoing, pair), {})
         return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
 
     def _chosen(self, block: Block, free: Sequence[Pair]) -> Pair:
-        """The first pair whose output is unused; otherwise the last pair, whose output gets another sink."""
+        """Return the first pair whose output is unused; otherwise the last pair, whose output gets another sink."""
         unused = [pair for pair in free if self._source(block, pair) not in self.sinks]
         last = free[-1][0]
         return unused[0] if unused else next(pair for pair in free if pair[0] == last)
@@ -211,7 +211,7 @@ class Wiring:
 
 
 def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
-    """The blocks of a cycle in the direction of the messages, each once; empty if there is no cycle."""
+    """Return the blocks of a cycle in the direction of the messages, each once, or an empty list if there is no cycle."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -221,13 +221,13 @@ def _cycle(graph: Mapping[str, Iterable[str]]) -> list[str]:
 
 
 def _fields(outgoing: Outgoing, given: MessageSide, taken: MessageSide) -> frozenset[Names]:
-    """The fields that go from one side to another; raises `InputError` for an unknown path."""
+    """Return the fields that go from one side to another; raise `InputError` for an unknown path."""
     chosen = select(given.frame, *(places(paths) for paths in (outgoing.include, outgoing.exclude)))
     return _names(given.frame) & _names(taken.frame) & _names(chosen)
 
 
 def places(paths: Iterable[Text]) -> Paths:
-    """The paths of `include` or `exclude`, in the form that `select` expects."""
+    """Return the paths of `include` or `exclude`, in the form that `select` expects."""
     return {path: path.source for path in paths}
 
 
@@ -240,7 +240,7 @@ def _messages(sides: Sequence[MessageSide]) -> str:
 
 
 def _what_lacks(block: Block, sides: Sequence[MessageSide], key: str) -> str:
-    """The key that is missing from an accelerator without a message at this side; empty if there is a message."""
+    """Return the key that is missing from an accelerator without a message at this side, or an empty string if there is a message."""
     return "" if sides else f"the interface of accelerator '{block.type}' has no '{key}'"
 
 

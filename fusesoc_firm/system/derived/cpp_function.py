@@ -60,12 +60,12 @@ class Argument:
 
 
 def function_name(accelerator: AcceleratorType) -> str:
-    """The C++ function's name, which is the name of the first source file without suffix."""
+    """Return the C++ function's name, which is the name of the first source file without suffix."""
     return PurePosixPath(accelerator.accelerator.sources[0]).stem
 
 
 def kernel_entity(accelerator: AcceleratorType) -> str:
-    """The name of the entity around the function: an IP or, in simulation, an entity that calls the C++ function.
+    """Return the name of the entity around the function: an IP or, in simulation, an entity that calls the C++ function.
 
     The wrapper instantiates this entity. The entity cannot have the function's name, which a module in the IP has.
     """
@@ -73,12 +73,12 @@ def kernel_entity(accelerator: AcceleratorType) -> str:
 
 
 def library_name(accelerator: AcceleratorType) -> str:
-    """The file name of the shared library that the simulation loads from its work folder."""
+    """Return the file name of the shared library that the simulation loads from its work folder."""
     return f"lib{function_name(accelerator)}.so"
 
 
 def arguments(accelerator: AcceleratorType) -> tuple[list[Argument], list[Argument]]:
-    """The function's inputs and outputs; the accelerator must have passed `check_kernel`."""
+    """Return the function's inputs and outputs; the accelerator must have passed `check_kernel`."""
     inputs = [(side, field) for side in accelerator.inputs for field in field_ports(side.frame)]
     outputs = [(side, field) for side in accelerator.outputs for field in field_ports(side.frame)]
     # `in_` becomes `x_in`, and `in1_` becomes `x_in1`.
@@ -95,7 +95,7 @@ def _arguments(fields: Sequence[tuple[MessageSide, FieldPort]], names: Sequence[
 
 
 def prototype(accelerator: AcceleratorType) -> str:
-    """The required declaration of the function."""
+    """Return the required declaration of the function."""
     inputs, outputs = arguments(accelerator)
     parameters = [f"{cpp_type(item)} {item.port}" for item in inputs]
     parameters += [f"{cpp_type(item)} *{item.port}" for item in outputs]
@@ -124,7 +124,7 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
 
 
 def _problems(frame: Frame) -> list[str]:
-    """The parts of a message that parameters cannot carry."""
+    """Return the parts of a message that parameters cannot carry."""
     try:
         check_fixed_size(frame)
     except InputError as error:
@@ -133,5 +133,5 @@ def _problems(frame: Frame) -> list[str]:
 
 
 def cpp_type(argument: Argument) -> str:
-    """The C++ type of an argument."""
+    """Return the C++ type of an argument."""
     return _CPP_TYPES[argument.field.field.type.name]

@@ -74,7 +74,7 @@ def derive(
 ) -> DerivedSystem:
     """Derive the system of a specification in `folder`; unless `needs_sources` is set, source files may be missing.
 
-    Raises `InputError` with the faults found here and the faults already in `faults`.
+    Raise `InputError` with the faults found here and the faults already in `faults`.
     """
     analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
     analysis.check_names()
@@ -118,7 +118,7 @@ def derive(
 
 
 def source_files(specification: Specification, folder: Path) -> list[Path]:
-    """The source files of all accelerators, in the order of the specification."""
+    """Return the source files of all accelerators, in the order of the specification."""
     return [folder / source for accelerator in specification.accelerators for source in accelerator.sources]
 
 
@@ -191,7 +191,7 @@ class _Analysis:
                 self.faults.error(f"'{source}' is not a source of type {accelerator.type}", source.source, hint)
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
-        """The message sides of an interface, numbered if there are several sides; None if a message has a fault."""
+        """Return the message sides of an interface, numbered if there are several sides, or None if a message has a fault."""
         frames = [self._frame(item.middleware, item.message, item.include, item.exclude) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
         sides = [
@@ -205,7 +205,7 @@ class _Analysis:
         return output_length(item, frame, self.faults) if isinstance(item, OutputType) else None
 
     def _frame(self, middleware: Text, message: Text, include: Sequence[Text], exclude: Sequence[Text]) -> Frame | None:
-        """The frame of a message's fields; None if a fault was noted, at the message's name in the specification."""
+        """Return the frame of a message's fields, or None if a fault was noted, at the message's name in the specification."""
         if not middleware or not message:
             return None
         library = self.libraries[MIDDLEWARES[middleware]]
@@ -294,7 +294,7 @@ class _Analysis:
             )
 
     def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
-        """The topics of all converters and of software in other programs; `names` are its messages' names."""
+        """Yield the topics of all converters and of software in other programs; `names` are its messages' names."""
         for name, block in self.blocks.items():
             is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
             if block.type is not None and not is_elsewhere:
@@ -306,7 +306,7 @@ class _Analysis:
                     yield TopicUse(topic, is_published, block.topic.source if block.topic else block.name.source)
 
     def wiring(self) -> Wiring:
-        """The wiring of the resolved blocks."""
+        """Return the wiring of the resolved blocks."""
         blocks = self.specification.blocks
         lost = [block for block in blocks if self.blocks.get(block.name) is not block]
         unsound = [block for block in self.blocks.values() if not block.is_sound]
@@ -324,12 +324,12 @@ class _Analysis:
         )
 
     def parts(self, connections: Sequence[Connection], names: Mapping[End, str]) -> Parts:
-        """The system in hardware and software."""
+        """Return the system in hardware and software."""
         software = self.instances(is_software=True)
         return Parting(self.blocks, software, self.inputs, self.outputs, connections, names).parts()
 
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
-        """The accelerators' blocks with known types, in hardware or in software."""
+        """Return the accelerators' blocks with known types, in hardware or in software."""
         found = [
             AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
             for block in self.blocks.values()
@@ -339,7 +339,7 @@ class _Analysis:
 
 
 def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
-    """The converters with the fields that connections carry; unconnected fields need no ports."""
+    """Return the converters with the fields that connections carry; unconnected fields need no ports."""
     names: dict[str, set[Names]] = {}
     for connection in connections:
         for sink, frame in zip(connection.sinks, connection.frames, strict=True):

@@ -55,7 +55,7 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
 
 
 def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
-    """The entity of each converter, with its block and its frame."""
+    """Yield the entity of each converter, with its block and its frame."""
     for converter in system.subscribers:
         yield subscriber_entity(converter.frame, converter.suffix), converter.block, converter.frame
     for converter in system.publishers:

@@ -13,7 +13,7 @@ _FASTEST = 10**9
 
 
 def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, faults: Diagnostics) -> Link | None:
-    """The link between the host and a system; None if the streams are ports of the system; faults are noted.
+    """Return the link between the host and a system, or None if the streams are ports of the system; faults are noted.
 
     `clock` is the frequency of clk in Hz, if it is given.
     """
@@ -30,7 +30,7 @@ def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, fa
 
 
 def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> int:
-    """The clock's frequency as an integer; 0 if it is not given."""
+    """Return the clock's frequency as an integer; 0 if it is not given."""
     if project.clock is None or clock is None:
         if project.interconnect == LinkKind.UART.value:
             faults.error(

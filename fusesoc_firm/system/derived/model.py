@@ -19,7 +19,7 @@ from fusesoc_firm.text.naming import identifier
 
 
 def absolute_name(topic: str) -> str:
-    """The name of a topic in the root namespace."""
+    """Return the name of a topic in the root namespace."""
     return topic if topic.startswith("/") else f"/{topic}"
 
 
@@ -257,12 +257,12 @@ class DerivedSystem:
     clocks: tuple[Clock, ...] = ()
 
     def clock_of(self, block: str) -> Clock | None:
-        """The clock of a block; None for the system's clock."""
+        """Return the clock of a block, or None for the system's clock."""
         name = self._accelerators[block].clock if block in self._accelerators else ""
         return next((clock for clock in self.clocks if clock.name == name), None)
 
     def width_of(self, block: str) -> int:
-        """The width of a block's streams in bits."""
+        """Return the width of a block's streams in bits."""
         return self._accelerators[block].type.width if block in self._accelerators else self.width
 
     @cached_property
@@ -290,7 +290,7 @@ class DerivedSystem:
         }
 
     def length_to(self, publisher: Converter) -> PayloadLength | None:
-        """The source from which a publisher learns the length of a payload; None if the length is constant."""
+        """Return the source from which a publisher learns the length of a payload, or None if the length is constant."""
         return next(item.length for item in self.connections if End(publisher.block) in item.sinks)
 
     @property

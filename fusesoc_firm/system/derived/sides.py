@@ -43,7 +43,7 @@ class Handshake:
 
 
 def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> list[SidePort]:
-    """The ports of a message side; `gives` tells whether its block is the source of the message.
+    """Return the ports of a message side; `gives` tells whether its block is the source of the message.
 
     With `has_valid`, the sink of a converter also learns from `msg_valid` that the message is complete. For messages of
     variable size, every sink has `msg_valid`.
@@ -60,7 +60,7 @@ def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> lis
 
 
 def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]]:
-    """All ports of an accelerator's message sides, with prefixes, in the order of the interface.
+    """Return all ports of an accelerator's message sides, with prefixes, in the order of the interface.
 
     An output's length is a port only if the accelerator provides it.
     """
@@ -79,7 +79,7 @@ def accelerator_ports(accelerator: AcceleratorType) -> list[tuple[str, SidePort]
 
 
 def handshakes(frame: Frame) -> Iterator[Handshake]:
-    """All handshakes of a message of variable size."""
+    """Yield all handshakes of a message of variable size."""
     side = message_side(frame)
     yield Handshake("", "msg_valid", "msg_ready", "segment_valid", side.segments)
     for part in side.parts:

@@ -54,7 +54,7 @@ def scheduling_of(
     publishers: Sequence[Converter],
     faults: Diagnostics,
 ) -> Scheduling:
-    """The scheduler of a system with these publishers; their `blocks` define the times, and faults are noted.
+    """Return the scheduler of a system with these publishers; their `blocks` define the times, and faults are noted.
 
     `clock` is the frequency of clk in Hz, if it is given.
     """
@@ -69,7 +69,7 @@ def scheduling_of(
 
 
 def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
-    """The publishers' tasks, in the order of the publishers' ids; raises `InputError` with all unknown times."""
+    """Return the publishers' tasks, in the order of the publishers' ids; raise `InputError` with all unknown times."""
     faults = Diagnostics()
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
@@ -84,14 +84,14 @@ def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
 
 
 def channel_of(system: DerivedSystem) -> Channel:
-    """The channel that the publishers share."""
+    """Return the channel that the publishers share."""
     from fusesoc_firm.scheduling.analysis import Channel
 
     return Channel(system.width // 8, system.scheduling.shortest_run)
 
 
 def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
-    """The bounds for each publisher under the system's scheduler, in the order of the publishers' ids.
+    """Return the bounds for each publisher under the system's scheduler, in the order of the publishers' ids.
 
     The result is empty unless all times of all publishers are known.
     """
@@ -104,7 +104,7 @@ def bounds_of(system: DerivedSystem) -> tuple[Bound, ...]:
 
 
 def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> tuple[Task, ...]:
-    """The tasks of the publishers whose times are all known."""
+    """Return the tasks of the publishers whose times are all known."""
     return tuple(
         Task(publisher.block, item.period, item.transfer_time, item.deadline or item.period)
         for publisher, item in zip(publishers, times, strict=True)
@@ -115,7 +115,7 @@ def _tasks(publishers: Iterable[Converter], times: Iterable[PublisherTimes]) -> 
 def _chosen(
     project: Project, publishers: Sequence[Converter], times: Sequence[PublisherTimes]
 ) -> tuple[str, tuple[str, ...]]:
-    """The smallest scheduler that meets all deadlines, as far as times are known, with the reasons for the choice."""
+    """Return the smallest scheduler that meets all deadlines, as far as times are known, with the reasons for the choice."""
     # Imported here, since loading NumPy takes longer than generating most systems.
     from fusesoc_firm.scheduling.analysis import Channel, Criterion, choose
 
@@ -129,23 +129,23 @@ def _chosen(
 
 
 def frame_beats(payload_bytes: int, width: int) -> int:
-    """The beats of a frame on a stream of `width` bits."""
+    """Return the beats of a frame on a stream of `width` bits."""
     return -(-(_HEADER_BYTES + payload_bytes) * 8 // width)
 
 
 def _time_bits(times: Iterable[PublisherTimes]) -> int:
-    """The width of the scheduler's time: enough for all deadlines with a frame of every other publisher in between."""
+    """Return the width of the scheduler's time: enough for all deadlines with a frame of every other publisher in between."""
     reach = max((item.deadline or 0 for item in times), default=0) + sum(item.transfer_time or 0 for item in times)
     return min(max(reach.bit_length() + _SPARE_TIME_BITS, _FEWEST_TIME_BITS), _MOST_TIME_BITS)
 
 
 def clock_frequency(project: Project, faults: Diagnostics) -> Fraction | None:
-    """The clock's frequency in Hz; None if it is missing or if a fault was noted."""
+    """Return the clock's frequency in Hz, or None if it is missing or if a fault was noted."""
     return None if project.clock is None else frequency("clock", project.clock, faults)
 
 
 def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
-    """A frequency in Hz; if the value of `key` is not a frequency, None, with the fault noted."""
+    """Return a frequency in Hz; if the value of `key` is not a frequency, None, with the fault noted."""
     found = _QUANTITY.fullmatch(text)
     hertz = Fraction(found[1]) * _HERTZ[found[2]] if found and found[2] in _HERTZ else Fraction(0)
     if not _SLOWEST <= hertz <= _FASTEST:
@@ -186,7 +186,7 @@ class _Reader:
     faults: Diagnostics
 
     def times(self, block: Block, publisher: Converter, width: int) -> PublisherTimes:
-        """A publisher's times; early times are rounded down, late times up, so rounding never hides a late frame."""
+        """Return a publisher's times; early times are rounded down, late times up, so rounding never hides a late frame."""
         period = self._cycles(block.period, "period", floor)
         transfer_time = self._cycles(block.wcet, "wcet", ceil)
         if block.wcet is None:
@@ -195,7 +195,7 @@ class _Reader:
         return PublisherTimes(period, transfer_time, deadline)
 
     def _cycles(self, time: Text | None, key: str, rounded: Rounding) -> int | None:
-        """A time in cycles; None if it is missing or if a fault was noted."""
+        """Return a time in cycles, or None if it is missing or if a fault was noted."""
         if time is None:
             return None
         found = _QUANTITY.fullmatch(time)
@@ -224,6 +224,6 @@ class _Reader:
 
 
 def _beats_at_most(publisher: Converter, width: int) -> int | None:
-    """The beats of a publisher's longest frame; None if its size is unbounded."""
+    """Return the beats of a publisher's longest frame, or None if its size is unbounded."""
     longest = publisher.buffer or length_of(publisher.frame).maximum
     return None if longest is None else frame_beats(longest, width)

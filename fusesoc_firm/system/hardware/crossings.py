@@ -73,7 +73,7 @@ class Crossing:
         return f"{self.source_width} to {self.sink_width} bits" if is_resized else ""
 
     def signals(self) -> Iterator[tuple[str, int | None]]:
-        """The declared signals: the word and the width of each signal."""
+        """Yield the declared signals: the word and the width of each signal."""
         if not self.is_clocked:
             return
         if self.frame.is_fixed_size:
@@ -90,7 +90,7 @@ class Crossing:
             yield from ((word(f"{stream}_axis", "idle"), None) for stream in scope.streams)
 
     def instances(self) -> Iterator[str]:
-        """The word in each instance's label."""
+        """Yield the word in each instance's label."""
         for scope in self.scopes:
             if self.is_clocked:
                 yield word(scope.handshake.part, "crossing")
@@ -99,28 +99,28 @@ class Crossing:
 
 
 def port_of(clock: Clock | None) -> str:
-    """The top level's port for the clock."""
+    """Return the top level's port for the clock."""
     return clock.port if clock else "clk"
 
 
 def word(part: str, name: str) -> str:
-    """A part's name joined with the name of a signal or label."""
+    """Return a part's name joined with the name of a signal or label."""
     return f"{part}_{name}" if part else name
 
 
 def parts_of(scope: Scope, scopes: Sequence[Scope]) -> list[str]:
-    """The words of the signals that tell whether a stream or an element within a scope is idle."""
+    """Return the words of the signals that tell whether a stream or an element within a scope is idle."""
     streams = [word(f"{stream}_axis", "idle") for stream in scope.streams]
     return streams + [word(item.handshake.part, "idle") for item in scopes if item.parent == scope.handshake]
 
 
 def crossings(system: DerivedSystem, connection: Connection) -> list[Crossing | None]:
-    """The crossing before each sink of a connection; None if both ends are alike."""
+    """Return the crossing before each sink of a connection, or None if both ends are alike."""
     return [_crossing(system, connection, sink) for sink in connection.sinks]
 
 
 def all_crossings(system: DerivedSystem) -> list[Crossing]:
-    """All crossings of a system, in the order of its connections."""
+    """Return all crossings of a system, in the order of its connections."""
     return [found for item in system.connections for found in crossings(system, item) if found]
 
 

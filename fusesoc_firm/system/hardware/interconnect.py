@@ -25,7 +25,7 @@ LINK_PINS = {
 
 
 def interconnect_configuration(system: DerivedSystem) -> dict[str, Any]:
-    """The streams as ports of the top level, or the link at which they end."""
+    """Return the streams as ports of the top level, or the link at which they end."""
     if system.link is None:
         return {"has_streams": True, "link": None}
     return {

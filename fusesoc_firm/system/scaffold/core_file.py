@@ -57,9 +57,9 @@ class CoreOptions:
 
 
 def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions) -> str:
-    """The text of the `.core` at `path` for a specification's system; the targets of an existing core are updated.
+    """Return the text of the `.core` at `path` for a specification's system; the targets of an existing core are updated.
 
-    The `paths` of `options` are relative to the current folder. Raises `InputError`.
+    The `paths` of `options` are relative to the current folder. May raise `InputError`.
     """
     if path.exists():
         return updated_core(loaded.system, path)
@@ -73,7 +73,7 @@ def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
-    """The text of a new `.core` for the specification `spec` next to it; raises `InputError`."""
+    """Return the text of a new `.core` for the specification `spec` next to it; may raise `InputError`."""
     if fault := text_fault(options.description):
         fail(f"--description {fault[0]}", hint=fault[1])
     further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
@@ -94,7 +94,7 @@ def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
 
 
 def updated_core(system: DerivedSystem, path: Path) -> str:
-    """The text of the `.core` at `path` with current targets; raises `InputError` if it is not the core of a system."""
+    """Return the text of the `.core` at `path` with current targets; raise `InputError` if it is not the core of a system."""
     core = read_core(path)
     if not isinstance(core.data.get("generate"), dict):
         fail(f"{path} is not a core with a section 'generate'")
@@ -135,7 +135,7 @@ def _targets(system: DerivedSystem, *, is_simulated: bool, has_environment: bool
 
 
 def _simulations(system: DerivedSystem, unit: str, *, is_live: bool) -> Iterator[dict[str, object]]:
-    """The targets of simulations or live simulations; the first simulator's target has the name without a suffix.
+    """Yield the targets of simulations or live simulations; the first simulator's target has the name without a suffix.
 
     For simulators that do not read VHDL, the design unit `unit` with all subunits is translated.
     """
@@ -180,7 +180,7 @@ def _options(options: Mapping[str, str]) -> list[dict[str, str]]:
 
 
 def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, object] | None:
-    """A board's target; None if the system has kernels and the board does not support them."""
+    """Return a board's target, or None if the system has kernels and the board does not support them."""
     board = read_board(name)
     if has_kernels and board.flow != VIVADO:
         return None
@@ -209,10 +209,10 @@ def _board(system: DerivedSystem, name: str, *, has_kernels: bool) -> dict[str, 
 
 
 def _value(value: str | Sequence[str]) -> str:
-    """A word or a list of words in YAML."""
+    """Return a word or a list of words in YAML."""
     return yaml_scalar(str(value)) if isinstance(value, str) else yaml_list(map(str, value))
 
 
 def _paths(items: Sequence[str | Path]) -> str:
-    """A list on one line; an empty list gives an empty text."""
+    """Return a list on one line; an empty list gives an empty text."""
     return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

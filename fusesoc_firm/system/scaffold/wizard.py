@@ -55,7 +55,7 @@ def extend_specification(path: Path, asker: Asker, message_names: MessageNames) 
 
 
 def _style(text: str) -> YAML:
-    """A YAML writer in the style of `text`: its quotes and the indentation of its lists; new files have no quotes."""
+    """Return a YAML writer in the style of `text`: its quotes and the indentation of its lists; new files have no quotes."""
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.brace_single_entry_mapping_in_flow_sequence = True
@@ -67,7 +67,7 @@ def _style(text: str) -> YAML:
 
 
 def _word(answer: str) -> Any:
-    """An answer as a scalar, in quotes if YAML would otherwise misread the answer, alone or in a list."""
+    """Return an answer as a scalar, in quotes if YAML would otherwise misread the answer, alone or in a list."""
     if answer.isdecimal() and len(answer) <= LONGEST_NUMBER and str(int(answer)) == answer:
         # A number is also accepted as a word, and reads better without quotes.
         return int(answer)
@@ -192,7 +192,7 @@ class _Wizard:
     # --- answers ---------------------------------------------------------------------------------------------------
 
     def _words(self, section: type[Section], name: str, entry: Key) -> Sequence[str]:
-        """The completions of an answer."""
+        """Return the completions of an answer."""
         if entry.choices:
             return [str(choice) for choice in entry.choices]
         if name == "message":
@@ -211,7 +211,7 @@ class _Wizard:
         return [str(item["name"]) for item in self.content.get(name, [])]
 
     def _fault(self, draft: _Draft, name: str, entry: Key, answer: str) -> str | None:
-        """The fault in an answer that the grammar's choices do not exclude."""
+        """Return the fault in an answer that the grammar's choices do not exclude."""
         if answer and (fault := entry.rule(answer)):
             return f"'{name}' {fault[0]}; {fault[1]}"
         if entry.form == "integer" and not answer.isdecimal():
@@ -232,7 +232,7 @@ class _Draft:
     made: CommentedMap = field(default_factory=CommentedMap)
 
     def has(self, entry: Key) -> bool:
-        """Whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
+        """Return whether to ask for a key, given the answers so far: the kind of a block determines its keys."""
         if self.section is not Block or not entry.only_of:
             return True
         if entry.only_of == PUBLISHER:
@@ -240,7 +240,7 @@ class _Draft:
         return ("type" in self.made) is (entry.only_of == ACCELERATOR)
 
     def needs(self, name: str, entry: Key) -> bool:
-        """Whether a key is mandatory; the keys of a converter are optional in a block's grammar."""
+        """Return whether a key is mandatory; the keys of a converter are optional in a block's grammar."""
         return entry.is_needed(self.made) or (self.section is Block and name in CONVERTER_KEYS)
 
 

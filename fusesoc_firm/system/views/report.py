@@ -54,7 +54,7 @@ class Report:
 
 
 def report(specification: Path, loaded: LoadedSystem) -> Report:
-    """Count the lines of a system and of the specification; raises `InputError`."""
+    """Count the lines of a system and of the specification; may raise `InputError`."""
     lines: Counter[Part] = Counter()
     configuration = 0
     for item in artifacts(loaded):
@@ -73,7 +73,7 @@ def report(specification: Path, loaded: LoadedSystem) -> Report:
 
 
 def _software(loaded: LoadedSystem) -> list[Path]:
-    """The sources of software, each once."""
+    """Return the sources of software, each once."""
     sources = (source for type_ in loaded.system.software.types for source in type_.accelerator.sources)
     return [*dict.fromkeys((loaded.folder / source).resolve() for source in sources)]
 

@@ -44,7 +44,7 @@ _LANGUAGES = {
 
 
 def declares_width(accelerator: Accelerator, sources: Iterable[Path]) -> bool:
-    """Whether the accelerator is an entity with a generic WIDTH, or a module with a parameter WIDTH.
+    """Return whether the accelerator is an entity with a generic WIDTH, or a module with a parameter WIDTH.
 
     WIDTH is the width of the streams in bits. Analysis, not this module, reports unreadable sources.
     """

@@ -50,7 +50,7 @@ _SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][
 
 
 def source_fault(text: str) -> tuple[str, str] | None:
-    """The reason why `text` is not a legal name of a source file; None if it is."""
+    """Return the reason why `text` is not a legal name of a source file, or None if it is."""
     if fault := text_fault(text, LONGEST_PATH):
         return fault
     legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
@@ -232,14 +232,14 @@ class Specification(Section):
 
 
 def is_core(path: str) -> bool:
-    """Whether an item of `paths` is the name of a core."""
+    """Return whether an item of `paths` is the name of a core."""
     return _CORE.fullmatch(path) is not None
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
     """Read the specification in a file, which messages call `file`, and note all faults.
 
-    Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
+    Raise `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
     text = read_yaml(path, file, faults)
     if text.root is None or is_null(text.root):
