@@ -48,7 +48,7 @@ from fusesoc_firm.text.diagnostics import Diagnostic, Diagnostics, InputError, S
 from fusesoc_firm.text.naming import identifier
 from fusesoc_firm.text.render import Context, render
 
-# FuseSoC's file types for accelerators' languages, and the suffixes of files that are not compiled separately.
+# FuseSoC's file types by suffix, and the suffixes of files that are not compiled separately.
 _FILE_TYPES = {
     ".vhd": VHDL,
     ".vhdl": VHDL,
@@ -64,7 +64,7 @@ _INCLUDE_SUFFIXES = (".vh", ".svh")
 class LoadedSystem:
     """A specification, its folder, an optional board, and the derived system; paths are relative to the folder.
 
-    `warnings` are messages to the author of the specification.
+    `warnings` are for the author of the specification.
     """
 
     specification: Specification
@@ -79,12 +79,12 @@ class LoadedSystem:
         return [*source_files(self.specification, self.folder), *self._message_files()]
 
     def messages(self) -> list[tuple[MessageName, Definitions]]:
-        """Return each converter's message once, regardless of used fields, with its definition and all nested definitions."""
+        """Return each message of the converters once, with its definition and all nested definitions."""
         messages = dict.fromkeys((frame.ros, frame.message) for frame in self.system.frames)
         return [(message, self.libraries[ros].closure(message)) for ros, message in messages]
 
     def definitions(self) -> list[tuple[MessageLibrary, Definitions]]:
-        """Return the library of each message, including software's messages, with its definition and nested definitions."""
+        """Return each message's library, definition and nested definitions, including the messages of software."""
         types = self.system.software.types
         sides = [side.frame for type_ in types for side in (*type_.inputs, *type_.outputs)]
         frames = dict.fromkeys((*self.system.frames, *sides))
@@ -103,7 +103,7 @@ def load_system(
     board: Board | None = None,
     core_folders: CoreFolders = no_core_folders,
 ) -> LoadedSystem:
-    """Read and derive the system of a specification, on an optional board; raise `InputError` with all faults.
+    """Read a specification and derive its system, optionally for a board; raise `InputError` with all faults.
 
     Unless `needs_sources` is set, accelerators' source files may be missing. Messages in the specification's `paths`
     take precedence over messages in `libraries`.
@@ -127,7 +127,7 @@ def with_paths(
     core_folders: CoreFolders,
     faults: Diagnostics,
 ) -> dict[Middleware, MessageLibrary]:
-    """Return the libraries, with the `paths` of a specification in `folder` first.
+    """Return the libraries, in which the `paths` of a specification in `folder` take precedence.
 
     Raise `InputError` with all `faults` if one of these paths is wrong, since a wrong path leads to unknown messages.
     """
@@ -165,7 +165,7 @@ def specification_path(request: Request) -> Path:
 
 
 def inputs(request: Request, loaded: LoadedSystem) -> list[Input]:
-    """Return the specification of a request with all files that the specification uses."""
+    """Return the specification of a request, and all files that the specification uses."""
     board = [_board_path(request)] if request.parameters.get("board") else []
     return [specification_path(request), *board, *loaded.inputs()]
 
@@ -285,7 +285,7 @@ def _clock(loaded: LoadedSystem) -> Fraction:
 
 
 def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, GeneratedFile]:
-    """Return the user's VHDL and Verilog; a shared package is listed once, since a package must not be analysed twice."""
+    """Return the user's VHDL and Verilog files, each once, since tools must not analyse a shared package twice."""
     files: dict[str, GeneratedFile] = {}
     taken: set[Path] = set()
     for type_ in types:
@@ -302,7 +302,7 @@ def _sources(types: Iterable[AcceleratorType], folder: Path) -> dict[str, Genera
 
 
 def source_name(accelerator: Accelerator, source: str) -> str:
-    """Return the path of a source file in the generated core: in its accelerator's folder, as in the specification."""
+    """Return the path of a source in the generated core: the accelerator's folder, then the specification's path."""
     names = {"..": "above", "/": "root"}
     parts = [names.get(part, part) for part in PurePosixPath(source).parts]
     return str(PurePosixPath(identifier(accelerator.name), *parts))

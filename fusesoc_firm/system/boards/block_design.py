@@ -167,7 +167,10 @@ def _pins(system: DerivedSystem) -> list[Context]:
 def package_configuration(
     type_: AcceleratorType, sources: Sequence[str], system: DerivedSystem, board: Board, clock: Fraction
 ) -> Context:
-    """Return the configuration of the Vitis HLS script that makes an IP from a C++ function in `sources` next to it."""
+    """Return the configuration of the Vitis HLS script that packages a C++ function as an IP.
+
+    `sources` are next to the script.
+    """
     clocks = {item.name: item.frequency for item in system.clocks}
     fastest = max(clocks.get(block.clock, clock) for block in system.accelerators if block.type is type_)
     return {

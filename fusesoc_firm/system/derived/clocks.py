@@ -13,7 +13,7 @@ from fusesoc_firm.text.naming import identifier
 
 
 def clocks_of(specification: Specification, own: Fraction | None, faults: Diagnostics) -> tuple[Clock, ...]:
-    """Return the clocks of the specification other than clk, in the order of the specification; faults are noted.
+    """Return all clocks except clk, in the order of the specification, and note their faults.
 
     `own` is the frequency of clk in Hz, if it is known.
     """

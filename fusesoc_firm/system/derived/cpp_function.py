@@ -24,9 +24,9 @@ from fusesoc_firm.text.diagnostics import Diagnostics, InputError
 from fusesoc_firm.text.naming import distinct_identifiers, identifier
 
 AP_PORTS = ("ap_clk", "ap_rst", "ap_start", "ap_done", "ap_idle", "ap_ready")
-"""The ports of the handshake `ap_ctrl_hs`."""
+"""The ports of the `ap_ctrl_hs` handshake."""
 WORD_BITS = 32
-"""Bits of a word between the function and its kernel."""
+"""The width in bits of a word that the function and its kernel exchange."""
 _CPP_TYPES = {
     "bool": "bool",
     "float32": "float",
@@ -60,14 +60,14 @@ class Argument:
 
 
 def function_name(accelerator: AcceleratorType) -> str:
-    """Return the C++ function's name, which is the name of the first source file without suffix."""
+    """Return the C++ function's name: the name of the first source file without its suffix."""
     return PurePosixPath(accelerator.accelerator.sources[0]).stem
 
 
 def kernel_entity(accelerator: AcceleratorType) -> str:
-    """Return the name of the entity around the function: an IP or, in simulation, an entity that calls the C++ function.
+    """Return the name of the entity around the function: an IP or, in simulation, a unit that calls the function.
 
-    The wrapper instantiates this entity. The entity cannot have the function's name, which a module in the IP has.
+    The wrapper instantiates this entity. The entity cannot have the function's name, because a module in the IP has it.
     """
     return f"{function_name(accelerator)}_kernel"
 

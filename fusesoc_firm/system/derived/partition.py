@@ -1,9 +1,9 @@
 """The partition of a system into software and hardware, and the messages between the two.
 
 A specification defines the connections; the type of an accelerator decides between hardware and software. A message
-from hardware to a block in software leaves through an added publisher. A message from such a block to hardware enters
-through an added subscriber. All other messages of software stay on the host. A subscriber that feeds only software, or
-a publisher that only software feeds, is therefore not a converter.
+from hardware to a block in software leaves the hardware through an added publisher. A message from a block in software
+to hardware enters the hardware through an added subscriber. All other messages of software stay on the host. A
+subscriber that feeds only software, or a publisher that only software feeds, is therefore not a converter.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ MOST_CONVERTERS = 256
 
 @dataclass(frozen=True)
 class Parts:
-    """A partitioned system: `software`, and the hardware's blocks by name, message sides and connections.
+    """A partitioned system: the `software`, and the hardware as blocks by name, message sides and connections.
 
-    `crossings` are the added converters among these blocks, each with the message side in software that the converter
-    represents. Added converters come last, in the order of the specification's blocks.
+    `crossings` maps the name of each added converter to the message side in software that the converter represents.
+    Added converters come last, in the order of the specification's blocks.
     """
 
     blocks: Mapping[str, Block]
@@ -107,7 +107,7 @@ class Parting:
         )
 
     def _software(self, connections: tuple[Connection, ...]) -> Software:
-        """Return the host's part of the system; its publishers have only the driven fields."""
+        """Return the host's part of the system, whose publishers use only the driven fields."""
         sources = {connection.source.block for connection in connections}
         subscribers = [
             self._topic(name, self.outputs[name][0].frame) for name in self._converters(SUBSCRIBER) if name in sources
@@ -125,7 +125,7 @@ class Parting:
         return Software(tuple(self.software), tuple(subscribers), tuple(publishers), connections)
 
     def _topic(self, name: str, frame: Frame) -> Topic:
-        """Return the topic of one of the specification's converters."""
+        """Return the topic of the converter with this name in the specification."""
         return Topic(name, frame, given_name=str(self.blocks[name].topic or ""))
 
     # --- where a message is ----------------------------------------------------------------------------------------
@@ -201,7 +201,7 @@ class Parting:
         return End(self.names[end]) if end.block in self._in_software else end
 
     def _converter(self, end: End, side: MessageSide) -> Block:
-        """Return the block of the converter that represents a side; a publisher gets the block's publisher keys."""
+        """Return the block of the converter that represents a side; copy the block's publisher keys to a publisher."""
         block = self.blocks[end.block]
         made = Block(name=Text(self.names[end], block.name.source), source=block.source, places=block.places)
         if side in self.outputs[end.block]:
@@ -209,7 +209,7 @@ class Parting:
         keys = {key: getattr(block, key) for key in keys_only_of(Block, PUBLISHER)}
         leaving = [side.frame for other, side in self._leaving() if other.block == end.block]
         if side.frame.is_fixed_size and not all(frame.is_fixed_size for frame in leaving):
-            # The buffer belongs to the inputs of variable size.
+            # Only a message of variable size uses the buffer.
             del keys["buffer"]
         return replace(made, mode=Text(PUBLISHER), **keys)
 

@@ -1,4 +1,4 @@
-"""The message side of a block as ports, and the handshakes on it."""
+"""The ports and handshakes of a block's message side."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Handshake:
 
 
 def side_ports(frame: Frame, width: int, *, gives: bool, has_valid: bool) -> list[SidePort]:
-    """Return the ports of a message side; `gives` tells whether its block is the source of the message.
+    """Return the ports of a message side; `gives` tells whether the side's block is the source of the message.
 
-    With `has_valid`, the sink of a converter also learns from `msg_valid` that the message is complete. For messages of
-    variable size, every sink has `msg_valid`.
+    With `has_valid`, the side of a message of fixed size includes `msg_valid`, which signals a complete message. The
+    side of a message of variable size always includes `msg_valid`.
     """
     ports = [
         SidePort(port.name, port.width, gives is not port.is_reverse, port.comment)

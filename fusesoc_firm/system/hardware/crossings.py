@@ -40,7 +40,7 @@ class Scope:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Two different ends of a connection; the system's clock is represented as None."""
+    """A connection between two ends whose clocks or stream widths differ; None represents the system's clock."""
 
     source: End
     sink: End
@@ -62,18 +62,18 @@ class Crossing:
 
     @property
     def clocks(self) -> str:
-        """The ports of both clocks, as words; empty if they are equal."""
+        """The ports of both clocks, as text; empty if the clocks are equal."""
         return f"{port_of(self.source_clock)} to {port_of(self.sink_clock)}" if self.is_clocked else ""
 
     @property
     def widths(self) -> str:
-        """The stream widths at both ends, as words; empty if they are equal or there is no stream."""
+        """The stream widths at both ends, as text; empty if the widths are equal or there is no stream."""
         has_streams = any(scope.streams for scope in self.scopes)
         is_resized = has_streams and self.source_width != self.sink_width
         return f"{self.source_width} to {self.sink_width} bits" if is_resized else ""
 
     def signals(self) -> Iterator[tuple[str, int | None]]:
-        """Yield the declared signals: the word and the width of each signal."""
+        """Yield the word and the width of each signal to declare."""
         if not self.is_clocked:
             return
         if self.frame.is_fixed_size:
@@ -109,7 +109,7 @@ def word(part: str, name: str) -> str:
 
 
 def parts_of(scope: Scope, scopes: Sequence[Scope]) -> list[str]:
-    """Return the words of the signals that tell whether a stream or an element within a scope is idle."""
+    """Return the words for the signals that tell whether the streams and elements within a scope are idle."""
     streams = [word(f"{stream}_axis", "idle") for stream in scope.streams]
     return streams + [word(item.handshake.part, "idle") for item in scopes if item.parent == scope.handshake]
 

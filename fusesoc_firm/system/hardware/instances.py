@@ -42,7 +42,7 @@ def publisher_instance(names: Names, converter: Converter, system: DerivedSystem
 
 
 def _part_of_manager(converter: Converter, width: int) -> dict[str, int]:
-    """Return the part of the Manager's inputs that takes a publisher's frames."""
+    """Return the slice of the Manager's inputs that receives a publisher's frames."""
     number, lanes = converter.id, width // 8
     return {
         "id": number,
@@ -54,7 +54,7 @@ def _part_of_manager(converter: Converter, width: int) -> dict[str, int]:
 
 
 def _error(converter: Converter, system: DerivedSystem) -> dict[str, int]:
-    """Return the part of the system's error outputs that reports a converter's errors."""
+    """Return the slice of the system's error outputs that reports a converter's errors."""
     bit = system.error_blocks.index(converter.block)
     return {"bit": bit, "high": ERROR_CODE_BITS * (bit + 1) - 1, "low": ERROR_CODE_BITS * bit}
 

@@ -18,7 +18,7 @@ from fusesoc_firm.system.derived.sides import (
 from fusesoc_firm.system.hardware.crossings import Crossing, all_crossings
 from fusesoc_firm.text.naming import distinct_identifiers
 
-# Names in the top level and its test bench, which signals of blocks and pins must not have.
+# Names that the top level and its test bench use, which signals of blocks and pins must not have.
 _TAKEN = """
     clk rst_n id_error frame_error frame_error_code rtl u_manager u_scheduler firm work ieee std_logic_1164
     s_axis_tdata s_axis_tkeep s_axis_tvalid s_axis_tlast s_axis_tready
@@ -90,7 +90,7 @@ class Names:
         return self._signals[block, port]
 
     def at(self, end: End, port: str) -> str:
-        """Return the signal of a port of the message at an end of a connection."""
+        """Return the signal of a message's port at one end of a connection."""
         return self._signals[end.block, f"{end.prefix}{port}"]
 
     def fork(self, end: End, fork: Handshake) -> str:
@@ -98,7 +98,7 @@ class Names:
         return self._labels["u", *_fork_key(end, fork, "fork")]
 
     def forked(self, end: End, fork: Handshake, word: str) -> str:
-        """Return the signal with the `valid`, `ready` or `segment_valid` of all sinks of a fork."""
+        """Return the signal that combines `valid`, `ready` or `segment_valid` of all sinks of a fork."""
         return self._signals[_fork_key(end, fork, f"fork_{word}")]
 
     def length(self, connection: Connection) -> str:
@@ -120,7 +120,7 @@ class Names:
 
 
 def blocks(system: DerivedSystem) -> list[tuple[str, list[tuple[str, SidePort]]]]:
-    """Return each block with all signals of its message sides and their prefixes, in the order of the data flow."""
+    """Return each block with the ports of its message sides and their prefixes, in the order of the data flow."""
     blocks = []
     for converter in system.subscribers:
         ports = side_ports(converter.frame, system.width, gives=True, has_valid=True)
@@ -147,7 +147,7 @@ def is_found_out(connection: Connection) -> bool:
 
 
 def clock_names(system: DerivedSystem) -> list[str]:
-    """Return the names for further clocks: ports, resets, and the labels of the instances that make the resets."""
+    """Return the names needed for clocks besides clk: ports, resets, and the labels of the reset instances."""
     if not system.clocks:
         return []
     resets = [RELEASED, *(name for clock in system.clocks for name in (clock.reset, seen_reset(clock)))]
@@ -155,7 +155,7 @@ def clock_names(system: DerivedSystem) -> list[str]:
 
 
 def reset_label(reset: str) -> str:
-    """Return the label of the instance that makes a reset."""
+    """Return the label of the instance that generates a reset."""
     return f"u_{reset.removesuffix('_n')}"
 
 

@@ -17,7 +17,7 @@ from fusesoc_firm.text.render import Context
 
 
 def python_skeleton(type_: AcceleratorType) -> Context:
-    """Return the configuration of the function's first version."""
+    """Return the template configuration of the function's first version."""
     parameters = parameter_names(type_)
     count = len(type_.outputs)
     answers = ["answer"] if count == 1 else [f"answer{number}" for number in range(count)]
@@ -34,7 +34,7 @@ def python_skeleton(type_: AcceleratorType) -> Context:
 
 
 def _described(name: str, frame: Frame) -> Context:
-    """Return a message, and the used fields with their types."""
+    """Return a message with its used fields and their types."""
     fields = dict(_fields(frame.nodes, "", 0))
     return {
         "name": name,
@@ -44,7 +44,7 @@ def _described(name: str, frame: Frame) -> Context:
 
 
 def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str, str]]:
-    """Yield the leaves of nodes below `above`, an element at the end of a path of `depth` names."""
+    """Yield the path, relative to an element `depth` names deep, and the type of each leaf below `above`."""
     for node in nodes:
         match node:
             case Fixed(fields=leaves):
@@ -70,7 +70,7 @@ def _size(path: Path) -> str:
 
 
 def _values(frame: Frame) -> list[Context]:
-    """Return the defaults of all used fields."""
+    """Return the default of each used field."""
     message = decode(frame, encode_used(with_names_in_use(frame, ()), {}))
     return [{"field": name, "value": _literal(value)} for name, value in used_part(message, frame).items()]
 

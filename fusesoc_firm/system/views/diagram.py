@@ -113,5 +113,5 @@ def _with(streams: Iterable[str]) -> str:
 
 
 def _node(block: str) -> str:
-    """Return the node name of a block, distinct from host and Manager, and without a colon, which marks a port in DOT."""
+    """Return a block's node name: distinct from host and Manager, and without a colon, which marks a port in DOT."""
     return f"block {quote(block, safe=' ')}"

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def derived_description(system: DerivedSystem) -> dict[str, Any]:
-    """Converters, accelerators and all connections between two ports, as `block/port`."""
+    """Return the converters, accelerators and all connections as plain data, with ports written as `block/port`."""
     pins = top_level_pins(system)
     return {
         "System": {
@@ -74,7 +74,7 @@ def derived_description(system: DerivedSystem) -> dict[str, Any]:
 
 
 def counts(system: DerivedSystem) -> str:
-    """Return the number of blocks of each kind in a system, in words."""
+    """Return a phrase with the number of blocks of each kind in a system."""
     found = [
         (len(system.subscribers), "subscriber"),
         (len(system.accelerators), "accelerator"),
@@ -100,7 +100,7 @@ def _domain(system: DerivedSystem, block: AcceleratorBlock) -> dict[str, Any]:
 
 
 def _crossings(system: DerivedSystem) -> dict[str, Any]:
-    """Return the differences between the ends of a connection."""
+    """Return the differences in clock and width between the two ends of each crossing."""
     found = []
     for item in all_crossings(system):
         ends = {"from": _side(item.source), "to": _side(item.sink)}
@@ -190,7 +190,7 @@ def _payload_bytes(frame: Frame) -> int | str:
 
 
 def _length(publisher: Converter, length: PayloadLength | None) -> dict[str, Any]:
-    """Return the source from which a publisher learns the length of a payload, with the reason, and the size of the buffer."""
+    """Return the source of a payload's length for a publisher, with the reason for the choice, and the buffer size."""
     if length is None:
         return {}
     buffer = {"buffer": publisher.buffer} if publisher.buffer else {}
@@ -211,7 +211,7 @@ def _times(times: PublisherTimes) -> dict[str, int]:
 
 
 def _bound(bound: Bound | None) -> dict[str, int | str]:
-    """Return the bounds on a publisher's frames, and the bytes that its accelerator may have to store if a frame is late."""
+    """Return the bounds for a publisher's frames, and the number of bytes that its accelerator may have to store."""
     if bound is None:
         return {}
     if bound.response is None or bound.lateness is None or bound.buffer is None:

@@ -20,7 +20,7 @@ from fusesoc_firm.text.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
 from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 
-# The type of an accelerator that is a function on the host.
+# The type of an accelerator that is a function in software.
 SOFTWARE = "ROS-SW"
 # The types of accelerators, with the suffixes of their source files.
 SOURCE_SUFFIXES = {
@@ -50,7 +50,7 @@ _SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][
 
 
 def source_fault(text: str) -> tuple[str, str] | None:
-    """Return the reason why `text` is not a legal name of a source file, or None if it is."""
+    """Return the reason why `text` is not a legal name of a source file, or None if the name is legal."""
     if fault := text_fault(text, LONGEST_PATH):
         return fault
     legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
@@ -161,7 +161,7 @@ class Accelerator(Section):
 
 @dataclass(frozen=True)
 class Outgoing(Section):
-    """A connection from the block that contains it."""
+    """A connection from the block whose section contains it."""
 
     name: Text = key("the block that receives the message", is_required=True)
     include: tuple[Text, ...] = key(**_INCLUDE)
@@ -206,7 +206,7 @@ class Block(Section):
 
 @dataclass(frozen=True)
 class Specification(Section):
-    """The whole file."""
+    """The contents of a specification file."""
 
     project: Project = key("settings of the whole system", form="section", section=Project, is_required=True)
     paths: tuple[Text, ...] = key(
@@ -215,7 +215,7 @@ class Specification(Section):
     )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
-    # From some place on, the file is invalid YAML, so any section may have more items.
+    # The file is invalid YAML from some line on, so any section may have further items.
     is_cut: bool = False
 
     @property
