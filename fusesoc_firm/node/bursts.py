@@ -6,8 +6,8 @@
             deliver(frame.id, frame.payload)
     joiner.close()
 
-An uninterrupted frame is one burst, so the class also supports a Manager without preemption. `cpp/firm/bursts.hpp` is
-the C++ version.
+Without preemption, each frame is one burst, so the class also supports a Manager without preemption.
+`cpp/firm/bursts.hpp` is the C++ version.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
 
 class BurstError(ValueError):
-    """A burst that no Manager sends. The received part of the burst's frame is dropped."""
+    """A burst that a Manager never sends; the received part of the burst's frame is dropped."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class BurstJoiner:
         """Create a joiner for a Manager with `publishers` (1 to 256) and a stream of `width` bits.
 
         A frame that announces a payload of more than `longest` bytes is rejected as soon as its header is complete,
-        before it takes memory.
+        before the joiner allocates memory for the payload.
         """
         if not 1 <= publishers <= MOST_PUBLISHERS:
             raise ValueError(f"publishers is {publishers}; legal: 1 to {MOST_PUBLISHERS}")
@@ -68,7 +68,8 @@ class BurstJoiner:
         else:
             if len(burst) <= self._beat_bytes:
                 raise BurstError(f"the burst that resumes the frame of id {identifier} holds nothing but the id")
-            # Only these bytes were inserted. They fill a beat, so that the following bytes stay in their lanes.
+            # The first beat of the burst is inserted and not part of the frame; the following bytes stay in their
+            # lanes.
             frame = begun
             frame += memoryview(burst)[self._beat_bytes :]
         whole = self._frame_bytes(identifier, frame)
@@ -101,7 +102,7 @@ class BurstJoiner:
         return identifier
 
     def _frame_bytes(self, identifier: int, frame: bytearray) -> int | None:
-        """Return the number of bytes of the whole frame; None while its header is incomplete."""
+        """Return the number of bytes in the whole frame, or None while its header is incomplete."""
         if len(frame) < _HEADER_BYTES:
             return None
         length = int.from_bytes(frame[ID_BYTES:_HEADER_BYTES], "little")
@@ -116,9 +117,9 @@ class BurstJoiner:
 
 
 def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
-    """Split a frame into bursts, as the Manager does: `runs` has the beats of each burst except the last one.
+    """Split a frame into bursts, as the Manager does; `runs` lists the beats in each burst except the last.
 
-    This serves tests and models of the Manager. The meaningless bits of an extra beat are zero.
+    The function serves tests and models of the Manager. The unused bits of an extra beat are zero.
     Raise `ValueError` if a run has no beats, or if the runs have more beats than the frame.
     """
     _check_width(width)

@@ -31,7 +31,7 @@ class _Step:
 
 
 def are_steps(table: Path) -> bool:
-    """Return whether a table has lines for steps. Raise `InputError` if it cannot be read."""
+    """Return whether a table lists steps instead of routes. Raise `InputError` if it cannot be read."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             return tuple(next(csv.reader(file), ())) == COLUMNS
@@ -53,8 +53,8 @@ class _Fold:
         self._description = description
         self._steps = steps
         self._now = steps[0].time_ns if steps else 0
-        # By subscriber and number. Messages being sent stay, since simulated hardware may take them before or after
-        # that step.
+        # By subscriber and number. Messages being sent stay here, since simulated hardware may take them before or
+        # after the step `sent`.
         self._entries: dict[tuple[int, int], Entry] = {}
         # For the current frame of each publisher: the time of its last burst, and its cycles.
         self._bursts: dict[int, tuple[int, tuple[int, int] | None]] = {}
@@ -80,7 +80,7 @@ class _Fold:
             self._entries[step.converter, step.message] = Entry(
                 step.converter, step.size, step.time_ns, queued_ns=step.time_ns
             )
-        # A message received before the trace began is unknown.
+        # A message that was received before the trace began is unknown.
         elif entry := self._entries.get((step.converter, step.message)):
             self._go_on(trace, step, entry)
 

@@ -1,4 +1,4 @@
-"""`firm scheduler choose`: presents a choice in words or as data."""
+"""`firm scheduler choose`: present the choice of a scheduler as text or as data."""
 
 from __future__ import annotations
 

@@ -225,7 +225,7 @@ class Specification(Section):
 
     @property
     def middlewares(self) -> set[str]:
-        """The middlewares of the specification, by the words that the specification uses."""
+        """The names of the middlewares that the specification uses, as written there."""
         sides = [side for item in self.accelerators for side in (*item.interface.input, *item.interface.output)]
         words = [*(block.middleware for block in self.blocks), *(side.middleware for side in sides)]
         return {str(word) for word in words if word}
