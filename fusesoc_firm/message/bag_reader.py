@@ -1,11 +1,11 @@
-"""Reads recorded bags, message by message.
+"""Read recorded bags, message by message.
 
     with open_bag(path) as bag:
         for recorded in bag.messages(topics):
             ...
 
-The formats are ROS 1 bags, and ROS 2 bags as sqlite3 or MCAP, with or without compression. Only a bag's index is held
-in memory. Payloads are returned as recorded, without decoding. `definitions_in` returns the definitions that a bag
+The formats are ROS 1 bags, and ROS 2 bags in sqlite3 or MCAP, with or without compression. Only a bag's index is held
+in memory. Payloads are returned as recorded and are not decoded. `definitions_in` returns the definitions that a bag
 contains.
 """
 
@@ -50,7 +50,7 @@ _REMEDIES = {
 
 
 class Form(Enum):
-    """The format of a bag, by its name in commands."""
+    """The format of a bag; the values are the formats' names in commands."""
 
     ROS1 = "ros1"
     SQLITE3 = "sqlite3"
@@ -58,12 +58,12 @@ class Form(Enum):
 
     @property
     def ros(self) -> Middleware:
-        """The middleware of the messages."""
+        """The middleware of the messages in this format."""
         return ROS1 if self is Form.ROS1 else ROS2
 
 
 class Stream(NamedTuple):
-    """The messages of one topic and one type, with the signature and definition that the bag gives for the type.
+    """The messages of one topic and one type, with the type's signature and definition from the bag.
 
     The signature and the definition are empty if the bag does not contain them. The definition is a joint text (see
     `message/joint.py`).
@@ -76,7 +76,7 @@ class Stream(NamedTuple):
 
 
 class Recorded(NamedTuple):
-    """A recorded message: `number` counts the messages of its topic from 0, `stamp` is in ns."""
+    """A recorded message; `number` counts the messages of a topic from 0, and `stamp` is in ns."""
 
     stream: Stream
     number: int
@@ -86,7 +86,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag: its format, the number of messages of each stream, and its start time (ns)."""
+    """An open bag: its format, the number of messages in each stream, and the start time in ns."""
 
     path: Path
     form: Form
@@ -95,7 +95,7 @@ class Bag:
     _readers: Sequence[Reader] = field(repr=False)
 
     def messages(self, topics: Collection[str], stop: int | None = None) -> Iterator[Recorded]:
-        """Yield the messages of `topics` in order of time, up to but not including `stop` (ns).
+        """Yield the messages of `topics` in the order of their times, up to but not including `stop` (in ns).
 
         Raise `InputError` if the bag is damaged.
         """
@@ -117,14 +117,14 @@ class Bag:
 
 @dataclass(frozen=True)
 class BagDefinitions:
-    """The definitions in a bag: the middleware, and the distinct texts for each message."""
+    """The definitions in a bag: the middleware, and the distinct definition texts of each message."""
 
     ros: Middleware
     texts: Mapping[MessageName, tuple[str, ...]]
 
 
 def is_bag(path: Path) -> bool:
-    """Return whether a path is a bag, judged by the file's name or the folder's contents."""
+    """Return whether a path is a bag, according to the file's name or the folder's contents."""
     if path.is_dir():
         return (path / _METADATA).is_file() or any(file.suffix in _SUFFIXES[1:] for file in path.iterdir())
     return path.suffix in _SUFFIXES and path.is_file()
@@ -136,9 +136,9 @@ def bag_files(path: Path) -> list[Path]:
 
 
 def definitions_in(path: Path) -> BagDefinitions:
-    """Return the message definitions in a bag; reads only the bag's index. May raise `InputError`.
+    """Return the message definitions in a bag; only the bag's index is read. May raise `InputError`.
 
-    Types without a definition in ROS's `.msg` language are omitted.
+    Types without a definition in the `.msg` language are omitted.
     """
     files = bag_files(path)
     with in_part(files):
@@ -153,7 +153,7 @@ def _state(file: Path) -> tuple[str, int, int]:
 
 @lru_cache(maxsize=4)
 def _definitions_in(path: Path, _states: tuple[tuple[str, int, int], ...]) -> BagDefinitions:
-    """Cached `definitions_in`: every library of a process needs the definitions; `_states` invalidates the cache."""
+    """Cache `definitions_in`, since every library of a process needs the result; `_states` invalidates the cache."""
     texts: dict[MessageName, dict[str, None]] = {}
     with open_bag(path) as bag:
         for stream in bag.streams:
@@ -192,7 +192,7 @@ def _readers(path: Path) -> list[Reader]:
 
 
 def _check_journals(path: Path) -> None:
-    """Raise `ValueError` if SQLite has not yet written all messages to the file: rosbags would miss the others."""
+    """Raise `ValueError` if SQLite has not yet written all messages to the file, since rosbags would miss the rest."""
     for file in path.glob("*.db3") if path.is_dir() else [path]:
         journal = file.with_name(f"{file.name}-wal")
         if journal.exists() and journal.stat().st_size:

@@ -1,4 +1,4 @@
-"""Converts a message with its nested messages to one text, as in bags and ROS 1 connections, and back.
+"""Convert a message with its nested messages to one text, as in bags and ROS 1 connections, and back.
 
 Lines of 80 `=` separate the definitions. Each definition except the first begins with `MSG: ` and the message's name.
 """
@@ -22,14 +22,17 @@ _PARTING = re.compile(rf"^{_LINE}\s*\n\s*MSG:\s*(\S+)\s*?\n", re.MULTILINE)
 
 
 def joint_text(name: MessageName, definitions: Definitions) -> str:
-    """Return the joint text: the message first, then all others in `definitions`."""
+    """Return the joint text: the message first, then all other messages in `definitions`."""
     others = [definition for other, definition in definitions.items() if other != name]
     parts = [to_text(definitions[name]), *(f"MSG: {item.name}\n{to_text(item)}" for item in reversed(others))]
     return f"{_LINE}\n".join(parts)
 
 
 def separate_texts(name: MessageName, text: str) -> dict[MessageName, str]:
-    """Return the text of each message in a joint text of the message `name`. Raise `InputError` for a bad name."""
+    """Return the text of each message in the joint text of the message `name`.
+
+    Raise `InputError` for an illegal name.
+    """
     first, *others = _PARTING.split(text)
     pairs = zip(others[::2], others[1::2], strict=True)
     return {name: first} | {parse_name(word): part for word, part in pairs}
@@ -50,7 +53,10 @@ def signature_of_text(name: MessageName, text: str, ros: Middleware) -> str | No
 
 
 def _inner_first(definitions: Definitions) -> Iterable[MessageName]:
-    """Return the names, each after the names of that message's nested messages. May raise `CycleError`."""
+    """Return the names in an order in which nested messages precede the messages that contain them.
+
+    May raise `CycleError`.
+    """
     within = {
         name: [nested for field in definition.fields if (nested := nested_message(field.type))]
         for name, definition in definitions.items()

@@ -1,4 +1,4 @@
-"""Text with a position, so that an error can point to any part of a line."""
+"""Text with a position, so that an error can refer to any part of a line."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fusesoc_firm.text.diagnostics import SourceRef
 
 _BYTE_ORDER_MARK = "\ufeff"
-# Not str.splitlines(): editors do not end a line at a form feed or U+2028.
+# Not `str.splitlines`, which also ends lines at form feeds and U+2028, unlike editors.
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _BLANKS = re.compile(r"\s+")
 
@@ -45,12 +45,12 @@ class Piece:
         return self.part(start, max(start, len(self.text.rstrip())))
 
     def partition(self, separator: str) -> tuple[Piece, Piece]:
-        """Return the parts before and after the first `separator`, stripped; without a separator, the second part is empty."""
+        """Return the stripped parts before and after the first `separator`; without it, the second part is empty."""
         before, found, _ = self.text.partition(separator)
         return self.part(0, len(before)).strip(), self.part(len(before) + len(found)).strip()
 
     def split_word(self) -> tuple[Piece, Piece]:
-        """Return the first word and the rest, stripped."""
+        """Return the first word and the stripped rest."""
         blanks = _BLANKS.search(self.text)
         return self.partition(blanks.group()) if blanks else (self, self.part(len(self.text)))
 

@@ -25,8 +25,7 @@ def of_simulator(built: BuiltSimulator, seed: int = 1, stall_percent: int = 0) -
 
 
 def at_address(address: str) -> OpenTransport:
-    """Return a function that opens the transport `address`, such as `uart:DEVICE:BAUD`
-    (docs/reference/transports.md)."""
+    """Return a function that opens a transport; docs/reference/transports.md describes addresses."""
     return lambda listener: open_transport(address, _PACE, partial(_tell, listener))
 
 

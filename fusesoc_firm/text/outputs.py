@@ -1,4 +1,4 @@
-"""Writes the files that a user names for a command's output, and checks them before the work begins."""
+"""Write the files that a user names for a command's output, and check them before the work begins."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fusesoc_firm.text.diagnostics import fail
 
 
 def check_output(path: Path, endings: Sequence[str] = ()) -> None:
-    """Raise `InputError` if the file cannot be written or, if `endings` are given, its name has none of them.
+    """Raise `InputError` if the file cannot be written, or if its name has none of the given `endings`.
 
     The file's folder must exist, since a missing folder is usually a misspelling.
     """

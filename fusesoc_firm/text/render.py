@@ -1,8 +1,8 @@
-"""Renders strict mustache templates: where mustache would guess, rendering fails with an error.
+"""Render strict mustache templates: where mustache would guess, rendering fails with an error.
 
-Mustache was made for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks up missing keys in
-outer scopes. In hardware descriptions each of these is a fault that compiles. So chevron only parses the templates, and
-this module expands the tree by these rules:
+Mustache was designed for HTML: it escapes `<` and `&`, prints nothing for an unknown key, and looks up missing keys in
+outer scopes. In a hardware description, the result of each of these rules may compile but be wrong. Therefore chevron
+only parses the templates, and this module expands the tree by these rules:
 
 * `{{x}}` prints a string or an integer unchanged. A bool or None is an error, since neither has a standard spelling.
 * `{{comment x}}` prints a user's text, quoted for this purpose in the language given by the ending of the template's
@@ -43,12 +43,12 @@ TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
 
 
 class TemplateError(Exception):
-    """A template and its context do not match: an error in this package, never the user's."""
+    """A mismatch between a template and its context, which is an error in this package, not in the user's input."""
 
 
 @dataclass(frozen=True)
 class Rendering:
-    """A template below `TEMPLATES`, and its context."""
+    """A template below `TEMPLATES`, with its context."""
 
     template: str
     context: Mapping[str, object]
@@ -65,11 +65,11 @@ class TracedLine:
 
 
 _RECORDS: list[dict[str, Rendering]] = []
-# Private-use characters, which no template contains, enclose the place of a line.
+# Private-use characters, which templates never contain, enclose the place of a line.
 _MARK = re.compile("\ue000(?P<file>[^\ue000]*):(?P<line>\\d+):(?P<scope>[^\ue001]*)\ue001")
-# A line that is removed as a whole, regardless of the tag's expansion.
+# A line that is always removed as a whole, regardless of the tag's expansion.
 _STANDALONE = re.compile(r"[ \t]*\{\{[#^/!>][^}]*\}\}[ \t]*")
-# The start of a column, and the least number of characters before it.
+# The start of a column, and the minimum number of characters before it.
 _COLUMN = re.compile("\ue002(\\d*)\ue003")
 _PARTED = "\ue004"
 _COLUMN_KEY = re.compile(r"\|(?P<least>\d*)")
@@ -110,7 +110,7 @@ _Node = _Literal | _Value | _Section | _Partial
 class _Scope:
     """A scope for key lookup, and its path from the context's root (`ports[3]`), for messages.
 
-    `turn` has `@first` and `@last` of the innermost list around it.
+    `turn` contains `@first` and `@last` of the innermost list around the scope.
     """
 
     data: object
@@ -129,8 +129,8 @@ class _Scope:
 def render(template_name: str, context: Mapping[str, object], templates: Path = TEMPLATES) -> str:
     """Return the text of `templates/<template_name>.mustache` for `context`.
 
-    The context may contain only dict, list, str, int, bool and None. If template and context do not match, raises
-    `TemplateError`, which names template, key and scope.
+    The context may contain only dict, list, str, int, bool and None. If template and context do not match, raise
+    `TemplateError`, which names the template, the key and the scope.
     """
     try:
         _require_plain(context, "")
@@ -145,7 +145,7 @@ def render(template_name: str, context: Mapping[str, object], templates: Path = 
 
 @contextmanager
 def recorded() -> Iterator[dict[str, Rendering]]:
-    """Record every text rendered in the context, with its template and its data."""
+    """Record every text rendered within the `with` block, with its template and its data."""
     renderings: dict[str, Rendering] = {}
     _RECORDS.append(renderings)
     try:
@@ -164,7 +164,7 @@ def traced_lines(rendering: Rendering) -> list[TracedLine]:
     traced: list[TracedLine] = []
     place = (f"{name}.mustache", 1, "")
     for line, text in zip(lines, texts, strict=True):
-        # The later lines of a multi-line value, and blank lines, have no mark: they belong to the line above.
+        # The later lines of a multi-line value, and blank lines, have no mark: they share the place of the line above.
         if found := _MARK.search(line):
             place = (found["file"], int(found["line"]), found["scope"])
         traced.append(TracedLine(text, *place))
@@ -241,7 +241,7 @@ class _TracedExpansion(_Expansion):
 
 
 def _turns(section: _Section, value: object, scope: _Scope, path: str) -> Iterator[tuple[_Scope, bool]]:
-    """Yield the scopes in which a section's body is expanded, and for each whether the text is used."""
+    """Yield each scope in which a section's body is expanded, and whether the resulting text is used."""
     if section.is_inverted:
         yield scope, not _is_there(value)
     elif section.is_question or isinstance(value, bool):
@@ -298,7 +298,7 @@ def _kind(value: object) -> str:
 
 
 def _indented(text: str, indentation: str) -> str:
-    """Indent every line that is not empty."""
+    """Return a text in which every line that is not empty is indented."""
     return "\n".join(indentation + line if line.strip() else line for line in text.split("\n"))
 
 
@@ -320,7 +320,7 @@ def _in_columns(text: str) -> str:
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Yield the aligned lines of rows, in which cells alternate with the minimum length of the cell before."""
+    """Yield the aligned lines for rows, in which each cell is followed by its minimum length."""
     widths: dict[int, int] = {}
     for row in rows:
         for number, (cell, least) in enumerate(zip(row[:-1:2], row[1::2], strict=True)):
@@ -331,7 +331,7 @@ def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 
 
 def _require_plain(value: object, path: str) -> None:
-    """Raise unless `value` is plain data: values computed during rendering could not be printed beforehand."""
+    """Raise `TemplateError` unless `value` is plain data, since other values could not be printed before rendering."""
     # Exact types, since a subclass may print differently (an IntEnum does).
     if value is None or type(value) in (str, int, bool):
         return

@@ -1,7 +1,7 @@
-"""Describes the grammar of a YAML file as a JSON Schema, with which editors check and complete it.
+"""Describe the grammar of a YAML file as a JSON Schema, with which editors check and complete the file.
 
-The schema covers the same rules as the file's sections (`yaml_sections`). Unknown names are only found by reading the
-file.
+The schema covers the same rules as the file's sections (`yaml_sections`). Unknown names are found only when the file is
+read.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from fusesoc_firm.text.yaml_sections import Key, Section, keys_of
 
 Schema = dict[str, Any]
 
-# YAML may read words as numbers.
+# YAML may parse words as numbers.
 _WORD = {"type": ["string", "number", "boolean"]}
 
 
 def json_schema(section: type[Section], title: str) -> Schema:
-    """Return the schema of a file with one section, in JSON Schema's draft 2020-12."""
+    """Return the schema, in JSON Schema draft 2020-12, of a file whose content is one section."""
     definitions: dict[str, Schema] = {}
     _define(section, definitions)
     return {

@@ -16,7 +16,7 @@ REQUESTERS = (2, 4, 8, 16, 32, 64, 128, 256)
 """The numbers of accelerators in the dissertation's tables."""
 
 NANOSECONDS_PER_CYCLE = 10
-"""The number of cycles in a simulation, at the 100 MHz of section 4.3."""
+"""The clock period at the 100 MHz of section 4.3."""
 
 
 class Distribution(StrEnum):
