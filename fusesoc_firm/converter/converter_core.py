@@ -28,7 +28,7 @@ VHDL = "vhdlSource-93"
 
 
 def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], str | None]:
-    """Return the sources of a request's messages, as arguments of `MessageLibrary`: folders, environment, distribution."""
+    """Return the sources of a request's messages as arguments of `MessageLibrary`."""
     paths = request.parameters.get("paths") or []
     distro = request.parameters.get("distro")
     assert isinstance(paths, list)
@@ -37,7 +37,7 @@ def library_sources(request: Request) -> tuple[list[Path], Mapping[str, str], st
 
 
 def load(request: Request) -> LoadedRequest:
-    """Return the order of a request; may raise `InputError`."""
+    """Load the order of a request; may raise `InputError`."""
     order = order_of_request(request)
     return LoadedRequest(
         request,
@@ -62,7 +62,7 @@ def converters_core(order: Order) -> GeneratedCore:
 
 
 def constants_files(messages: Sequence[tuple[MessageName, Definitions]], prefix: str = "") -> dict[str, GeneratedFile]:
-    """Return the package of each message, without duplicates; the definitions include nested messages."""
+    """Return the package files of the messages, each once, by name; the definitions include nested messages."""
     return {
         path: GeneratedFile(render(CONSTANTS_TEMPLATE, configuration), VHDL)
         for path, configuration in constants_configurations(messages, prefix)
@@ -80,13 +80,13 @@ def constants_configurations(
 
 
 def subscriber_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
-    """`<prefix>_axis_to_<pkg>_<type>.vhd` of each frame."""
+    """Return `<prefix>_axis_to_<pkg>_<type>.vhd` for each frame."""
     entities = {subscriber_entity(frame, prefix=prefix): frame for frame in frames}
     return {f"{entity}.vhd": _file(subscriber_source(frame, width, entity)) for entity, frame in entities.items()}
 
 
 def publisher_files(frames: Iterable[Frame], width: int, prefix: str = "") -> dict[str, GeneratedFile]:
-    """`<prefix>_<pkg>_<type>_to_axis.vhd` of each frame."""
+    """Return `<prefix>_<pkg>_<type>_to_axis.vhd` for each frame."""
     entities = {publisher_entity(frame, prefix=prefix): frame for frame in frames}
     return {f"{entity}.vhd": _file(publisher_source(frame, width, entity)) for entity, frame in entities.items()}
 
@@ -109,7 +109,7 @@ def order_of_request(request: Request) -> Order:
 
 
 def _interface_files(names: Sequence[str], converter: str, vhdl: str, frame: Frame) -> dict[str, GeneratedFile]:
-    """`<name>.vhd` for each further name of a converter; `vhdl` is the converter's text."""
+    """Return `<name>.vhd` for each additional name of a converter; `vhdl` is the converter's text."""
     message = f"{frame.message} ({frame.ros.title})"
     return {
         f"{name}.vhd": GeneratedFile(

@@ -1,6 +1,6 @@
-"""The text of a message at each stage on the route from definition to hardware.
+"""The text of a message at each stage from the definition to the hardware.
 
-Each stage imports only the modules that it needs, since the user of `firm message show` waits for these imports.
+Each stage imports only the modules that it needs, so that `firm message show` starts quickly.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def stages_text(stage: str, library: MessageLibrary, type_: str, width: int) -> str:
-    """Return a message, or the messages of a service or action, at one of `STAGES`, without the final newline.
+    """Return a message, or the messages of a service or action, at one of `STAGES`, without a final newline.
 
     `width` is the width of the converters' stream in bits. May raise `InputError`.
     """
@@ -97,5 +97,5 @@ STAGES: Mapping[str, Callable[[MessageName, Definitions, int], str]] = {
     "config": _configuration,
     "vhdl": _vhdl,
 }
-"""The text of a message, with all definitions within it, for a stream of so many bits: by the stage's name."""
+"""For each stage's name, a function of a message, its definitions and the stream width that returns the text."""
 _YAML = ("frame", "config")

@@ -25,9 +25,9 @@ class CodecError(ValueError):
 
 
 class SignallingNan(float):
-    """A signalling NaN of a float32; conversion to a double, Python's float, would make it quiet.
+    """A signalling NaN of a float32, which conversion to a double, Python's float, would turn into a quiet NaN.
 
-    The value prints and calculates like any NaN; `bits` are the bits on the wire.
+    The value prints and behaves in arithmetic like any NaN; `bits` are the bits on the wire.
     """
 
     bits: int
@@ -44,7 +44,7 @@ class SignallingNan(float):
 
 
 def packed(code: str, values: Sequence[Any]) -> bytes:
-    """Pack numbers into bytes, in sequence; `code` is a `struct` format code. Raise `struct`'s errors."""
+    """Pack numbers into bytes, in sequence; `code` is a `struct` format code. May raise the errors of `struct`."""
     data = struct.pack(f"<{len(values)}{code}", *values)
     if code != "f" or SignallingNan not in {*map(type, values)}:
         return data
@@ -54,7 +54,7 @@ def packed(code: str, values: Sequence[Any]) -> bytes:
 
 
 def unpacked(code: str, data: bytes) -> Sequence[Any]:
-    """Unpack the numbers in `data`, so that `packed` returns the same bytes."""
+    """Unpack the numbers in `data`; `packed` converts them back to the same bytes."""
     numbers = struct.unpack(f"<{len(data) // struct.calcsize(code)}{code}", data)
     if code != "f" or struct.pack(f"<{len(numbers)}f", *numbers) == data:
         return numbers
@@ -63,12 +63,13 @@ def unpacked(code: str, data: bytes) -> Sequence[Any]:
 
 
 def _is_signalling(word: int) -> bool:
-    """Return whether a float32's exponent bits are all ones, and its fraction is not zero but begins with a zero."""
+    """Return whether the bits of a float32 are a signalling NaN: an exponent of ones, a fraction that begins with
+    zero."""
     return word & 0x7FC00000 == 0x7F800000 and word & 0x003FFFFF != 0
 
 
 def shown(value: object) -> str:
-    """Return the value as shown in error messages; long values are shortened."""
+    """Return the text of a value in error messages; long values are shortened."""
     return _repr.repr(value)
 
 
@@ -78,7 +79,7 @@ def dotted(names: tuple[str, ...]) -> str:
 
 
 def part_of(value: Any, part: Data | Loop, depth: int) -> Any:
-    """Return the value of `part` within `value`, or the part's default; `depth` is the number of names above `value`."""
+    """Return the value or default of `part` within `value`; `depth` is the number of names above `value`."""
     for step in part.path[depth:]:
         value = _member(value, step.name)
         if value is _MISSING:
@@ -111,13 +112,13 @@ def put_leaf(message: dict[str, Any], path: Path, elements: Iterator[Any]) -> No
 
 
 def reject_unknown(frame: Frame, message: MessageValue) -> None:
-    """Raise `CodecError` for an unknown name, unless it has no values below it."""
+    """Raise `CodecError` for an unknown name, unless there are no values below that name."""
     for names in _unknown(message, frame.names, ()):
         raise CodecError(f"{frame.message} has no field '{dotted(names)}'")
 
 
 def units_of(data: Data, text: object) -> BytesLike:
-    """Return the units of a text as sent, without count or terminator. Raise `CodecError` if the value is not a text."""
+    """Return the bytes of a text on the wire, without count and terminator. Raise `CodecError` for any other value."""
     if not isinstance(text, str):
         raise CodecError(f"'{dotted(data.names)}' takes a {data.kind.value}, not {shown(text)}")
     try:
@@ -143,13 +144,13 @@ def text_of(data: Data, units: bytes) -> str:
 
 
 def check_bound(part: Data | Loop, count: int) -> None:
-    """Raise `CodecError` if `count` exceeds the bound of the definition."""
+    """Raise `CodecError` if `count` exceeds the bound in the definition."""
     if part.bound is not None and count > part.bound:
         raise CodecError(f"'{dotted(part.names)}' holds at most {part.bound}, not {count}")
 
 
 def _member(value: Any, name: str) -> Any:
-    """Return the member `name`. A missing message has no members, since it may consist of defaults."""
+    """Return the member `name`, or None; a missing message has no members, since it may consist of defaults."""
     if value is _MISSING or not isinstance(value, Mapping):
         return _MISSING
     return value.get(name, _MISSING)
@@ -204,7 +205,7 @@ def _unknown(value: Any, known: NameTree, names: tuple[str, ...]) -> Iterator[tu
 
 
 def _leaves(value: Any, names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Yield the names of all values; empty messages and arrays without elements have none."""
+    """Yield the names on the path to each value; empty messages and arrays without elements contain no values."""
     if isinstance(value, Mapping):
         for name, inner in value.items():
             yield from _leaves(inner, (*names, str(name)))

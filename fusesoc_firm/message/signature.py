@@ -177,8 +177,7 @@ def _described_field(
 
 
 def _array_of(kind: FieldType) -> tuple[PrimitiveType | StringType | MessageType, int, int]:
-    """Return a type's element, the offset that an array adds to the element's type id, and the array's size or
-    bound."""
+    """Return a type's element, the array's offset to the element's type id, and the array's size or bound."""
     if isinstance(kind, ArrayType):
         return kind.element, _ARRAY, kind.length
     if isinstance(kind, SequenceType):

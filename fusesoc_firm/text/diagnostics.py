@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-# The limit on reported faults: in a file of a different kind, every line would be a fault.
+# The maximum number of reported faults; in a file of a different kind, every line would be a fault.
 _MOST_SHOWN = 200
 # The maximum number of characters shown around a fault, and the minimum length of a word that is shortened.
 _WIDEST = 200
