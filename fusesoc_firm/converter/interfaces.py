@@ -1,4 +1,4 @@
-"""An interface: an entity that only instantiates a converter, under the name that a configuration file gives it.
+"""An interface: an entity that only instantiates a converter, with a name from the configuration file.
 
 The wrapper's ports are read from the converter's text, so the two cannot differ. A converter can have any number of
 names.

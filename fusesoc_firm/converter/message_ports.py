@@ -181,8 +181,7 @@ class _Naming:
     taken: set[str] = field(default_factory=lambda: set(_TAKEN))
 
     def nodes(self, nodes: Sequence[Node], scope: Scope) -> None:
-        """Name the ports of all parts, including unused ones, so that names do not depend on the selection of
-        fields."""
+        """Name the ports of all parts, even of unused ones, so that names do not depend on the selection of fields."""
         for node in nodes:
             match node:
                 case Fixed(fields=fields):

@@ -63,8 +63,7 @@ def unpacked(code: str, data: bytes) -> Sequence[Any]:
 
 
 def _is_signalling(word: int) -> bool:
-    """Return whether the bits of a float32 are a signalling NaN: an exponent of ones, a fraction that begins with
-    zero."""
+    """Return whether the bits of a float32 are those of a signalling NaN."""
     return word & 0x7FC00000 == 0x7F800000 and word & 0x003FFFFF != 0
 
 
@@ -150,7 +149,7 @@ def check_bound(part: Data | Loop, count: int) -> None:
 
 
 def _member(value: Any, name: str) -> Any:
-    """Return the member `name`, or None; a missing message has no members, since it may consist of defaults."""
+    """Return the member `name`, or `_MISSING`; a missing message has no members, since it may consist of defaults."""
     if value is _MISSING or not isinstance(value, Mapping):
         return _MISSING
     return value.get(name, _MISSING)

@@ -1,4 +1,4 @@
-"""Reads a `.core` file with the positions of its contents. All other modules read cores through this one.
+"""Read a `.core` file with the positions of its contents; all other modules read cores through this module.
 
 `building` uses FuseSoC's own reader, which includes dependencies and a target's flags.
 """
@@ -26,7 +26,7 @@ class CoreFile:
 
     @cached_property
     def data(self) -> Mapping[str, Any]:
-        """The file's content with YAML's inheritance resolved; empty if it is not a mapping. May raise `InputError`."""
+        """The file's content with YAML's inheritance resolved, empty if it is not a mapping. May raise `InputError`."""
         try:
             data = data_of(self.text.root)
         except yaml.YAMLError as error:
@@ -34,13 +34,13 @@ class CoreFile:
         return data if isinstance(data, dict) else {}
 
     def section(self, name: str) -> dict[str, dict[str, Any]]:
-        """Return the items of a section by name, including empty ones. May raise `InputError`."""
+        """Return the items of a section by name, including empty items. May raise `InputError`."""
         section = self.data.get(name)
         items = section.items() if isinstance(section, dict) else ()
         return {str(key): item if isinstance(item, dict) else {} for key, item in items}
 
     def parameters(self, instance: str) -> dict[str, Any]:
-        """Return the parameters that the core gives a generator for an instance. May raise `InputError`."""
+        """Return the parameters of a generator instance in the core. May raise `InputError`."""
         parameters = self.section("generate").get(instance, {}).get("parameters")
         return parameters if isinstance(parameters, dict) else {}
 
@@ -66,7 +66,7 @@ def read_core(path: Path) -> CoreFile:
 
 @lru_cache(maxsize=8)
 def read_core_once(path: Path, _changed: int) -> CoreFile:
-    """Cached `read_core`, for a process that generates many instances of one core."""
+    """Cache `read_core`, for a process that generates many instances of one core."""
     return read_core(path)
 
 
