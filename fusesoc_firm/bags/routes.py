@@ -23,7 +23,7 @@ Message = tuple[Middleware, MessageName]
 
 @dataclass(frozen=True)
 class Route:
-    """The subscribers to a stream, and the reason if they cannot accept the stream's messages."""
+    """A stream's subscribers and, if they cannot accept the stream's messages, the reason."""
 
     subscribers: tuple[Topic, ...]
     misfit: str = ""
@@ -37,11 +37,11 @@ def renamed(topics: Iterable[AnyTopic], names: Mapping[str, str]) -> list[AnyTop
 def routes_of(
     bag: Bag, subscribers: Sequence[Topic], signatures: Mapping[Message, str] | None = None
 ) -> dict[Stream, Route]:
-    """Return the route of each stream with a route; either all streams of a topic have a route, or none has.
+    """Return the routes by stream; either all streams of a topic have a route, or none of them.
 
     A topic is routed to all subscribers with the same topic name. A subscriber whose topic is not in the bag receives
-    the only topic of its type, if there is no other subscriber like it. `signatures` contains the known signatures of
-    the system's messages. Raise `InputError` with every topic that does not fit.
+    the only topic of its type, if no other subscriber without a topic has this type. `signatures` contains the known
+    signatures of the system's messages. Raise `InputError` with every topic that does not fit.
     """
     return _Routing(bag, subscribers, signatures or {}).routes()
 
@@ -132,7 +132,7 @@ class _Routing:
 
 
 def _message(stream: Stream) -> MessageName | None:
-    """Return the message of a stream, or None if a specification cannot name it."""
+    """Return the name of a stream's message, or None if a specification cannot contain this name."""
     try:
         return parse_name(stream.type)
     except InputError:

@@ -221,7 +221,7 @@ def _file(item: object) -> str:
 
 
 def _words(item: object) -> list[str]:
-    """Return the words of a text under all flags, such as x for `target_sim ? (x)`."""
+    """Return the words of a text under all flags, such as x for `target_sim ? (x)`; rejected text is unchanged."""
     from fusesoc.capi2.exprs import parse
 
     def words(tree: Iterable[Any]) -> Iterator[str]:

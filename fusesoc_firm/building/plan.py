@@ -16,7 +16,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics, fail
 
 @dataclass(frozen=True)
 class Build:
-    """A target of a core, which is given by its full name, and the build folder."""
+    """The full name of a core, a target of the core, and the build folder."""
 
     core: str
     target: str
@@ -71,7 +71,7 @@ class Plan:
 
 
 def make_plan(cores: Sequence[str], targets: Sequence[str], build_root: Path | None = None) -> Plan:
-    """Return a plan of all targets of all cores, each once, with FuseSoC's configuration for the current folder.
+    """Return a plan of the builds of all targets of all cores, with FuseSoC's configuration for the current folder.
 
     Raise `InputError` with all unknown cores and targets.
     """

@@ -131,7 +131,7 @@ def order_of_config(path: Path, libraries: Mapping[Middleware, MessageLibrary]) 
 def _wanted(
     entry: MessageInterfaces, libraries: Mapping[Middleware, MessageLibrary], faults: Diagnostics
 ) -> Wanted | None:
-    """Return the message of an item of the file, or None if a fault was noted."""
+    """Return the requested message in an item of the file; after a fault, note it and return None."""
     if not entry.type or not entry.name:
         return None
     library = libraries[MIDDLEWARES[entry.type]]

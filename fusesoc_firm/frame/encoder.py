@@ -26,7 +26,7 @@ from fusesoc_firm.message.wire import WireType
 def encode(frame: Frame, message: MessageValue) -> bytes:
     """Return the payload of `message`; padding bytes are zero.
 
-    A missing field has its default. Arrays are lists or tuples; `uint8` arrays may also be bytes.
+    A missing field is encoded with its default. Arrays are lists or tuples; `uint8` arrays may also be bytes.
 
     Raises:
         CodecError: a field has neither value nor default, a value does not fit, or a name is unknown.

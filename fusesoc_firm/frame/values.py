@@ -27,7 +27,7 @@ class CodecError(ValueError):
 class SignallingNan(float):
     """A signalling NaN of a float32, which conversion to a double, Python's float, would turn into a quiet NaN.
 
-    The value prints and behaves in arithmetic like any NaN; `bits` are the bits on the wire.
+    The value prints and calculates like any other NaN; `bits` are the bits on the wire.
     """
 
     bits: int

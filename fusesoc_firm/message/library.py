@@ -87,7 +87,7 @@ class MessageLibrary:
         return sorted(self._store.names | self._sources.keys())
 
     def interfaces(self) -> dict[Interface, Path]:
-        """Return all known services and actions, sorted by full name, and their files."""
+        """Return the files of all known services and actions, sorted by full name."""
         return dict(sorted(self._interfaces.items(), key=lambda item: str(item[0])))
 
     def interface(self, name: MessageName, kind: InterfaceKind | None = None) -> Interface | None:

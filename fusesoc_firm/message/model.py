@@ -63,7 +63,7 @@ class StringType:
 
 @dataclass(frozen=True)
 class MessageType:
-    """A field whose type is another message."""
+    """The type of a field that contains another message."""
 
     name: MessageName
 
@@ -76,7 +76,7 @@ ElementType = PrimitiveType | StringType | MessageType
 
 @dataclass(frozen=True)
 class ArrayType:
-    """A fixed number of elements: `float64[9]`."""
+    """An array with a fixed number of elements, such as `float64[9]`."""
 
     element: ElementType
     length: int
@@ -87,7 +87,7 @@ class ArrayType:
 
 @dataclass(frozen=True)
 class SequenceType:
-    """A variable number of elements: `float64[]`, or `float64[<=9]` with a bound."""
+    """An array with a variable number of elements: `float64[]`, or `float64[<=9]` with a bound."""
 
     element: ElementType
     bound: int | None = None

@@ -99,7 +99,7 @@ class Interface:
         return MessageName(self.name.package, self.name.name + suffix)
 
     def _wrapper(self, suffix: str, text: str, file: str) -> MessageDefinition:
-        """Return a derived message; since its fields are not in the file, they refer to the start of the file."""
+        """Return a derived message; since its fields are not in the file, their place is the start of the file."""
         # The only possible fault is in the name, which the sections report.
         ignored = Diagnostics()
         definition = parse_message(text.format(self.name.name), self._suffixed(suffix), self.ros, file, ignored)

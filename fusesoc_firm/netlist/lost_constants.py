@@ -1,9 +1,9 @@
 """Find constants that GHDL 2.0 turns into zero: 64, 96, ... bits wide, with bits set only in the highest 32.
 
 In the netlist, a lost constant looks like any other zero. If the netlist contains a zero of one of these widths, a copy
-of the sources is therefore synthesised that contains probes: functions that report the values of constant expressions.
-GHDL evaluates the probes during synthesis, because all arguments are constant. The same applies to levels other than 0
-and 1.
+of the sources with probes is therefore synthesised; a probe is a function that reports the value of a constant
+expression. GHDL evaluates the probes during synthesis, because all arguments are constant. The same applies to levels
+other than 0 and 1.
 """
 
 from __future__ import annotations
@@ -426,7 +426,7 @@ class Copies:
 
 
 def refuse(lost: Sequence[tuple[str, int]]) -> None:
-    """Raise `NetlistError` if constants are lost."""
+    """Raise `NetlistError` with all lost constants, if there are any."""
     if lost:
         raise NetlistError(
             "\n".join(

@@ -209,7 +209,7 @@ class Ros1(Ros):
         self._ended.wait()
 
     def close(self) -> None:
-        """Wait until published messages have left, then end the node."""
+        """Wait until published messages have been sent, then end the node."""
         latest = time.monotonic() + _FLUSH_SECONDS
         for publisher in self._publishers.values():
             for connection in list(publisher.impl.connections):
@@ -330,7 +330,7 @@ class Ros2(Ros):
         self._executor.wake()
 
     def close(self) -> None:
-        """Wait until published messages have left, then end the node."""
+        """Wait until published messages have been sent, then end the node."""
         from rclpy.duration import Duration
 
         if self._config["is_reliable"]:

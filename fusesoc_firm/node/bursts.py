@@ -1,4 +1,4 @@
-"""Joins the bursts from a preemptive Manager into frames (docs/reference/manager.md, 'Bursts').
+"""Join the bursts from a preemptive Manager into frames (docs/reference/manager.md, 'Bursts').
 
     joiner = BurstJoiner(publishers=4, width=64)
     for burst in bursts:                    # the bytes between two `tlast` that `tkeep` marks as valid
@@ -35,7 +35,7 @@ class JoinedFrame:
 
 
 class BurstJoiner:
-    """Joins bursts by id until a frame has the length that its header announces; each stream needs its own joiner."""
+    """A joiner of bursts by id, until a frame has the length in its header; each stream needs a separate joiner."""
 
     def __init__(self, publishers: int, width: int, longest: int | None = None) -> None:
         """Create a joiner for a Manager with `publishers` (1 to 256) and a stream of `width` bits.

@@ -1,4 +1,4 @@
-"""The middleware as a node sees it, and its implementation by ROS: a process under the Python that has ROS."""
+"""A node's interface to the middleware, and the implementation for ROS: a process under ROS's Python."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Carrier(Protocol):
         """
 
     def close(self) -> None:
-        """End the carrier after all published messages have left."""
+        """End the carrier after all published messages have been sent."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class RosCarrier:
         return self._stopped.wait(timeout)
 
     def close(self) -> None:
-        """End the process after all published messages have left."""
+        """End the process after all published messages have been sent."""
         self._end(_END_SECONDS)
 
     def _send(self, kind: bytes, topic: int = 0, data: bytes = b"") -> None:

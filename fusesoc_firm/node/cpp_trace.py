@@ -1,4 +1,4 @@
-"""Converts the steps that a C++ node writes (`firm/trace.hpp`), one per line, to the table that `Trace` writes.
+"""Convert the steps that a C++ node writes (`firm/trace.hpp`), one per line, to a table like that of `Trace`.
 
     write_ways(Path("steps.csv"), Path("ways.csv"), describe(loaded))
 
@@ -47,7 +47,7 @@ def write_ways(steps: Path, table: Path, description: NodeDescription) -> None:
 
 
 class _Fold:
-    """Replays the steps into a `Trace`, with the original times."""
+    """A replay of the steps into a `Trace`, with the original times."""
 
     def __init__(self, description: NodeDescription, steps: list[_Step]) -> None:
         self._description = description

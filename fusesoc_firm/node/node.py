@@ -38,7 +38,7 @@ _MOST_REPORTS = 20
 
 
 class HardwareListener(Protocol):
-    """Receives a transport's events other than bursts; any thread may call it."""
+    """The receiver of a transport's events other than bursts; any thread may call its methods."""
 
     def taken(self, first_cycle: int, last_cycle: int) -> None:
         """Handle the event that simulated hardware took the next sent frame in these cycles of clk."""

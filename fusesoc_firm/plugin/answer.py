@@ -87,7 +87,7 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
 def answer_from_store(command: str, path: Path) -> bool:
     """Answer a hit in FuseSoC's own process; for a miss or a faulty call, write nothing and return False.
 
-    In the latter case, the generator reports the faults.
+    After a faulty call, the generator reports the faults.
     """
     run = run_of(os.getpid())
     try:
@@ -101,7 +101,7 @@ def answer_from_store(command: str, path: Path) -> bool:
 def _answer(command: str, generator: Generator, path: Path, run: str, *, is_only_looked_up: bool = False) -> None:
     """Write the core for FuseSoC's file to the current folder, report it, and store a note for recall.
 
-    Raise `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
+    May raise `InputError`. If `is_only_looked_up` is set, raise `_NotStoredError` for a miss.
     """
     start = time.monotonic()
     # The state of the code is recorded first, since its modules are imported from here on.
@@ -155,7 +155,7 @@ def obtain(
 ) -> tuple[Key, Entry]:
     """Return the key and the core for a request; the core is from the store if possible.
 
-    Raise `InputError`, and `_NotStoredError` for a miss if `is_only_looked_up`.
+    May raise `InputError`. If `is_only_looked_up` is set, raise `_NotStoredError` for a miss.
     """
 
     def build() -> Files:

@@ -125,7 +125,7 @@ def _files_behind(call: GeneratorCall, changed: Collection[Path]) -> set[Path]:
 
 
 def _request(call: GeneratorCall) -> Request | None:
-    """Return the request that FuseSoC would make, or None for other generators."""
+    """Return the request that FuseSoC would make, or None if the generator is not ours."""
     if call.generator not in GENERATORS:
         return None
     return make_request(call, GENERATORS[call.generator].parameters, message_folders)

@@ -2,7 +2,7 @@
 
 Each generator call is a separate process. FuseSoC makes the calls of a run one after another, in adjacent folders
 below `generator_cache`, which may still contain folders of earlier runs. The data that a call leaves in its folder
-therefore include the run:
+therefore include the run's id:
 
 * The messages of a core: the generator of message cores marks its folder, and the generators of other cores find that
   folder.

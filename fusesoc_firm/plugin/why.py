@@ -46,7 +46,7 @@ class Reason:
 
 @dataclass(frozen=True)
 class Names:
-    """The places of names: blocks, and fields and constants, the latter two by block and for all messages."""
+    """The places of the names of blocks, and of fields and constants, by block and for all messages together."""
 
     blocks: Mapping[str, SourceRef]
     fields: Mapping[str, Mapping[str, SourceRef]]
@@ -125,7 +125,7 @@ def reasons(rendering: Rendering, names: Names) -> list[Reason]:
 
 
 def names_of(specification: Specification | None, messages: Iterable[Message]) -> Names:
-    """Return the names in a specification and in messages, each given with all nested definitions."""
+    """Return the names in a specification and in messages, which are given with all nested definitions."""
     fields = {str(name): dict(_fields(name, definitions)) for name, definitions in messages}
     blocks: dict[str, SourceRef] = {}
     of_blocks: dict[str, dict[str, SourceRef]] = {}

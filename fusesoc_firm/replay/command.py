@@ -52,7 +52,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Target:
-    """The bag for the responses; the format is `form`, by default that of the name's ending or of the source."""
+    """The bag for the responses; without `form`, the name's ending or else the source determines the format."""
 
     path: Path
     form: Form | None = None

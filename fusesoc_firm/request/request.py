@@ -88,8 +88,8 @@ class GeneratedFile:
     """A file of a generated core.
 
     `file_type` is FuseSoC's name for the type (`vhdlSource-93`, `user`, ...), `logical_name` is the VHDL library, and
-    `copyto` is the file's place in the tool's work folder; an empty value omits the attribute. Other files include an
-    include file.
+    `copyto` is the file's place in the tool's work folder; an empty value omits the attribute. `is_include_file` marks
+    a file that other files include.
     """
 
     content: str | bytes
@@ -102,7 +102,7 @@ class GeneratedFile:
 
 @dataclass(frozen=True)
 class GeneratedCore:
-    """The core that a generator returns: files by path relative to the core, in the order for tools."""
+    """The core that a generator returns: its files by relative path, in the order in which tools read them."""
 
     description: str
     files: Mapping[str, GeneratedFile] = field(default_factory=dict)

@@ -58,7 +58,7 @@ class Overheads:
 
 
 def fixed_priority_preemptive(task: Task, higher: Sequence[Task], overheads: Overheads) -> int | None:
-    """Return the bound for a task below the tasks in `higher`, or None if these may use the channel all the time.
+    """Return the bound for a task with lower priority than `higher`, or None if `higher` may block it forever.
 
     Each request of higher priority may interrupt the task once, which costs a resumption. The blocking run is a run of
     lower priority, or the last run of the same requester's previous task, during which requests of higher priority may
@@ -99,7 +99,7 @@ def taking_turns(task: Task, others: Sequence[Task], overheads: Overheads) -> in
 
 
 def edf_by_demand(tasks: Sequence[Task], overheads: Overheads) -> float:
-    """Return the greatest lateness of any task under EDF; infinite if the tasks exceed the channel's capacity.
+    """Return the greatest lateness of any task under EDF, or infinity if the tasks exceed the channel's capacity.
 
     Shifting all deadlines by the same time does not change their order. The greatest lateness is therefore the smallest
     shift for which the processor-demand test passes, that is, the greatest excess of the demand over the time.

@@ -73,7 +73,7 @@ class _Way:
 
 @dataclass
 class Functions:
-    """The blocks with sources, sources of messages before their sinks, and the messages that wait at each end.
+    """The blocks with source files, in the order of the data flow, and the messages that wait at each end.
 
     Messages from several blocks to one end are combined in order: the first messages together, then the second, and so
     on.

@@ -59,7 +59,7 @@ class BuiltSimulator:
     words: tuple[str, ...] = field(repr=False)
 
     def command(self, *, seed: int = 1, stall_percent: int = 0) -> list[str]:
-        """Return the command to run in `folder`; `seed` determines the `stall_percent` of cycles with stalls."""
+        """Return the command to run in `folder`; `seed` selects the `stall_percent` of cycles with stalls."""
         mark = _live(self.tool).parameter
         return [*self.words, f"{mark}SEED={seed}", f"{mark}STALL_PERCENT={stall_percent}"]
 

@@ -49,7 +49,7 @@ _WORDS = ("name", "core", "marks")
 
 
 def default_root(environment: Mapping[str, str] = os.environ) -> str:
-    """Return the absolute path FUSESOC_FIRM_CACHE, by default `fusesoc_firm` in XDG_CACHE_HOME or ~/.cache."""
+    """Return the store's absolute path: FUSESOC_FIRM_CACHE, by default `fusesoc_firm` in XDG_CACHE_HOME or ~/.cache."""
     if chosen := environment.get("FUSESOC_FIRM_CACHE"):
         return os.path.abspath(os.path.expanduser(chosen))
     base = environment.get("XDG_CACHE_HOME") or "~/.cache"

@@ -173,7 +173,7 @@ def _entries(root: str, name: str) -> list[tuple[str, os.stat_result]]:
 
 @contextmanager
 def _opened(root: str, name: str, *, is_made: bool = False) -> Iterator[int]:
-    """Open a folder; with `is_made`, create it and its parents if they are missing."""
+    """Open a folder within this context and yield its handle; with `is_made`, create missing folders."""
     if is_made:
         os.makedirs(root, exist_ok=True)
     handle = os.open(root, _FOLDER)

@@ -1,4 +1,4 @@
-"""A lock on a file or folder for one process of this machine, which the system releases when the process ends.
+"""A lock on a file or folder for one process on this machine, which the system releases when the process ends.
 
 Processes on several machines that share a folder may hold the lock at the same time. `building/folder_lock.py` provides
 a lock that also excludes processes on other machines.

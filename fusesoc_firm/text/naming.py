@@ -105,7 +105,7 @@ def distinct_identifiers(names: Iterable[Sequence[str]], reserved: Iterable[str]
 
 
 def distinct_constants(names: Iterable[Sequence[str]], reserved: Iterable[str] = ()) -> list[str]:
-    """Return identifiers like `distinct_identifiers`, but in capitals and not predefined in VHDL, for constants.
+    """Return identifiers for constants like `distinct_identifiers`, but in capitals and not predefined in VHDL.
 
     `STATUS_OK` is unchanged; `ERROR` and `IN` become `ERROR_VALUE` and `IN_VALUE`.
     """

@@ -10,14 +10,14 @@ only parses the templates, and this module expands the tree by these rules:
 * `{{x-1}}` and `{{x+1}}` print an integer minus or plus a number: `std_logic_vector({{width-1}} downto 0)`.
 * A key is looked up only in the innermost scope; `../x` is `x` in the enclosing scope. The key must exist, even in
   an omitted section.
-* `{{#x}}` takes a bool (the section or nothing, same scope), a list (the section once per item), or a mapping or None
+* `{{#x}}` expects a bool (the section or nothing, same scope), a list (the section once per item), or a mapping or None
   (the section in the mapping's scope, or nothing). `{{^x}}` is the section for false, an empty list or None.
 * `{{#x?}}` is a section in the same scope, once, unless `x` is false, "", an empty list or None.
 * A list holds mappings, each the scope of its iteration, or strings and integers, which `{{.}}` prints. Within the
   section, the bools `@first` and `@last` mark the first and the last iteration.
-* `{{|}}` begins a column: in adjacent lines, the text after it is aligned. `{{|20}}` begins it after at least 20
-  characters. `{{|!}}` in a line separates it from the lines before.
-* `{{> name}}` includes `partials/name.mustache`; if the tag is alone on a line, the tag's indentation applies to every
+* `{{|}}` begins a column: in adjacent lines, the text after the tag is aligned. `{{|20}}` begins a column after at
+* least 20 characters. `{{|!}}` separates a line from the lines before it. `{{> name}}` includes
+* `partials/name.mustache`; if the tag is alone on a line, the tag's indentation applies to every
   included line.
 """
 
@@ -56,7 +56,7 @@ class Rendering:
 
 @dataclass(frozen=True)
 class TracedLine:
-    """A line of a rendered text, its line in the template file, and the scope's path in the context."""
+    """A line of rendered text, the corresponding line in the template file, and the scope's path in the context."""
 
     text: str
     template: str
@@ -303,7 +303,7 @@ def _indented(text: str, indentation: str) -> str:
 
 
 def _in_columns(text: str) -> str:
-    """Align the columns of a text; each run of lines with columns is aligned independently."""
+    """Return a text with aligned columns; each run of lines with columns is aligned independently."""
     if not _COLUMN.search(text):
         return text
     lines: list[str] = []

@@ -121,7 +121,7 @@ class _Reader:
         return section(source=source, is_sound=is_sound, places=places, **(blanks | found))
 
     def _given(self, known: dict[str, tuple[str, Key]], node: yaml.MappingNode, what: str) -> dict[str, yaml.Node]:
-        """Return the nodes of the known keys with a value, by the key's main name."""
+        """Return the value nodes of the known keys that have a value, by the keys' main names."""
         spellings = {spelling: name for name, (_, entry) in known.items() for spelling in (name, *entry.aliases)}
         given: dict[str, yaml.Node] = {}
         meant: set[str] = set()

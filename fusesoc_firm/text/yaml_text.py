@@ -233,7 +233,7 @@ def _composed_by(loader: Any, text: str, bounds: Bounds) -> yaml.Node | None:
 
 
 def _composed_above(error: yaml.MarkedYAMLError, lines: list[str]) -> yaml.Node | None:
-    """Return the root node of the lines above a fault or the construct open there, or None without a node."""
+    """Return the root node of the lines above a fault or the construct open there, or None if there is no node."""
     for mark in (error.problem_mark, error.context_mark):
         if mark is not None:
             with suppress(yaml.YAMLError, TooLargeError):

@@ -47,7 +47,7 @@ def launch(program: str, arguments: Sequence[str]) -> int:
 
 
 def _run(command: Sequence[str]) -> int:
-    """Run a command and return the exit status; if this process is terminated (by make), terminate the command."""
+    """Run a command and return the exit status; if make terminates this process, terminate the command."""
     program: subprocess.Popen[bytes] | None = None
     is_wanted = True
 

@@ -84,7 +84,7 @@ def find(program: str) -> Path | None:
 
 
 def programs_of(tool: str, options: Mapping[str, object] = MappingProxyType({})) -> tuple[str, ...]:
-    """Return the programs that Edalize's tool starts with these options, as far as known."""
+    """Return the known programs that a tool of Edalize starts with these options."""
     if tool == "nextpnr":
         return tuple(filter(None, [_NEXTPNR.get(str(options.get("arch")))]))
     if tool == "verilator" and options.get("mode") == "lint-only":

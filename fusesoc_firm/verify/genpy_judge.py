@@ -45,7 +45,7 @@ def serialise(name: MessageName, definitions: Definitions, values: Sequence[Mess
 
 
 class _Server:
-    """A running server process. Raises `EOFError` if the Python has no genpy."""
+    """A running server process. Raises `EOFError` if that Python lacks genpy."""
 
     def __init__(self, python: str) -> None:
         self._process = subprocess.Popen(
@@ -75,7 +75,10 @@ class _Server:
 
 @cache
 def _server() -> _Server | None:
-    """Return this process's server, run by the first Python with genpy, or None (on Debian, the system's Python)."""
+    """Return this process's server, or None without genpy.
+
+    The first Python with genpy (on Debian, the system's) runs the server.
+    """
     pythons = dict.fromkeys(filter(None, (sys.executable, shutil.which("python3"), "/usr/bin/python3")))
     for python in pythons:
         try:

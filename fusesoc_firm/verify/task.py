@@ -1,4 +1,4 @@
-"""Verifies one message, from its definition to a verdict: stimuli, reference, converters, simulation."""
+"""Verify one message, from its definition to a verdict: stimuli, reference, converters, simulation."""
 
 from __future__ import annotations
 

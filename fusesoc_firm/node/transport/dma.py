@@ -28,7 +28,7 @@ _NAMES = {TO_SYSTEM: "MM2S", FROM_SYSTEM: "S2MM"}
 
 
 class Control(IntFlag):
-    """Bits of a channel's control register."""
+    """The bits of a channel's control register."""
 
     RUN = 1 << 0
     RESET = 1 << 2
@@ -38,7 +38,7 @@ class Control(IntFlag):
 
 
 class Status(IntFlag):
-    """Bits of a channel's status register."""
+    """The bits of a channel's status register."""
 
     HALTED = 1 << 0
     HAS_SCATTER_GATHER = 1 << 3

@@ -22,7 +22,7 @@ _WRITE_COMBINE = "2"
 
 
 class DmaDevice(Protocol):
-    """The driver's interface to the engine; a test may implement its own."""
+    """The driver's interface to the engine, which tests may also implement."""
 
     @property
     def memory(self) -> memoryview:
@@ -30,16 +30,16 @@ class DmaDevice(Protocol):
 
     @property
     def address(self) -> int:
-        """The address of its first byte as the engine sees it."""
+        """The address of the memory's first byte, as the engine sees it."""
 
     def read(self, offset: int) -> int:
-        """Read a register, by its offset in bytes."""
+        """Return the value of the register at `offset` (in bytes)."""
 
     def write(self, offset: int, value: int) -> None:
-        """Set a register."""
+        """Set the register at `offset` (in bytes)."""
 
     def wait(self, timeout: float | None) -> None:
-        """Sleep until an unacknowledged interrupt, until the timeout, or until `end`."""
+        """Wait for an unacknowledged interrupt, the timeout (in seconds) or a call of `end`."""
 
     def end(self) -> None:
         """Wake all threads that wait, now and later."""
@@ -84,19 +84,19 @@ class LinuxDmaDevice:
 
     @property
     def address(self) -> int:
-        """The address of its first byte as the engine sees it."""
+        """The address of the memory's first byte, as the engine sees it."""
         return self._address
 
     def read(self, offset: int) -> int:
-        """Read a register, by its offset in bytes."""
+        """Return the value of the register at `offset` (in bytes)."""
         return self._registers[offset // _WORD_BYTES]
 
     def write(self, offset: int, value: int) -> None:
-        """Set a register."""
+        """Set the register at `offset` (in bytes)."""
         self._registers[offset // _WORD_BYTES] = value
 
     def wait(self, timeout: float | None) -> None:
-        """Sleep until an unacknowledged interrupt, until the timeout, or until `end`."""
+        """Wait for an unacknowledged interrupt, the timeout (in seconds) or a call of `end`."""
         if not self._has_interrupt:
             time.sleep(_POLL_SECONDS)
             return

@@ -54,7 +54,7 @@ class Taken:
 
 @dataclass(frozen=True)
 class ErrorPulse:
-    """A pulse of a converter's bit of `frame_error`, or of `id_error` if the converter is None."""
+    """A pulse of a converter's bit in `frame_error`, or of `id_error` if the converter is None."""
 
     converter: int | None
     cycle: int
@@ -297,7 +297,7 @@ class SimulatorTransport:
             return not is_busy and self._simulator.quiet >= self._pace.rest_cycles
 
     def close(self) -> None:
-        """Stop, and kill the simulator. A second call does nothing."""
+        """Close the transport and kill the simulator. A second call does nothing."""
         with self._changed:
             self._is_closed = True
             self._simulator.kill()
@@ -358,7 +358,7 @@ class SimulatorTransport:
             self._changed.notify_all()
 
     def _adapt(self, cycles: int, seconds: float) -> None:
-        """Adapt the cycles of a step to the simulator's speed."""
+        """Adapt the number of cycles in a step to the simulator's speed."""
         if cycles == self._step and seconds < _STEP_SECONDS / 2:
             self._step = min(2 * self._step, _MOST_CYCLES)
         elif seconds > 2 * _STEP_SECONDS:

@@ -28,7 +28,7 @@ Values = NDArray[np.float64]
 class Metrics:
     """All metrics of section 4.3 as arrays of shape (B,), one element for each set.
 
-    NaN if a set has no task to measure.
+    An element is NaN if its set has no task to measure.
 
     Times are in cycles.
     """

@@ -79,11 +79,11 @@ def simulate(
 ) -> Trace:
     """Simulate a model for a number of cycles after its reset, and return the trace.
 
-    `first_requests` (B, N) are the cycles of the first requests. If it is None, each requester makes its first request
-    after its usual pause. Section 4.3 does not define the first requests. This choice explains the maxima of table 4.3
-    for two accelerators; simultaneous first requests would result in maxima that are a quarter larger. Each run of a
-    task except the first run begins with `resume_beats` additional cycles, which the Manager needs to resume a burst;
-    the scheduler sees no beat in these cycles.
+    `first_requests` (B, N) are the cycles of the first requests. If `first_requests` is None, each requester makes its
+    first request after its usual pause. Section 4.3 does not define the times of the first requests. This choice
+    explains the maxima of table 4.3 for two accelerators; simultaneous first requests would result in maxima that are a
+    quarter larger. Each run of a task except the first run begins with `resume_beats` additional cycles, which the
+    Manager needs to resume a burst; the scheduler sees no beat in these cycles.
     """
     first = workload.frequencies if first_requests is None else first_requests
     environment = _Environment(workload, first, resume_beats)

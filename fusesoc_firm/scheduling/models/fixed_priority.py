@@ -19,7 +19,7 @@ class FixedPriority(ChoosingScheduler):
 class PreemptiveFixedPriority(Scheduler):
     """The preemptive scheduler, which chooses in every cycle.
 
-    A run is a sequence of consecutive beats from one requester. It cannot be interrupted until it has had
+    A run is a sequence of consecutive beats from one requester. A run cannot be interrupted until it has had
     `shortest_run` beats, the task ends, or the requester pauses.
     """
 

@@ -182,7 +182,7 @@ def on_board(specification: Specification, board: Board) -> Specification:
 
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
-    """Raise `InputError` if a system has more clocks or other pins than its board provides."""
+    """Raise `InputError` if the clocks or pins of a system and of its board do not match."""
     clocks = 1 + len(system.clocks)
     if board.processor and clocks > MOST_CLOCKS:
         fail(f"board '{board.name}' has at most {MOST_CLOCKS} clocks, including clk; the system has {clocks}")

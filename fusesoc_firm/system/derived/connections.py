@@ -143,7 +143,7 @@ class Wiring:
         return pairs
 
     def _rivals(self, outgoing: Outgoing, pair: Pair, names: Iterable[Names]) -> tuple[Names, Outgoing] | None:
-        """Return a field that another connection already drives, with that connection."""
+        """Return a field that another connection already drives, with that connection, or None."""
         driven = self.driven.get(self._sink(outgoing, pair), {})
         return next(((name, driven[name]) for name in sorted(names) if name in driven), None)
 

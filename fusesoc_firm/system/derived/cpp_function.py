@@ -1,4 +1,4 @@
-"""Accelerators written as a C++ function for high-level synthesis.
+"""Accelerators written as C++ functions for high-level synthesis.
 
 An accelerator of this type consists of a kernel with the `ap_ctrl_hs` handshake, which HLS tools generate for a
 function, and a wrapper with the message sides of an accelerator. In synthesis, the kernel is the output of the HLS
@@ -67,7 +67,8 @@ def function_name(accelerator: AcceleratorType) -> str:
 def kernel_entity(accelerator: AcceleratorType) -> str:
     """Return the name of the entity around the function: an IP or, in simulation, a unit that calls the function.
 
-    The wrapper instantiates this entity. The entity cannot have the function's name, because a module in the IP has it.
+    The wrapper instantiates this entity. The entity cannot have the function's name, because a module in the IP already
+    has this name.
     """
     return f"{function_name(accelerator)}_kernel"
 

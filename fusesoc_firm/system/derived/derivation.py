@@ -324,7 +324,7 @@ class _Analysis:
         )
 
     def parts(self, connections: Sequence[Connection], names: Mapping[End, str]) -> Parts:
-        """Return the system in hardware and software."""
+        """Return the system, partitioned into hardware and software."""
         software = self.instances(is_software=True)
         return Parting(self.blocks, software, self.inputs, self.outputs, connections, names).parts()
 

@@ -91,7 +91,7 @@ def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
 
 
 def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> PayloadLength | None:
-    """Return the source of an accelerator output's length, or None if the length is constant or faulty."""
+    """Return the source for the length of an accelerator's output, or None if it is constant or faulty."""
     if frame.is_fixed_size:
         if item.length is not None:
             message = f"'length' is given for {frame.message}, which is of fixed size"

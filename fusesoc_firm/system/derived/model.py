@@ -19,7 +19,7 @@ from fusesoc_firm.text.naming import identifier
 
 
 def absolute_name(topic: str) -> str:
-    """Return the absolute name of a topic, which is relative to the root namespace."""
+    """Return the absolute name of a topic; a relative name is resolved in the root namespace."""
     return topic if topic.startswith("/") else f"/{topic}"
 
 
@@ -151,9 +151,9 @@ class Connection:
 
 @dataclass(frozen=True)
 class PublisherTimes:
-    """The known times of a publisher, in cycles.
+    """The times of a publisher, in cycles; an unknown time is None.
 
-    These are the time between messages, the time to send a frame, and the time from a request to its deadline.
+    The times are the period between messages, the time to send a frame, and the time from a request to its deadline.
     """
 
     period: int | None
@@ -186,7 +186,7 @@ class LinkKind(Enum):
 
 @dataclass(frozen=True)
 class Link:
-    """The link between the host and the system, with the frequency of clk in Hz, 0 if unknown and not needed."""
+    """The link between the host and the system; `clock_hz` is the frequency of clk, or 0 if it is unknown."""
 
     kind: LinkKind
     clock_hz: int

@@ -143,7 +143,7 @@ class Parting:
 
     @cached_property
     def _hardware_sinks(self) -> frozenset[End]:
-        """The ends whose whole message is in hardware, even if part of the message comes from the host.
+        """The ends whose whole message is in hardware, even if the host sends part of the message.
 
         These ends are the accelerators in hardware, all sinks of accelerators in hardware, and the publishers that
         subscribers drive.

@@ -1,4 +1,4 @@
-"""An accelerator in software: a Python function that takes its messages and returns its responses.
+"""An accelerator in software: a Python function that receives messages and returns responses.
 
     def mix(message0, message1):
         return {"x": message0["x"] + message1["x"], "y": 0.0, "z": 0.0}
@@ -30,7 +30,7 @@ def function_name(type_: AcceleratorType) -> str:
 
 
 def parameter_names(type_: AcceleratorType) -> list[str]:
-    """Suggested names for the function's parameters, one for each input, in order."""
+    """Return suggested names for the function's parameters, one for each input, in order."""
     count = len(type_.inputs)
     return ["message"] if count == 1 else [f"message{number}" for number in range(count)]
 

@@ -84,7 +84,7 @@ def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
 
 
 def channel_of(system: DerivedSystem) -> Channel:
-    """Return the analysis's view of the channel that the publishers share."""
+    """Return the channel that the publishers share, for the analysis."""
     from fusesoc_firm.scheduling.analysis import Channel
 
     return Channel(system.width // 8, system.scheduling.shortest_run)
@@ -129,7 +129,7 @@ def _chosen(
 
 
 def frame_beats(payload_bytes: int, width: int) -> int:
-    """Return the beats of a frame on a stream of `width` bits."""
+    """Return the number of beats in a frame on a stream of `width` bits."""
     return -(-(_HEADER_BYTES + payload_bytes) * 8 // width)
 
 
@@ -227,6 +227,6 @@ class _Reader:
 
 
 def _beats_at_most(publisher: Converter, width: int) -> int | None:
-    """Return the beats of a publisher's longest frame, or None if its size is unbounded."""
+    """Return the number of beats in a publisher's longest frame, or None if its size is unbounded."""
     longest = publisher.buffer or length_of(publisher.frame).maximum
     return None if longest is None else frame_beats(longest, width)

@@ -146,7 +146,7 @@ def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:
 
 
 def pin_groups(names: Names, system: DerivedSystem) -> list[Context]:
-    """Return the pins of each block with pins, as ports of the top level."""
+    """Return the pins of each block that has pins, as ports of the top level."""
     return [
         {
             "block": block.block,

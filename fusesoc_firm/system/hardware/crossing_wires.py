@@ -148,7 +148,7 @@ def _variable_sides(names: Names, crossing: Crossing, scope: Scope, source: Sour
 
 
 def _stream(names: Names, crossing: Crossing, scope: Scope, stream: str, source: SourceSide) -> dict[str, Any]:
-    """Return the instance for a stream of a scope."""
+    """Return the instance for a stream within a scope."""
     part, sink = scope.handshake.part, crossing.sink
     found = {
         "label": names.crossing_label(crossing, word(f"{stream}_axis", "crossing")),

@@ -149,7 +149,7 @@ def _scopes(frame: Frame) -> list[Scope]:
 
 
 def _collect(side: MessageSide, nodes: Sequence[Node], scope: Scope) -> Iterator[Scope]:
-    """Put fields and streams into their scope, and add the nested scopes."""
+    """Add fields and streams to a scope, and yield the nested scopes."""
     for node in nodes:
         match node:
             case Fixed():

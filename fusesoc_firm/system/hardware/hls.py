@@ -49,7 +49,7 @@ def wrapper_configuration(accelerator: AcceleratorType) -> Context:
 
 
 def _kernel_port(argument: Argument) -> Context:
-    """Return a port of the kernel, where a single bit is a vector."""
+    """Return a port of the kernel, in which a single bit is also a vector."""
     is_bit = argument.field.width is None
     return {"port": argument.port, "signal": argument.signal, "bits": argument.bits, "is_bit": is_bit}
 

@@ -27,7 +27,8 @@ def verilog_bench_configuration(
 ) -> Context:
     """Return the configuration of the test bench, which includes the configuration `bench` of the VHDL test bench.
 
-    Each file has space for `frames`; `beats` limits the number of beats that wait for the end of their frame.
+    `frames` is the maximum number of frames in a file; `beats` is the maximum number of beats that wait for the end of
+    their frame.
     """
     return {
         **bench,

@@ -1,7 +1,7 @@
 """The `.core` file of a system, with all targets that the system supports.
 
 The upper part of the file is generated once; after that, the author maintains it. The targets are regenerated from a
-template, so that every system gets new targets. Targets that the author added under other names are kept.
+template, so that existing systems also receive new targets. Targets that the author added under other names are kept.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def core_text(loaded: LoadedSystem, spec: Path, path: Path, options: CoreOptions
 
 
 def new_core(system: DerivedSystem, spec: str, options: CoreOptions) -> str:
-    """Return the text of a new `.core` for the specification `spec` next to it; may raise `InputError`."""
+    """Return the text of a new `.core` for `spec`, a specification in the same folder; may raise `InputError`."""
     if fault := text_fault(options.description):
         fail(f"--description {fault[0]}", hint=fault[1])
     further = {"paths": _paths(options.paths), "distro": yaml_scalar(options.distro) if options.distro else ""}
@@ -217,5 +217,5 @@ def _value(value: str | Sequence[str]) -> str:
 
 
 def _paths(items: Sequence[str | Path]) -> str:
-    """Return a list on one line; an empty list gives an empty text."""
+    """Return a list on one line, or an empty string for an empty list."""
     return yaml_list(str(PurePosixPath(item)) for item in items) if items else ""

@@ -44,7 +44,7 @@ def _described(name: str, frame: Frame) -> Context:
 
 
 def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str, str]]:
-    """Yield the path, relative to an element `depth` names deep, and the type of each leaf below `above`."""
+    """Yield the path and type of each leaf below `above`; paths omit the first `depth` names."""
     for node in nodes:
         match node:
             case Fixed(fields=leaves):

@@ -1,4 +1,4 @@
-"""`firm system new`: builds a specification from the user's answers to questions that follow the grammar.
+"""`firm system new`: build a specification from the user's answers to questions that follow the grammar.
 
 All keys, with their meanings and legal values, come from `specification`. An existing file is extended and keeps its
 comments. In a new file, a comment explains each key at its first use.

@@ -70,7 +70,7 @@ def _draw_streams(graph: Digraph, system: DerivedSystem) -> None:
 
 
 def _draw_software(graph: Digraph, system: DerivedSystem) -> None:
-    """Draw the blocks on the host, and their messages from and to the Manager, topics, and each other."""
+    """Draw the blocks on the host, and their messages to and from the Manager, the topics and each other."""
     blocks = {block.block for block in system.software.blocks}
     for block in system.software.blocks:
         graph.node(_node(block.block), _accelerator(block), **_SOFTWARE)

@@ -76,7 +76,7 @@ class ClockDomain(Section):
 
 @dataclass(frozen=True)
 class Project(Section):
-    """Settings of the whole system."""
+    """The settings of the whole system."""
 
     name: Text = key("the system's name; the top level is <name>_system", is_required=True)
     # The dissertation's listings 6.1, 6.6 and 5.1 use three spellings.
