@@ -98,7 +98,7 @@ def _holds_texts(loop: Loop) -> bool:
 
 
 def _defaults(leaf: FrameField) -> Iterator[Scalar]:
-    """Yield the elements of an unused leaf."""
+    """Yield the values of an unused leaf's elements."""
     given = leaf.default if isinstance(leaf.default, tuple) else (0 if leaf.default is None else leaf.default,)
     values = (given[number % len(given)] for number in range(leaf.count))
     return (bool(value) if leaf.type.code == "?" else value for value in values)

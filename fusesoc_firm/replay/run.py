@@ -49,8 +49,7 @@ class Sent:
     last_cycle: int | None
 
     def latency(self, clock_hz: Fraction) -> int:
-        """Return the time in ns from the cause's first beat to the response's last, or 0 if one bypassed the
-        hardware."""
+        """Return the time in ns from the cause's first to the response's last beat; 0 if one bypassed the hardware."""
         if self.last_cycle is None or self.cause.first_cycle is None:
             return 0
         return round((self.last_cycle - self.cause.first_cycle) * 10**9 / clock_hz)

@@ -50,7 +50,7 @@ class Argument:
 
     @property
     def bits(self) -> int:
-        """The width of the kernel's port."""
+        """The width of the kernel's port in bits."""
         return self.field.width or 1
 
     @property

@@ -44,7 +44,7 @@ def _described(name: str, frame: Frame) -> Context:
 
 
 def _fields(nodes: Iterable[Node], above: str, depth: int) -> Iterator[tuple[str, str]]:
-    """Yield the path and type of each leaf below `above`; paths omit the first `depth` names."""
+    """Yield the path and type of each used leaf; a path is `above` and the leaf's names after the first `depth`."""
     for node in nodes:
         match node:
             case Fixed(fields=leaves):
