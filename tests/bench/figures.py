@@ -104,7 +104,7 @@ _METHODS = {
 _INTRODUCTION = """# {title}
 
 For readers who compare designs, versions or tools.
-After it you can look up {subject}.
+After reading it, you can look up {subject}.
 
 Written by `make bench BENCH='{parts}'`.
 [Figures](index.md) explains the terms in the tables.
