@@ -75,31 +75,33 @@ _HEADINGS = {
     "live": "Live nodes",
 }
 _METHODS = {
-    "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT are the
-        cells LUT1 to LUT6, and inverters except inverters of resets, which a slice contains. FF are FDRE, FDSE, FDCE
-        and FDPE. A design with a latch fails. The dissertation's values are LUT/FF by Vivado for an UltraScale+.""",
-    "manager": "Measured as in [Area](converters.md#area).",
-    "timing": f"""The clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
-        (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. With another seed, the
-        figures differ by some percent.""",
-    "use": "Counted in the cycle-exact models of the schedulers.",
+    "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT counts
+        the cells LUT1 to LUT6 and all inverters except inverters of resets, which a slice contains. FF counts the
+        cells FDRE, FDSE, FDCE and FDPE. A design with a latch fails. The dissertation's values are LUT/FF reported
+        by Vivado for an UltraScale+.""",
+    "manager": "LUT and FF are counted as in [Area](converters.md#area).",
+    "timing": f"""The tables list the clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and
+        nextpnr (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. With another
+        seed, the figures differ by a few percent.""",
+    "use": "The beats are counted in the cycle-exact models of the schedulers.",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
         not be delivered.""",
-    "images": """The accelerators of specs/image_pipeline and specs/sobel are measured alone, LUT/FF as in
+    "images": """The accelerators of specs/image_pipeline and specs/sobel are measured on their own: LUT/FF as in
         [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
-    "links": "Measured as in [Area](converters.md#area).",
+    "links": "LUT and FF are counted as in [Area](converters.md#area).",
     "applications": f"""Each of the [demo systems](../reference/applications.md) is measured as a whole, with its
-        streams as ports, as in [Area](converters.md#area). For ECP5, Yosys runs `{yosys.ECP5.synthesis}`, and for iCE40
-        UltraPlus `{yosys.ICE40.synthesis}`. The targets `synth_*` run the same commands with the installed Yosys.""",
-    "systems": "Time to check and generate a large system.",
-    "builds": "Time to generate many cores.",
+        streams as ports, as in [Area](converters.md#area). Yosys runs `{yosys.ECP5.synthesis}` for ECP5 and
+        `{yosys.ICE40.synthesis}` for iCE40 UltraPlus. The targets `synth_*` run the same commands with the installed
+        Yosys.""",
+    "systems": "The table lists the time to check and generate a large system.",
+    "builds": "The table lists the time to generate many cores.",
     "simulators": """The system of specs/quat2euler, with converters, Manager and accelerator, is connected to the
-        simulated host. Frames and stalls are the same in every simulator, and so are the received bytes.""",
-    "store": "The number of cores that a second run of FuseSoC generates, and its time.",
-    "replay": "`firm replay` replays bags that rosbags has written. The recorded bags are read with rosbags.",
-    "live": "[`firm live`](../how-to/run-live.md) with a running ROS.",
+        simulated host. Frames, stalls and received bytes are the same in every simulator.""",
+    "store": "The tables list the number of cores that a second run of FuseSoC generates, and the time of this run.",
+    "replay": "`firm replay` replays bags that rosbags has written. rosbags also reads the recorded bags.",
+    "live": "[`firm live`](../how-to/run-live.md) runs as a node of a running ROS.",
 }
 _INTRODUCTION = """# {title}
 
