@@ -76,9 +76,9 @@ _HEADINGS = {
 }
 _METHODS = {
     "area": f"""LUT and FF are counted after `ghdl --synth --out=verilog` and Yosys' `{yosys.SYNTHESIS}`. LUT counts
-        the cells LUT1 to LUT6 and all inverters except inverters of resets, which a slice contains. FF counts the
-        cells FDRE, FDSE, FDCE and FDPE. A design with a latch fails. The dissertation's values are LUT/FF reported
-        by Vivado for an UltraScale+.""",
+        the cells LUT1 to LUT6 and all inverters, except inverters of resets, because a slice contains these. FF
+        counts the cells FDRE, FDSE, FDCE and FDPE. A design with a latch fails. The dissertation's values are LUT/FF
+        reported by Vivado for an UltraScale+.""",
     "manager": "LUT and FF are counted as in [Area](converters.md#area).",
     "timing": f"""The tables list the clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and
         nextpnr (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. With another
@@ -108,7 +108,7 @@ _INTRODUCTION = """# {title}
 For readers who compare designs, versions or tools.
 After reading it, you can look up {subject}.
 
-Written by `make bench BENCH='{parts}'`.
+`make bench BENCH='{parts}'` writes this page.
 [Figures](index.md) explains the terms in the tables.
 """
 
@@ -143,7 +143,8 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
 def section(part: str, tables: Sequence[Table]) -> str:
     """The text of a part: heading, method, versions, tables."""
     body = "\n".join(str(table) for table in tables)
-    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{_versions(part)}\n\n{body}"
+    versions = filled(f"These figures were measured with {_versions(part)}.")
+    return f"## {_HEADINGS[part]}\n\n{filled(_METHODS[part])}\n\n{versions}\n\n{body}"
 
 
 def write(sections: Mapping[str, str]) -> None:
@@ -170,11 +171,11 @@ def _section_of(text: str, heading: str) -> str:
 def _versions(part: str) -> str:
     if part in ("systems", "store"):
         packages = ["rosbags", *(["fusesoc"] if part == "store" else [])]
-        return f"With {', '.join([f'Python {platform.python_version()}', *map(_package, packages)])}."
+        return ", ".join([f"Python {platform.python_version()}", *map(_package, packages)])
     if part == "builds":
-        return f"With Python {platform.python_version()}, {_package('fusesoc')} and two processors."
+        return f"Python {platform.python_version()}, {_package('fusesoc')} and two processors"
     if part == "use":
-        return f"With Python {platform.python_version()}, NumPy {metadata.version('numpy')}."
+        return f"Python {platform.python_version()}, NumPy {metadata.version('numpy')}"
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]
     if part == "images":
         tools += [_first_line("verilator"), f"{yowasp.PACKAGE} {yowasp.version()}"]
@@ -187,7 +188,7 @@ def _versions(part: str) -> str:
         tools += [f"{nextpnr.PACKAGE} {nextpnr.version()}"] if part == "timing" else []
     else:
         tools += [_first_line("verilator"), f"rosbags {metadata.version('rosbags')}"]
-    return f"With {', '.join(tools)}."
+    return ", ".join(tools)
 
 
 def _package(name: str) -> str:
