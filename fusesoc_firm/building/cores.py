@@ -130,7 +130,7 @@ def core_graph(core: str, target: str, inputs_of: Callable[[GeneratorCall], list
 
 
 def configuration() -> Any:
-    """Return FuseSoC's configuration for the current folder, like the command `fusesoc`."""
+    """Return FuseSoC's configuration for the current folder, as the command `fusesoc` reads it."""
     from fusesoc.config import Config
 
     return Config(path=os.environ.get("FUSESOC_CONFIG"), create_if_missing=False)

@@ -65,7 +65,7 @@ def doubts(modules: Modules) -> list[str]:
 
 
 def _mixed(parts: Instance, drivers: Mapping[int, Instance]) -> Iterator[str]:
-    """Yield the places of selections that have different constants for several of these parts on one side."""
+    """Yield the places of selections in which several of these parts have different constants at the same input."""
     constants: dict[tuple[str, int, int], list[str]] = defaultdict(list)
     for index in range(len(parts.inputs)):
         selection = _driver(parts, index, drivers)

@@ -247,7 +247,10 @@ class Source:
         yield from self._calls(sorted([*spans, *((probe.start, probe.end) for probe in assigned)]))
 
     def _first_value(self, found: re.Match[str]) -> _Probe | None:
-        """Return the probe of a declaration, or None if the value depends on parameters: GHDL runs functions itself."""
+        """Return the probe of a declaration, or None if the value depends on a function's parameters.
+
+        GHDL runs such functions itself.
+        """
         is_vector = found[3].strip().lower().startswith(_VECTORS)
         if not found[4] or not self._is_constant(*found.span(4)):
             return None

@@ -167,7 +167,7 @@ def _path(request: Request, parameter: str) -> Path:
 
 
 def _stimuli_files(path: Path) -> list[Path]:
-    """Return the files of stimuli; a bag may be a folder."""
+    """Return the files with the stimuli, which for a bag may be all files in a folder."""
     if path.is_file():
         return [path]
     # A hit must not spend time on importing the readers of rosbags.
