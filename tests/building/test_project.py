@@ -302,7 +302,7 @@ def test_tools_are_locked(project: Path, capsys: Captured, monkeypatch: pytest.M
     main(["lock", "me:p:top"])
     capsys.readouterr()
     install("GHDL 3.0.0")
-    assert locked(capsys) == ["tool ghdl: version is GHDL 3.0.0, but GHDL 2.0.0 is locked"]
+    assert locked(capsys) == ["tool ghdl: version is GHDL 3.0.0, but the lock file has GHDL 2.0.0"]
     (project / "bin" / "ghdl").unlink()
     assert locked(capsys) == ["tool ghdl is locked, but not installed"]
     # Additional installed programs do not count as a difference, either.

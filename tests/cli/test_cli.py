@@ -260,7 +260,7 @@ def test_a_fault_in_a_message_is_shown_in_its_file(tmp_path: Path, capsys: Captu
         (["message", "show", "Quaternion"], "Quaternion"),
         (
             ["message", "show", "sensor_msgs/Image", "--stage", "vhdl", "--width", "24"],
-            "a converter cannot have a stream of 24 bits",
+            "converters do not support 24-bit streams",
         ),
         (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9 bits"),
         (["message", "list", "--path", "no/such/folder"], "no/such/folder"),
@@ -416,7 +416,7 @@ def test_steps_of_a_node_in_cpp_need_its_system(capsys: Captured, tmp_path: Path
         "wall_ns,event,converter,message,bytes,first_cycle,last_cycle\n"
         "1,received,0,0,32,,\n2,sent,0,0,32,,\n3,burst,0,0,29,,\n4,published,0,0,24,,\n"
     )
-    assert "give the specification with --system SPEC" in error(capsys, "trace", str(steps))
+    assert "add the system's specification with --system SPEC" in error(capsys, "trace", str(steps))
     ways = tmp_path / "steps-ways.csv"
     assert out(capsys, "trace", str(steps), "--system", str(SPEC), "-o", str(picture)) == f"{ways}\n{picture}\n"
     assert "0,QuaternionToEuler_sub,QuaternionToEuler_pub,32,24,0,0,1,2,3," in ways.read_text(encoding="utf-8")

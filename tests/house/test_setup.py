@@ -254,8 +254,8 @@ def test_why_pip_failed_is_shown(checkout: Checkout) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ("sim TARGET=sim_vcs", ["has no target 'sim_vcs'", "it has: default, sim, sim_icarus, sim_verilator,"]),
-        ("sim TARGET=lint", ["target 'lint' of", "it has: sim, sim_icarus, sim_verilator,"]),
+        ("sim TARGET=sim_vcs", ["has no target 'sim_vcs'", "its targets: default, sim, sim_icarus, sim_verilator,"]),
+        ("sim TARGET=lint", ["target 'lint' of", "its targets: sim, sim_icarus, sim_verilator,"]),
         ("sim SYSTEM=robot:sys:no", ["unknown core 'robot:sys:no'", "cores with sim: ", "robot:sys:quat2euler:"]),
         ("bitstream BOARD=iceberg", ["has no target 'iceberg'", "icebreaker, quartus, tangnano9k, ulx3s"]),
     ],

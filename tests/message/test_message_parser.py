@@ -114,20 +114,20 @@ def test_types_of_one_version(text: str, ros: Middleware, expected: FieldType) -
         ("uint8", ROS1, "1:1 'uint8' is not followed by a name"),
         ("uint8=3", ROS1, "1:1 'uint8=3' is not followed by a name"),
         ("uint8 =3", ROS1, "1:7 the constant name is missing"),
-        ("uint8 []  data", ROS1, "1:7 a blank before '['"),
-        ("uint8 [] data", ROS2, "1:7 a blank before '['"),
-        ("uint8[2][3] x", ROS1, "1:1 multi-dimensional arrays are not supported by .msg"),
+        ("uint8 []  data", ROS1, "1:7 unexpected blank before '['"),
+        ("uint8 [] data", ROS2, "1:7 unexpected blank before '['"),
+        ("uint8[2][3] x", ROS1, "1:1 multi-dimensional arrays are not supported in .msg files"),
         ("uint8[ x", ROS2, "1:1 'uint8[' is not a type"),
-        ("uint8[-1] x", ROS1, "1:7 '-1' is not a size"),
-        ("uint8[0] x", ROS2, "1:7 '0' is not a size"),
-        ("uint8[n] x", ROS2, "1:7 'n' is not a size"),
-        ("uint8[4294967296] x", ROS1, "1:7 '4294967296' is not a size"),
-        ("uint8[<=0] x", ROS2, "1:9 '0' is not a size"),
-        ("uint8[<=-2] x", ROS2, "1:9 '-2' is not a size"),
-        ("string<=0 x", ROS2, "1:9 '0' is not a size"),
-        ("string<= x", ROS2, "1:9 '' is not a size"),
-        ("string<=10 x", ROS1, "1:7 ROS 1 has no bounds like '<=10'"),
-        ("uint8[<=3] x", ROS1, "1:7 ROS 1 has no bounds like '<=3'"),
+        ("uint8[-1] x", ROS1, "1:7 '-1' is not a legal size"),
+        ("uint8[0] x", ROS2, "1:7 '0' is not a legal size"),
+        ("uint8[n] x", ROS2, "1:7 'n' is not a legal size"),
+        ("uint8[4294967296] x", ROS1, "1:7 '4294967296' is not a legal size"),
+        ("uint8[<=0] x", ROS2, "1:9 '0' is not a legal size"),
+        ("uint8[<=-2] x", ROS2, "1:9 '-2' is not a legal size"),
+        ("string<=0 x", ROS2, "1:9 '0' is not a legal size"),
+        ("string<= x", ROS2, "1:9 '' is not a legal size"),
+        ("string<=10 x", ROS1, "1:7 ROS 1 does not support bounds such as '<=10'"),
+        ("uint8[<=3] x", ROS1, "1:7 ROS 1 does not support bounds such as '<=3'"),
         ("uint9 x", ROS2, "1:1 unknown type 'uint9'"),
         ("lower x", ROS2, "1:1 unknown type 'lower'"),
         ("pkg__a/Point x", ROS2, "1:1 unknown type 'pkg__a/Point'"),
@@ -145,12 +145,12 @@ def test_types_of_one_version(text: str, ros: Middleware, expected: FieldType) -
         ("uint8 x 5", ROS1, "1:9 unexpected '5' after field 'x'"),
         ("uint8 x more garbage", ROS2, "1:9 'more garbage' is not a value of uint8"),
         ('string s "a=b"', ROS2, "1:8 's \"a' is not a legal constant name in ROS 2"),
-        ("time T=1", ROS1, "1:1 'time' is not a type for constants"),
-        ("time T=1", ROS2, "1:1 'time' is not a type for constants"),
-        ("wstring T=1", ROS1, "1:1 'wstring' is not a type for constants"),
-        ("uint8[] T=1", ROS2, "1:1 'uint8[]' is not a type for constants"),
-        ("string<=5 T=1", ROS2, "1:1 'string<=5' is not a type for constants"),
-        ("Point P=1", ROS2, "1:1 'Point' is not a type for constants"),
+        ("time T=1", ROS1, "1:1 a constant cannot have the type 'time'"),
+        ("time T=1", ROS2, "1:1 a constant cannot have the type 'time'"),
+        ("wstring T=1", ROS1, "1:1 a constant cannot have the type 'wstring'"),
+        ("uint8[] T=1", ROS2, "1:1 a constant cannot have the type 'uint8[]'"),
+        ("string<=5 T=1", ROS2, "1:1 a constant cannot have the type 'string<=5'"),
+        ("Point P=1", ROS2, "1:1 a constant cannot have the type 'Point'"),
     ],
 )
 def test_faults(line: str, ros: Middleware, fault: str) -> None:
@@ -277,16 +277,16 @@ def test_defaults(line: str, default: Scalar | tuple[Scalar, ...]) -> None:
         ("string<=3 x 'abcd'", "1:13 ''abcd'' is not a value of string<=3"),
         ("int32[] x 1", "1:11 '1' is not a value of int32[]"),
         ("int32[] x [1", "1:11 '[1' is not a value of int32[]"),
-        ("int32[2] x [1]", "1:12 a default of 1 elements does not fit int32[2]"),
-        ("int32[<=2] x [1,2,3]", "1:14 a default of 3 elements does not fit int32[<=2]"),
+        ("int32[2] x [1]", "1:12 a default value with 1 elements does not fit int32[2]"),
+        ("int32[<=2] x [1,2,3]", "1:14 a default value with 3 elements does not fit int32[<=2]"),
         ("uint8[] x [1, 256]", "1:15 '256' is not a value of uint8"),
         ("int32[] x [1,]", "1:14 element 2 of the array is empty or not closed"),
         ('string[] x ["a" "b"]', "1:13 element 1 of the array is empty or not closed"),
         ('string[] x ["a\\", "b"]', "1:13 element 1 of the array is empty or not closed"),
         ("string[] x ['a', 'b]", "1:18 element 2 of the array is empty or not closed"),
         ("string<=2[] x ['abc']", "1:16 ''abc'' is not a value of string<=2"),
-        ("Point x 1", "1:9 a field of type my_msgs/Point has no default value"),
-        ("Point[] x []", "1:11 a field of type my_msgs/Point[] has no default value"),
+        ("Point x 1", "1:9 a field of type my_msgs/Point cannot have a default value"),
+        ("Point[] x []", "1:11 a field of type my_msgs/Point[] cannot have a default value"),
     ],
 )
 def test_faulty_defaults(line: str, fault: str) -> None:
@@ -398,8 +398,8 @@ def test_an_action_is_three_definitions() -> None:
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("int64 a", "Add.srv:1:1: error: 1 of 2 sections found"),
-        ("---\nint64 a\n---\n", "Add.srv:3:1: error: more than the 2 expected sections"),
+        ("int64 a", "Add.srv:1:1: error: the file has 1 of the 2 expected sections"),
+        ("---\nint64 a\n---\n", "Add.srv:3:1: error: the file has more than the 2 expected sections"),
     ],
 )
 def test_a_wrong_number_of_sections(text: str, fault: str) -> None:
@@ -411,4 +411,4 @@ def test_a_wrong_number_of_sections(text: str, fault: str) -> None:
 @pytest.mark.parametrize("ros", [ROS1, ROS2])
 def test_a_size_of_thousands_of_digits_is_a_fault_like_any_other(ros: Middleware) -> None:
     digits = "9" * 5000
-    assert faults(f"uint8[{digits}] x", ros) == [f"1:7 '{digits}' is not a size"]
+    assert faults(f"uint8[{digits}] x", ros) == [f"1:7 '{digits}' is not a legal size"]

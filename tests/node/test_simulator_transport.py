@@ -93,7 +93,7 @@ def test_what_cannot_be_requested(model: list[str]) -> None:
     ("frame", "message"),
     [
         (b"die", "the simulator ended with status 3; it printed:\nthe model dies"),
-        (b"garbage", "the simulator sent 0x21 where a report begins"),
+        (b"garbage", "the simulator sent 0x21 instead of the start of a report"),
         (b"half", "the simulator was killed by signal 9"),
     ],
 )

@@ -168,7 +168,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
             "def respond(block, m):\n    return [('left', {'x': 'one', 'y': 0, 'z': 0})]\n",
             (
                 "model.py:1:1: error: for message 0 to 'sub', 'respond' returned an invalid message for 'left': "
-                "'x' takes a float64, not 'one'"
+                "'x' must be of type float64, not 'one'"
             ),
         ),
         (

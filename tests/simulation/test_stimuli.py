@@ -310,6 +310,6 @@ def test_what_does_not_fit_a_message_of_variable_size(tmp_path: Path) -> None:
         (2, "'data' is a string, not a list"),
         (3, "'values' is a list, not a mapping"),
         (4, "'values[0]' has no field 'valeu'"),
-        (5, "'dimensions' holds at most 3, not 4"),
+        (5, "the length of 'dimensions' must be at most 3, not 4"),
         (6, "a std_msgs/String needs a value for data"),
     ]

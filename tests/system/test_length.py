@@ -58,14 +58,14 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             {
                 "length": "computed",
                 "because": "the lengths at the output's ports determine it",
-                "payloadBytes": "44 and more",
+                "payloadBytes": "44 or more",
             },
         ),
         (
             IMAGE,
             ", length: given",
             "",
-            {"length": "given", "because": "the specification says so", "payloadBytes": "44 and more"},
+            {"length": "given", "because": "the specification says so", "payloadBytes": "44 or more"},
         ),
         (
             IMAGE,
@@ -75,7 +75,7 @@ def described(system: DerivedSystem) -> dict[str, Any]:
                 "length": "buffered",
                 "because": "the specification says so",
                 "buffer": 5000,
-                "payloadBytes": "44 and more",
+                "payloadBytes": "44 or more",
             },
         ),
         (
@@ -86,7 +86,7 @@ def described(system: DerivedSystem) -> dict[str, Any]:
                 "length": "buffered",
                 "because": "each element of 'fields' has a length of its own, 'fields.name'",
                 "buffer": 9000,
-                "payloadBytes": "49 and more",
+                "payloadBytes": "49 or more",
             },
         ),
         ("geometry_msgs/Point", "", "", {"payloadBytes": 28}),
