@@ -30,8 +30,8 @@ class Project(Section):
 
     name: Text = key("the project's name", is_required=True)
     platform: Platform | None = key("the target hardware", form="section", section=Platform)
-    width: int = key("bits of the streams", form="integer", choices=WIDTHS, default=8)
-    prefix: Text | None = key("prefix of the names of all generated units except the interfaces, such as left")
+    width: int = key("width in bits of the streams", form="integer", choices=WIDTHS, default=8)
+    prefix: Text | None = key("prefix for the names of all generated units except the interfaces, such as left")
 
 
 @dataclass(frozen=True)

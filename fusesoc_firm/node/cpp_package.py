@@ -102,7 +102,7 @@ def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
         fail(f"the topics of '{description.name}' use {titles}, but a C++ node supports only one ROS version")
     if ros is not None and ros.number != found[0]:
         title = middleware_of(found[0]).title
-        hint = "the hardware supports one ROS version; select this version with 'middleware' in blocks and interfaces"
+        hint = "the hardware supports one ROS version; select the version with 'middleware' in blocks and interfaces"
         fail(f"the topics of '{description.name}' use {title}, not {ros.title}", hint=hint)
     return found[0]
 

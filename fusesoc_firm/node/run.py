@@ -39,7 +39,7 @@ def run_options(
     """Return the options from a command line; `ros` selects a version, if given. Raises `InputError`."""
     if ros is not None and ros not in description.versions:
         known = " and ".join(map(str, description.versions))
-        hint = "the hardware supports one ROS version; select this version with 'middleware' in blocks and interfaces"
+        hint = "the hardware supports one ROS version; select the version with 'middleware' in blocks and interfaces"
         fail(f"system '{description.name}' has no ROS {ros} topics, only topics of ROS {known}", hint=hint)
     versions = description.versions if ros is None else (ros,)
     if arguments.ros_args and 2 not in versions:

@@ -144,7 +144,7 @@ def test_a_topic_that_could_go_to_two(tmp_path: Path, kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bag_without_a_message_for_anybody(tmp_path: Path, kind: str) -> None:
     path = write(tmp_path, kind, [("/chatter", STRING, 0.0, 0)])
-    with pytest.raises(InputError, match="holds no message for p"):
+    with pytest.raises(InputError, match="contains no message for p"):
         read_stimuli(path, [subscriber("p", "geometry_msgs/Point", version(kind))])
 
 
@@ -242,7 +242,7 @@ def test_messages_in_a_journal_are_not_missed(tmp_path: Path) -> None:
         database.execute("update messages set timestamp = timestamp + 1")
         database.commit()
         for bag in (path, path / "recorded.db3"):
-            with pytest.raises(InputError, match=r"in its journal recorded\.db3-wal\n.*sqlite3 FILE 'pragma"):
+            with pytest.raises(InputError, match=r"in the journal recorded\.db3-wal\n.*sqlite3 FILE 'pragma"):
                 read_x(bag, "sqlite3")
         database.execute("pragma wal_checkpoint(truncate)")
         assert read_x(path, "sqlite3") == list(range(10))

@@ -210,7 +210,7 @@ def test_graph_as_a_picture(project: Path) -> None:
 def test_without_graphviz_it_says_so(project: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(project))
     assert main(["graph", "me:p:branch"]) == 1
-    assert capsys.readouterr().err.startswith("error: pictures need the program 'dot' of Graphviz")
+    assert capsys.readouterr().err.startswith("error: pictures require Graphviz's program 'dot'")
 
 
 @pytest.mark.parametrize(

@@ -386,12 +386,12 @@ def test_where_nothing_can_be_written_is_told_before_the_work(
     monkeypatch.chdir(tmp_path)
     message = error(capsys, *command, name)
     assert message == (
-        f"error: cannot write {name}: its ending does not name a format\n      = legal endings: {legal}\n"
+        f"error: cannot write {name}: the file's ending does not select a format\n      = legal endings: {legal}\n"
     )
     good = f"x{legal.split(',', maxsplit=1)[0]}"
     assert error(capsys, *command, f"none/{good}") == f"error: cannot write none/{good}: there is no folder none\n"
     (tmp_path / good).mkdir()
-    assert error(capsys, *command, good) == f"error: cannot write {good}: it is a folder\n"
+    assert error(capsys, *command, good) == f"error: cannot write {good}: the path is a folder\n"
     assert [path.name for path in tmp_path.iterdir()] == [good]
 
 

@@ -83,7 +83,7 @@ def test_step_by_step(model: list[str]) -> None:
 
 def test_what_cannot_be_requested(model: list[str]) -> None:
     with Simulator(model) as simulator:
-        with pytest.raises(ValueError, match="a frame of 0 bytes"):
+        with pytest.raises(ValueError, match="the frame has 0 bytes"):
             simulator.request(b"")
         with pytest.raises(ValueError, match="2147483648 cycles"):
             simulator.run(2**31)

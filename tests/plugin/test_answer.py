@@ -297,5 +297,5 @@ def test_a_program_that_is_missing_is_named_with_its_package(
     bench.programs = ["iverilog"]
     assert bench.run(spec="spec.yaml") == 0
     output = capsys.readouterr().out
-    assert "echo: error: not installed: iverilog" in output
+    assert "echo: error: missing programs: iverilog" in output
     assert "apt-get install --no-install-recommends iverilog" in output

@@ -115,7 +115,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         (
             "def respond(block, m)\n    return []\n",
             (
-                "model.py:1:22: error: the model is not Python: expected ':'\n"
+                "model.py:1:22: error: the model is not valid Python: expected ':'\n"
                 "    1 | def respond(block, m)\n      |                      ^"
             ),
         ),
@@ -131,7 +131,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
             (
                 "model.py:2:1: error: for message 0 to 'sub', 'respond' returned None, which is not a list\n"
                 "    2 | def respond(block, m):\n      | ^\n"
-                "      = it returns a list of (publisher, message), the message a mapping of fields"
+                "      = 'respond' must return a list of (publisher, message), where the message is a mapping of fields"
             ),
         ),
         (
@@ -140,7 +140,7 @@ def test_a_model_leaves_nothing_beside_it(tmp_path: Path) -> None:
         ),
         (
             "def respond(block, m):\n    return ['left']\n",
-            "model.py:1:1: error: for message 0 to 'sub', 'respond' returned 'left' in its list",
+            "model.py:1:1: error: for message 0 to 'sub', 'respond' returned a list that contains 'left'",
         ),
         (
             "def respond(block, m):\n    return [('lift', m)]\n",

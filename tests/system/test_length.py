@@ -57,7 +57,7 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             "",
             {
                 "length": "computed",
-                "because": "the lengths at the output's ports determine it",
+                "because": "the lengths at the output's ports determine the payload's length",
                 "payloadBytes": "44 or more",
             },
         ),
@@ -65,7 +65,7 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             IMAGE,
             ", length: given",
             "",
-            {"length": "given", "because": "the specification says so", "payloadBytes": "44 or more"},
+            {"length": "given", "because": "the specification selects this source", "payloadBytes": "44 or more"},
         ),
         (
             IMAGE,
@@ -73,7 +73,7 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             ", buffer: 5000",
             {
                 "length": "buffered",
-                "because": "the specification says so",
+                "because": "the specification selects this source",
                 "buffer": 5000,
                 "payloadBytes": "44 or more",
             },
@@ -84,7 +84,7 @@ def described(system: DerivedSystem) -> dict[str, Any]:
             ", buffer: 9000",
             {
                 "length": "buffered",
-                "because": "each element of 'fields' has a length of its own, 'fields.name'",
+                "because": "each element of 'fields' has a separate length, 'fields.name'",
                 "buffer": 9000,
                 "payloadBytes": "49 or more",
             },
@@ -103,7 +103,7 @@ def test_a_subscriber_has_the_length(tmp_path: Path) -> None:
     system = derived(tmp_path, specification(blocks))
     assert described(system) == {
         "length": "given",
-        "because": "the subscriber has it",
+        "because": "the subscriber has the length",
         "payloadBytes": described(system)["payloadBytes"],
     }
 

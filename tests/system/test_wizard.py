@@ -116,7 +116,7 @@ def test_the_paths_of_messages_decide_what_can_be_named(tmp_path: Path) -> None:
     assert "paths:" in (tmp_path / "robot.yaml").read_text()
     assert asked[0] == ["msg", "me:msgs:arm"]
     wrong = ["robot", *[""] * 7, "mgs"]
-    with pytest.raises(InputError, match="answer 9: 'mgs' is neither a folder, a bag nor a core"):
+    with pytest.raises(InputError, match="answer 9: 'mgs' is not a folder, a bag or a core"):
         extend_specification(tmp_path / "other.yaml", PipeAsker(wrong, io.StringIO()), names)
 
 
