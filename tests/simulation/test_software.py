@@ -392,8 +392,7 @@ def test_a_fault_of_a_function_is_shown_there(tmp_path: Path, code: str, message
         (
             "Point Pose",
             "m",
-            "the function must return a tuple of geometry_msgs/Point, geometry_msgs/Pose, each as a mapping, or None to"
-            " send nothing",
+            "the function must return a tuple of geometry_msgs/Point, geometry_msgs/Pose, each as a mapping, or None",
         ),
         ("Point Pose", "(m, m, m)", "the function must return a tuple"),
     ],

@@ -145,8 +145,7 @@ ACCELERATORS = "project: {name: a}\naccelerators: [{name: b, type: TYPE, interfa
         (
             "VHDL",
             "",
-            "an item of 'accelerators' needs the key 'sources': the accelerator's source files, relative to the"
-            " specification",
+            "an item of 'accelerators' needs the key 'sources': the accelerator's source files, relative to",
         ),
         ("VHDL", ", sources: ", "'sources' must be a word, not nothing"),
         ("ROS-SW", "", ""),
