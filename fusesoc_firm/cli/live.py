@@ -91,7 +91,7 @@ def _ways_of_steps(steps: Path, arguments: argparse.Namespace) -> Path:
 
     if not arguments.system:
         fail(
-            f"{steps} is the trace of a C++ node, which contains no names",
+            f"{steps} is a C++ node's trace, which contains no names",
             hint="add the system's specification with --system SPEC",
         )
     arguments.spec = arguments.system

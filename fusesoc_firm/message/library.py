@@ -200,7 +200,7 @@ class MessageLibrary:
             faults.error(
                 f"message path '{path}' is a bag without message definitions",
                 source,
-                "name the folder with the message definitions",
+                "give the folder with the message definitions",
             )
         return {name: _Source((path,), None, texts) for name, texts in bag.texts.items()} if bag.ros == self.ros else {}
 
@@ -243,7 +243,7 @@ class MessageLibrary:
             faults.error(
                 f"the bag has different definitions of '{name}'",
                 SourceRef(file, 1, 1),
-                "name the folder with the right definition",
+                "give the folder with the right definition",
             )
 
     def _collect(
@@ -341,7 +341,7 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
             faults.error(
                 f"the definition of '{name}' differs from the one in {other}",
                 SourceRef(str(first), 1, 1),
-                "name the folder with the right definition",
+                "give the folder with the right definition",
             )
     try:
         return data.decode("utf-8")

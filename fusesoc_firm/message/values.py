@@ -82,7 +82,9 @@ def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
         if match is None:
             rest = inner.part(position).strip()
             hint = "separate elements by ','; a string must end with the quote that starts it"
-            diagnostics.error(f"element {len(elements) + 1} of the array is empty or not closed", rest.source, hint)
+            diagnostics.error(
+                f"element {len(elements) + 1} of the array is empty or has no closing quote", rest.source, hint
+            )
             return None
         elements.append(inner.part(*match.span(1)))
         position = match.end()

@@ -165,7 +165,7 @@ def _names_what_lacks(fault: Fault, site: KeySite) -> bool:
     is_meant = any(f"'{word}'" in fault.words for word in site.parents)
     if site.is_needed:
         first = fault.line in (site.lines[0], *site.parents.values())
-        return first and bool(re.search(rf"needs?\b.*\b{site.name}\b", fault.words))
+        return first and bool(re.search(rf"(needs?\b|required keys:).*\b{site.name}\b", fault.words))
     return (is_near or is_meant) and f"'{site.name}'" in fault.words
 
 
