@@ -15,9 +15,6 @@ Times = NDArray[np.int64]
 REQUESTERS = (2, 4, 8, 16, 32, 64, 128, 256)
 """The numbers of accelerators in the dissertation's tables."""
 
-NANOSECONDS_PER_CYCLE = 10
-"""At the 100 MHz of section 4.3."""
-
 
 class Distribution(StrEnum):
     """The distribution of times around a data set's centre."""
