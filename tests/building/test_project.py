@@ -369,7 +369,7 @@ def test_a_generator_refuses_what_is_not_locked(
     error = capsys.readouterr().err
     assert "error: message my_msgs/Size (ROS 2): sha256 is " in error
     assert "error: message my_msgs/Size (ROS 2): signature is RIHS01_" in error
-    assert f"      = by {lock}\n" in error
+    assert f"      = according to {lock}\n" in error
     assert call(project, **{**more, "message": "geometry_msgs/Vector3"}) == 1
     assert "message geometry_msgs/Vector3 (ROS 2) is used, but not locked" in capsys.readouterr().err
     size.write_text("uint8 a\n")

@@ -125,7 +125,7 @@ def test_nothing_is_left_of_a_replay_that_cannot_begin(tmp_path: Path) -> None:
         run(loaded, source, tmp_path / "out", "echo")
     assert str(raised.value) == (
         f"error: {source} contains no topic for the system, which takes /p (geometry_msgs/Point)\n"
-        f"      = it holds /s of {STRING}"
+        f"      = the bag contains /s ({STRING})"
     )
     assert sorted(tmp_path.iterdir()) == before
 

@@ -252,7 +252,7 @@ blocks:
         (["robot", "", "7"], "answer 3: 'width' cannot be '7'"),
         (["robot", "", "", "", "many"], "answer 5: 'shortestRun' must be an integer, not 'many'"),
         (["robot", *[""] * 8, "no", "a", "b"], "answer 12: 'type' cannot be 'b'"),
-        (["robot", *[""] * 8, "no", "a", "", "ROS", "subscriber", ""], "answer 15: 'message' is needed"),
+        (["robot", *[""] * 8, "no", "a", "", "ROS", "subscriber", ""], "answer 15: 'message' is required"),
     ],
 )
 def test_a_wrong_answer_writes_nothing(tmp_path: Path, answers: list[str], message: str) -> None:

@@ -231,7 +231,7 @@ def test_no_plain_connection_gets_into_a_cluster_behind_tls(
 @needs_openssl
 def test_certificates_that_are_missing(certificates: Path, tmp_path: Path) -> None:
     address = "tls://127.0.0.1:1"
-    with pytest.raises(InputError, match=r"needs distributed.comm.tls.ca-file\n.*names the certificates"):
+    with pytest.raises(InputError, match=r"requires distributed.comm.tls.ca-file\n.*names the certificates"):
         workers.cluster_workers(address).__enter__()
     with (
         _configuration(tmp_path, "node", "ca"),
@@ -261,7 +261,7 @@ def test_a_cluster_that_anyone_may_read_is_warned_of(
         raise OSError("nobody")
 
     monkeypatch.setattr(distributed, "Client", refuse)
-    with pytest.raises(InputError, match="no Dask scheduler answers"), workers.cluster_workers(address):
+    with pytest.raises(InputError, match="no Dask scheduler responds"), workers.cluster_workers(address):
         pass
     err = capsys.readouterr().err
     assert err.startswith(f"warning: '{address}' is neither on this machine nor tls://") if is_open else not err
