@@ -262,7 +262,7 @@ def test_a_fault_in_a_message_is_shown_in_its_file(tmp_path: Path, capsys: Captu
             ["message", "show", "sensor_msgs/Image", "--stage", "vhdl", "--width", "24"],
             "converters do not support 24-bit streams",
         ),
-        (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9 bits"),
+        (["message", "show", "geometry_msgs/Point", "--stage", "config", "--width", "9"], "9-bit"),
         (["message", "list", "--path", "no/such/folder"], "no/such/folder"),
         (["message", "list", "--distro", "jazy"], "did you mean 'jazzy'?"),
         (["system", "check", str(SPEC), "--distro", "jazy"], "did you mean 'jazzy'?"),
@@ -365,7 +365,7 @@ def test_a_picture_is_what_its_name_says(
         assert out(capsys, *command, "-o", str(path)) == ""
         assert path.read_bytes().lstrip(b"/ \n").startswith(BEGINS[ending]), ending
     message = error(capsys, *command, "--format", "dot", "-o", str(tmp_path / "picture.svg"))
-    assert "not a picture in the format dot" in message
+    assert "does not match the format dot" in message
 
 
 @pytest.mark.parametrize(

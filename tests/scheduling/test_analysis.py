@@ -169,7 +169,7 @@ def test_bursts_count_with_a_policy_that_interrupts(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(area, "measured", lambda: areas)
     assert luts("fixed_priority", 3) == 20
     assert luts("fixed_priority_preemptive", 3) == 14 + 23
-    assert "fewest LUTs of these, 37 (measured, with the Manager's bursts)" in choose(ROBOT).reasons[2]
+    assert "fewest LUTs of these policies, 37 (measured, with the Manager's bursts)" in choose(ROBOT).reasons[2]
     for design in (area.MANAGER, area.MANAGER_PREEMPTIVE):
         others = {key: each for key, each in areas.items() if key[0] != design}
         monkeypatch.setattr(area, "measured", lambda others=others: others)

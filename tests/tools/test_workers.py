@@ -97,7 +97,7 @@ def test_a_cluster_without_workers() -> None:
 
 def test_workers_of_another_version(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(workers, "__version__", "99.0")
-    expected = r"its worker tcp://\S+ has \d+\.\d+\.\d+\n      = all workers need fusesoc-firm 99.0"
+    expected = r"worker tcp://\S+ has \d+\.\d+\.\d+\n      = all workers need fusesoc-firm 99.0"
     with pytest.raises(InputError, match=expected), workers.cluster_workers(address):
         pass
 
