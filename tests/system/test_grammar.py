@@ -145,7 +145,10 @@ ACCELERATORS = "project: {name: a}\naccelerators: [{name: b, type: TYPE, interfa
         (
             "VHDL",
             "",
-            "an item of 'accelerators' needs the key 'sources': the accelerator's source files, relative to",
+            (
+                "an item of 'accelerators' needs the key 'sources': the accelerator's source files, relative to the"
+                " specification"
+            ),
         ),
         ("VHDL", ", sources: ", "'sources' must be a word, not nothing"),
         ("ROS-SW", "", ""),

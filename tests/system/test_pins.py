@@ -88,7 +88,7 @@ def test_the_bench_connects_every_pin_to_the_environment(tmp_path: Path) -> None
     [
         (["missing.vhd"], "there is no file"),
         (["switches.v"], "'switches.v' is not a legal file name for a VHDL entity"),
-        (["entity.vhd"], "'entity.vhd' is not the name"),
+        (["entity.vhd"], "'entity.vhd' is not a legal file name"),
         (["Panel.vhd"], "the system already has an entity 'Panel'"),
         (["robot_system_tb.vhd"], "the system already has an entity 'robot_system_tb'"),
     ],
