@@ -196,6 +196,6 @@ def test_a_fault_below_the_model_is_shown_where_the_model_calls(tmp_path: Path) 
 @pytest.mark.parametrize("name", ["nowhere.py", "model.txt"])
 def test_a_model_that_is_not_there(tmp_path: Path, name: str) -> None:
     (tmp_path / "model.txt").write_text("def respond(block, m): return []\n")
-    message = rf"error: there is no model at .*{name}\n.*'respond\(subscriber, message\)'; it returns a list"
+    message = rf"error: there is no model at .*{name}\n.*'respond\(subscriber, message\)'; 'respond' must return a list"
     with pytest.raises(InputError, match=message):
         responses(tmp_path / name, stimuli(1.0), PUBLISHERS)
