@@ -106,7 +106,7 @@ begin
       port map (
         clk          => s_clk,
         rst_n        => s_rst_n,
-        release      => seen,
+        may_end      => seen,
         synced_rst_n => released
       );
 
@@ -114,7 +114,7 @@ begin
       port map (
         clk          => m_clk,
         rst_n        => s_rst_n,
-        release      => released,
+        may_end      => released,
         synced_rst_n => m_rst_n
       );
 

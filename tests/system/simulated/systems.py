@@ -76,14 +76,19 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
 
     Raises `InputError` and `GhdlError`.
     """
+    vhdl = write(request, folder)
+    Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
+    Library("work", folder).analyse(vhdl)
+    return GeneratedSystem(folder, vhdl[-1].stem.removesuffix("_tb"), tuple(vhdl))
+
+
+def write(request: Request, folder: Path) -> list[Path]:
+    """Generate a system and its simulation into `folder`: their VHDL, in order. Raises `InputError`."""
     folder.mkdir(parents=True, exist_ok=True)
     loaded = system_core.load_requested(request)
     *kernels, bench = _write(simulation_core.simulation_core(request, loaded), folder)
     # A kernel before the wrapper that instantiates it, the test bench last.
-    vhdl = [*kernels, *_write(system_core.system_core(loaded), folder), bench]
-    Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
-    Library("work", folder).analyse(vhdl)
-    return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
+    return [*kernels, *_write(system_core.system_core(loaded), folder), bench]
 
 
 def generate_system(spec: Path, folder: Path) -> list[Path]:
