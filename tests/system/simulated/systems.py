@@ -22,7 +22,7 @@ RUNTIME = (
     "manager/manager",
     "board/link",
 )
-SIMULATION = ("sim/host", "sim/link")
+SIMULATION = ("sim/checker", "sim/host", "sim/link")
 
 
 @dataclass(frozen=True)
