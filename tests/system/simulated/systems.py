@@ -17,6 +17,7 @@ RUNTIME = (
     "axis/axis",
     "sim/sync",
     "cdc/cdc",
+    "cdc/debounce",
     "sched/package",
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
