@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- Debounces a button or a switch: the output follows the pin after the pin has kept its level for CYCLES cycles. The pin
--- is synchronised first, so it needs no other synchroniser.
+-- Debounces a button or a switch: the output follows the pin after the pin has kept its level for CYCLES cycles. The
+-- pin is synchronised first, so it needs no other synchroniser.
 library ieee;
 use ieee.std_logic_1164.all;
 library firm;

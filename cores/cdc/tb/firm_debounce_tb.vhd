@@ -1,5 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
--- A button that bounces for random times: the output changes once for each press and release, and not too early or late.
+-- A button that bounces for random times: the output changes once for each press and release, and not too early or
+-- late.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.math_real.all;

@@ -53,15 +53,15 @@ architecture simulation of firm_axis_checker is
   constant FULL  : std_logic_vector(LANES-1 downto 0) := (others => '1');
   constant NONE  : std_logic_vector(LANES-1 downto 0) := (others => '0');
 
-  function is_known(level : std_logic) return boolean is
+  function is_known(value : std_logic) return boolean is
   begin
-    return level = '0' or level = '1';
+    return value = '0' or value = '1';
   end function is_known;
 
-  function is_known(levels : std_logic_vector) return boolean is
+  function is_known(values : std_logic_vector) return boolean is
   begin
-    for place in levels'range loop
-      if not is_known(levels(place)) then
+    for place in values'range loop
+      if not is_known(values(place)) then
         return false;
       end if;
     end loop;

@@ -50,6 +50,11 @@ class GeneratedSystem:
         result = self.run(**generics)
         return result.exit_code == 0 and result.output.splitlines()[-1].startswith("PASS ")
 
+    def use_real_synchronisers(self) -> None:
+        """Replace the synchronisers for simulation, which cannot be synthesised."""
+        Library("firm", self.folder).analyse(core_files("cdc/sync", "cdc/cdc", "cdc/debounce", "board/link"))
+        self.work.analyse(self.files)
+
     def replace_by_netlist(self) -> None:
         """Replace the top level by the netlist that GHDL makes of it."""
         self.work.replace_by_netlist(self.entity)
