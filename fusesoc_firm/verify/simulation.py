@@ -32,6 +32,7 @@ _CORES = (
     "sched/package",
     "sched/fixed_priority",
     "manager/manager",
+    "sim/checker",
     "sim/host",
     "sim/parts",
 )

@@ -11,7 +11,7 @@ from tests.hdl.ghdl import Generic
 
 LINKS_TITLE, CROSSINGS_TITLE = "Links between a host and a system", "Crossings between two clocks"
 
-_CORES = ("axis/package", "axis/axis", "board/link", "cdc/sync", "cdc/cdc")
+_CORES = ("axis/package", "axis/axis", "cdc/sync", "board/link", "cdc/cdc")
 # Bits of all fields, segments and streams of sensor_msgs/Image in ROS 2.
 _IMAGE: dict[str, Generic] = {"FIELD_BITS": 296, "SEGMENTS": 3, "PARTS": 3}
 _CROSSINGS: dict[str, tuple[str, dict[str, Generic]]] = {

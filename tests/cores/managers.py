@@ -16,6 +16,7 @@ def manager_library(directory: Path) -> Library:
             "sched/package",
             "sched/fixed_priority",
             "manager/manager",
+            "sim/checker",
             "sim/host",
             "sim/parts",
             "sim/echo",

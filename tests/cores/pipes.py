@@ -58,7 +58,7 @@ def _options(mark: str, generics: dict[str, Generic]) -> list[str]:
 
 def _analyse(folder: Path) -> None:
     library = Library("firm", folder)
-    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/pipe"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/pipe"))
     library.analyse(core_files("sim/pipe", fileset="tb"))
 
 

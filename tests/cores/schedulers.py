@@ -14,7 +14,7 @@ BENCH = "firm_sched_trace_tb"
 POLICY_CORES = ("queue", "engine", *dict.fromkeys(policy.core_file for policy in POLICIES.values()))
 SEED = 20240503
 
-_WITHOUT_POLICIES = ("axis/package", "axis/axis", "sim/host", "sched/package")
+_WITHOUT_POLICIES = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sched/package")
 
 NON_PREEMPTIVE = [name for name, policy in POLICIES.items() if not policy.is_preemptive]
 

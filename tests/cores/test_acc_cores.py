@@ -22,7 +22,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
     """The library with the benches, beside `firm` in the same directory."""
     directory = tmp_path_factory.mktemp("acc")
     Library("firm", directory).analyse(
-        core_files("axis/package", "sim/host", "acc/cordic/cordic", "acc/float64/float64")
+        core_files("axis/package", "sim/checker", "sim/host", "acc/cordic/cordic", "acc/float64/float64")
     )
     work = Library("work", directory)
     work.analyse(sorted(ACC.glob("*/tb/*.vhd")))

@@ -23,7 +23,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/parts"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts"))
     library.analyse(core_files("axis/axis", fileset="tb"))
     return library
 

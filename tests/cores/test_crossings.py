@@ -36,7 +36,7 @@ def _library(directory: Path, *, is_sure: bool = False) -> Library:
 
 
 def _cores(*, is_sure: bool) -> tuple[str, ...]:
-    return ("axis/package", "axis/axis", "cdc/sync" if is_sure else "sim/sync", "cdc/cdc", "sim/host")
+    return ("axis/package", "axis/axis", "cdc/sync" if is_sure else "sim/sync", "cdc/cdc", "sim/checker", "sim/host")
 
 
 def periods(ratio: float, source: random.Random) -> dict[str, Generic]:

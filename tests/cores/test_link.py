@@ -27,7 +27,11 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sim/parts", "sim/link", "board/link"))
+    library.analyse(
+        core_files(
+            "axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts", "sim/link", "cdc/sync", "board/link"
+        )
+    )
     library.analyse(core_files("board/link", fileset="tb"))
     return library
 

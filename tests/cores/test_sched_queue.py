@@ -70,7 +70,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 def _library(directory: Path) -> Library:
     library = Library("firm", directory)
-    library.analyse(core_files("axis/package", "axis/axis", "sim/host", "sched/queue"))
+    library.analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host", "sched/queue"))
     library.analyse(core_files("sched/queue", fileset="tb"))
     return library
 

@@ -32,7 +32,10 @@ EXPECTED = """\
 @pytest.fixture(scope="module", params=SIMULATORS)
 def host(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     return bench(
-        request.param, "firm_sim_host_tb", ("axis/package", "axis/axis", "sim/host"), tmp_path_factory.mktemp("host")
+        request.param,
+        "firm_sim_host_tb",
+        ("axis/package", "axis/axis", "sim/checker", "sim/host"),
+        tmp_path_factory.mktemp("host"),
     )
 
 
@@ -98,7 +101,12 @@ def test_both_hosts_do_the_same_in_every_cycle(tmp_path: Path) -> None:
     reports = []
     for simulator in SIMULATORS:
         (tmp_path / simulator).mkdir()
-        host = bench(simulator, "firm_sim_host_tb", ("axis/package", "axis/axis", "sim/host"), tmp_path / simulator)
+        host = bench(
+            simulator,
+            "firm_sim_host_tb",
+            ("axis/package", "axis/axis", "sim/checker", "sim/host"),
+            tmp_path / simulator,
+        )
         seeds = (1, SEED, 2147483562)
         outputs = [host.run(tmp_path, SEED=seed, STALL_PERCENT=47, WIDTH=16, SHOWN=40).output for seed in seeds]
         reports.append([output.splitlines()[1:] for output in outputs])

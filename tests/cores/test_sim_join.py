@@ -16,7 +16,7 @@ SEED = 20240719
 
 @pytest.fixture(scope="module", params=SIMULATORS)
 def joiner(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    cores = ("axis/package", "axis/axis", "sim/host", "sim/parts")
+    cores = ("axis/package", "axis/axis", "sim/checker", "sim/host", "sim/parts")
     return bench(request.param, "firm_sim_join_tb", cores, tmp_path_factory.mktemp("join"))
 
 

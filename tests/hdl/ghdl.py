@@ -1,4 +1,4 @@
-"""GHDL for tests: analyse VHDL-93, simulate, synthesise to a netlist, find latches, simulate the netlist instead.
+"""GHDL for tests: analyse VHDL, simulate, synthesise to a netlist, find latches, simulate the netlist instead.
 
     work = Library("firm", tmp_path)
     work.analyse(core_files("axis/package", "axis/axis", "manager/manager"))
@@ -48,14 +48,15 @@ class RunResult:
 
 @dataclass(frozen=True)
 class Library:
-    """A VHDL library by its logical name and the directory in which GHDL keeps it."""
+    """A VHDL library by its logical name and the directory in which GHDL keeps it; `standard` is "93" or "08"."""
 
     name: str
     directory: Path
+    standard: str = "93"
 
-    def analyse(self, files: Iterable[Path]) -> None:
-        """Analyse files in this order as strict VHDL-93; raise `GhdlError` on a fault."""
-        self._ghdl("-a", *(str(file) for file in files))
+    def analyse(self, files: Iterable[Path], *options: str) -> None:
+        """Analyse files in this order, strictly as the standard says; raise `GhdlError` on a fault."""
+        self._ghdl("-a", *options, *(str(file) for file in files))
 
     def elaborate(self, entity: str) -> None:
         """Bind and elaborate `entity` and all below it, without a simulation; raise `GhdlError` on a fault."""
@@ -117,7 +118,7 @@ class Library:
         return netlist
 
     def _options(self) -> list[str]:
-        return ["--std=93", f"--work={self.name}", f"--workdir={self.directory}", f"-P{self.directory}"]
+        return [f"--std={self.standard}", f"--work={self.name}", f"--workdir={self.directory}", f"-P{self.directory}"]
 
     def _ghdl(self, command: str, *arguments: str) -> str:
         process = subprocess.run(

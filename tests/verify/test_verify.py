@@ -169,12 +169,12 @@ def test_a_simulation_that_does_not_end_fails(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_message_that_is_withdrawn_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`segment_valid` must stay until `msg_ready`."""
-    blink = f"valid_r <= not valid_r when rising_edge(clk);\n{DEAF}".replace('"0"', "(others => valid_r)")
+    """`segment_valid` must stay until `msg_ready`; the publisher's stream falls with it, and is checked first."""
+    blink = f"valid_r <= rst_n and not valid_r when rising_edge(clk);\n{DEAF}".replace('"0"', "(others => valid_r)")
     signals = "signal x_r : std_logic_vector(63 downto 0);\nsignal valid_r : std_logic := '0';"
     other_text(monkeypatch, "subscriber_files", architecture(signals, blink))
     found = result()
-    assert found.detail.startswith("firm_sim_gates: valid(0) falls before ready rises")
+    assert found.detail == "firm_axis_checker: from the publisher: stable: tvalid fell before tready"
 
 
 def test_an_error_that_is_told_fails(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -52,7 +52,7 @@ architecture rtl of firm_axis_select is
     constant BELOW  : natural  := max(0, PLACES-HERE);
     variable first  : natural;
     variable beyond : natural;
-    variable word   : std_logic_vector(WIDTH-1 downto 0) := (others => '0');
+    variable found  : std_logic_vector(WIDTH-1 downto 0) := (others => '0');
   begin
     if COUNT = 1 then
       return candidates;
@@ -62,11 +62,11 @@ architecture rtl of firm_axis_select is
       beyond := COUNT - max(0, COUNT - first - 2**BELOW);
       if first < COUNT then
         if is_equal(number(PLACES-1 downto BELOW), part) = '1' then
-          word := word or gathered(candidates(LOW+beyond*WIDTH-1 downto LOW+first*WIDTH), number);
+          found := found or gathered(candidates(LOW+beyond*WIDTH-1 downto LOW+first*WIDTH), number);
         end if;
       end if;
     end loop;
-    return word;
+    return found;
   end function gathered;
 
 begin

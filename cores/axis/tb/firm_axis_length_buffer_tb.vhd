@@ -167,4 +167,36 @@ begin
     end if;
   end process find_gaps;
 
+  u_check_in : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "in",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => in_tdata,
+      axis_tkeep  => in_tkeep,
+      axis_tvalid => in_tvalid,
+      axis_tlast  => in_tlast,
+      axis_tready => in_tready
+    );
+
+  u_check_sent : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "sent",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => sent_tdata,
+      axis_tkeep  => sent_tkeep,
+      axis_tvalid => sent_tvalid,
+      axis_tlast  => sent_tlast,
+      axis_tready => sent_tready
+    );
+
 end architecture simulation;

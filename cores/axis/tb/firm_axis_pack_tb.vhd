@@ -227,4 +227,20 @@ begin
     wait;
   end process receive;
 
+  u_check_out : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "out",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => tdata,
+      axis_tkeep  => tkeep,
+      axis_tvalid => tvalid,
+      axis_tlast  => tlast,
+      axis_tready => tready
+    );
+
 end architecture simulation;

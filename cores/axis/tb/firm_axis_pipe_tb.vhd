@@ -197,4 +197,36 @@ begin
     end if;
   end process find_gaps;
 
+  u_check_in : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "in",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => in_tdata,
+      axis_tkeep  => in_tkeep,
+      axis_tvalid => in_tvalid,
+      axis_tlast  => in_tlast,
+      axis_tready => in_tready
+    );
+
+  u_check_part : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "part",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => part_tdata,
+      axis_tkeep  => part_tkeep,
+      axis_tvalid => part_tvalid,
+      axis_tlast  => part_tlast,
+      axis_tready => part_tready
+    );
+
 end architecture simulation;

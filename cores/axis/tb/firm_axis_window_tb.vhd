@@ -252,4 +252,22 @@ begin
       report "a combinational path from an input to an output" severity failure;
   end process find_paths;
 
+  u_check_in : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "in",
+      -- The void lanes have no value.
+      KNOWN => VOID_LANES = 0,
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => tdata,
+      axis_tkeep  => tkeep,
+      axis_tvalid => tvalid,
+      axis_tlast  => tlast,
+      axis_tready => tready
+    );
+
 end architecture simulation;

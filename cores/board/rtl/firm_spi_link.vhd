@@ -57,10 +57,13 @@ architecture rtl of firm_spi_link is
   constant READ   : byte_t := x"02";
   constant CUT    : byte_t := x"03";
 
-  -- The asynchronous pins after two flip-flops; a third one detects edges. The highest bit is the oldest.
-  signal sclk_r : std_logic_vector(2 downto 0);
-  signal cs_n_r : std_logic_vector(1 downto 0);
-  signal mosi_r : std_logic_vector(1 downto 0);
+  -- The pins, synchronous to clk.
+  signal pins          : std_logic_vector(2 downto 0);
+  signal synced        : std_logic_vector(2 downto 0);
+  signal sclk          : std_logic;
+  signal cs_n          : std_logic;
+  signal mosi          : std_logic;
+  signal sclk_before_r : std_logic;  -- a cycle earlier
 
   signal rises : std_logic;
   signal falls : std_logic;
@@ -95,9 +98,25 @@ begin
     report "firm_spi_link: DEPTH is " & integer'image(DEPTH) & "; legal: 16 to 32768"
     severity failure;
 
-  rises    <= not cs_n_r(1) and sclk_r(1) and not sclk_r(2);
-  falls    <= not cs_n_r(1) and sclk_r(2) and not sclk_r(1);
-  received <= in_r & mosi_r(1);
+  pins <= spi_mosi & spi_cs_n & spi_sclk;
+
+  u_sync : entity firm.firm_cdc_sync
+    generic map (
+      BITS => 3
+    )
+    port map (
+      clk    => clk,
+      level  => pins,
+      synced => synced
+    );
+
+  sclk <= synced(0);
+  cs_n <= synced(1) or not rst_n;
+  mosi <= synced(2);
+
+  rises    <= not cs_n and sclk and not sclk_before_r;
+  falls    <= not cs_n and sclk_before_r and not sclk;
+  received <= in_r & mosi;
   complete <= '1' when rises = '1' and bit_r = 7 else '0';
 
   rx_valid   <= '1' when complete = '1' and first_r = '0' and command_r = WRITE else '0';
@@ -136,10 +155,8 @@ begin
 
   begin
     if rising_edge(clk) then
-      sclk_r <= sclk_r(1 downto 0) & spi_sclk;
-      cs_n_r <= cs_n_r(0) & spi_cs_n;
-      mosi_r <= mosi_r(0) & spi_mosi;
-      if cs_n_r(1) = '1' then
+      sclk_before_r <= sclk;
+      if cs_n = '1' then
         bit_r     <= 0;
         first_r   <= '1';
         offered_r <= '0';
@@ -157,7 +174,6 @@ begin
         dropped_r <= '0';
       end if;
       if rst_n = '0' then
-        cs_n_r    <= "11";
         dropped_r <= '0';
       end if;
     end if;

@@ -47,12 +47,12 @@ end entity firm_uart_link;
 architecture rtl of firm_uart_link is
 
   -- The cycles of a bit, rounded to nearest.
-  function divisor_of(clock_hz : integer; baud : integer) return integer is
+  function divisor_of(hertz : integer; bits_per_second : integer) return integer is
   begin
-    if baud < 1 then
+    if bits_per_second < 1 then
       return 0;
     end if;
-    return (clock_hz + baud/2) / baud;
+    return (hertz + bits_per_second/2) / bits_per_second;
   end function divisor_of;
 
   constant DIVISOR : integer := divisor_of(CLOCK_HZ, BAUD);

@@ -4,6 +4,7 @@
 -- case the line must rise before the next byte can start.
 library ieee;
 use ieee.std_logic_1164.all;
+library firm;
 
 entity firm_uart_receiver is
   generic (
@@ -29,7 +30,7 @@ architecture rtl of firm_uart_receiver is
 
   type state_t is (WAITING, RECEIVING, RECOVERING);
 
-  signal line_r  : std_logic_vector(1 downto 0);  -- the asynchronous pin after two flip-flops; bit 1 is older
+  signal level   : std_logic_vector(0 downto 0);  -- of the line, synchronous to clk
   signal state_r : state_t;
   signal count_r : natural range 0 to DIVISOR-1;  -- cycles until the next bit's middle
   signal bit_r   : natural range FIRST_BIT to STOP_BIT;
@@ -41,6 +42,13 @@ begin
     report "firm_uart_receiver: DIVISOR is " & integer'image(DIVISOR) & "; legal: 4 or more"
     severity failure;
 
+  u_sync : entity firm.firm_cdc_sync
+    port map (
+      clk      => clk,
+      level(0) => uart_rxd,
+      synced   => level
+    );
+
   receive : process (clk)
 
     procedure take_bit is
@@ -49,19 +57,19 @@ begin
       bit_r   <= bit_r + 1;
       if bit_r = FIRST_BIT then
         -- Too short for a start bit.
-        if line_r(1) = '1' then
+        if level(0) = '1' then
           state_r <= WAITING;
         end if;
       elsif bit_r < STOP_BIT then
-        byte_r <= line_r(1) & byte_r(7 downto 1);
+        byte_r <= level(0) & byte_r(7 downto 1);
       end if;
     end procedure take_bit;
 
     procedure finish_byte is
     begin
       state_r <= WAITING;
-      valid   <= line_r(1);
-      if line_r(1) = '0' then
+      valid   <= level(0);
+      if level(0) = '0' then
         state_r <= RECOVERING;
         if byte_r = x"00" then
           is_break <= '1';
@@ -73,18 +81,17 @@ begin
 
   begin
     if rising_edge(clk) then
-      line_r   <= line_r(0) & uart_rxd;
       valid    <= '0';
       is_break <= '0';
       is_wrong <= '0';
       if state_r = WAITING then
         count_r <= DIVISOR/2 - 1;
         bit_r   <= FIRST_BIT;
-        if line_r(1) = '0' then
+        if level(0) = '0' then
           state_r <= RECEIVING;
         end if;
       elsif state_r = RECOVERING then
-        if line_r(1) = '1' then
+        if level(0) = '1' then
           state_r <= WAITING;
         end if;
       elsif count_r /= 0 then
@@ -95,7 +102,6 @@ begin
         take_bit;
       end if;
       if rst_n = '0' then
-        line_r  <= "11";
         state_r <= RECOVERING;
       end if;
     end if;

@@ -3,6 +3,7 @@
 -- the other side is not ready; a started byte is completed. Ready bytes follow each other without a pause.
 library ieee;
 use ieee.std_logic_1164.all;
+library firm;
 
 entity firm_uart_transmitter is
   generic (
@@ -25,7 +26,7 @@ architecture rtl of firm_uart_transmitter is
 
   constant BITS : positive := 10;
 
-  signal cts_n_r : std_logic_vector(1 downto 0);  -- the asynchronous pin after two flip-flops; bit 1 is older
+  signal cts_n   : std_logic_vector(0 downto 0);  -- synchronous to clk
   signal count_r : natural range 0 to DIVISOR-1;  -- remaining cycles of the bit
   signal left_r  : natural range 0 to BITS-1;     -- bits after this one
   signal bits_r  : std_logic_vector(BITS-1 downto 0);
@@ -40,12 +41,18 @@ begin
     severity failure;
 
   done      <= '1' when count_r = 0 and left_r = 0 else '0';
-  ready_out <= done and not cts_n_r(1);
+  ready_out <= done and not cts_n(0);
+
+  u_sync : entity firm.firm_cdc_sync
+    port map (
+      clk      => clk,
+      level(0) => uart_cts_n,
+      synced   => cts_n
+    );
 
   transmit : process (clk)
   begin
     if rising_edge(clk) then
-      cts_n_r <= cts_n_r(0) & uart_cts_n;
       if count_r /= 0 then
         count_r <= count_r - 1;
       elsif left_r /= 0 then
@@ -58,7 +65,6 @@ begin
         bits_r  <= '1' & data & '0';
       end if;
       if rst_n = '0' then
-        cts_n_r <= "11";
         count_r <= 0;
         left_r  <= 0;
         bits_r  <= (others => '1');

@@ -223,4 +223,36 @@ begin
       );
   end generate spi;
 
+  u_check_to : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "to",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => to_tdata,
+      axis_tkeep  => to_tkeep,
+      axis_tvalid => to_tvalid,
+      axis_tlast  => to_tlast,
+      axis_tready => to_tready
+    );
+
+  u_check_from : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "from",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => from_tdata,
+      axis_tkeep  => from_tkeep,
+      axis_tvalid => from_tvalid,
+      axis_tlast  => from_tlast,
+      axis_tready => from_tready
+    );
+
 end architecture simulation;

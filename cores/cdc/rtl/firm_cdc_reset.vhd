@@ -1,6 +1,6 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Transfers a reset to another clock domain: it begins with `rst_n` at once, even without a clock. It ends with a
--- rising edge, at least three edges after both `rst_n` and `release` are high. A reset is therefore never too short to
+-- rising edge, at least three edges after both `rst_n` and `may_end` are high. A reset is therefore never too short to
 -- be seen, and when it ends, synchronisers no longer hold values from before it.
 --
 -- Constraint: the paths to the registers' clear and into the first register are asynchronous
@@ -14,7 +14,7 @@ entity firm_cdc_reset is
     -- Must come from a register, because it clears asynchronously.
     rst_n : in std_logic;
     -- From any domain; low while `rst_n` is low, and for as long as the reset must last.
-    release : in std_logic := '1';
+    may_end : in std_logic := '1';
 
     synced_rst_n : out std_logic
   );
@@ -36,7 +36,7 @@ begin
     if rst_n = '0' then
       stages_r <= (others => '0');
     elsif rising_edge(clk) then
-      stages_r <= stages_r(1 downto 0) & release;
+      stages_r <= stages_r(1 downto 0) & may_end;
     end if;
   end process pass_on;
 

@@ -154,7 +154,7 @@ begin
       port map (
         clk          => main_clk,
         rst_n        => rst_n,
-        release      => seen,
+        may_end      => seen,
         synced_rst_n => released
       );
 
@@ -162,7 +162,7 @@ begin
       port map (
         clk          => other_clk,
         rst_n        => rst_n,
-        release      => released,
+        may_end      => released,
         synced_rst_n => synced_rst_n
       );
 
@@ -436,10 +436,10 @@ begin
         let_go;
       end if;
     end loop;
-    for cycle in 1 to 100 loop
+    for waited in 1 to 100 loop
       wait until rising_edge(s_clk);
     end loop;
-    for cycle in 1 to 100 loop
+    for waited in 1 to 100 loop
       wait until rising_edge(m_clk);
     end loop;
     assert taken = given or (RESET_PERCENT > 0 and taken > given)
@@ -478,18 +478,18 @@ begin
       assert is_right report "message " & integer'image(number) & ": " & what severity failure;
     end procedure check;
 
-    procedure take_beat(stream, element : in natural; place : inout natural) is
+    procedure take_beat(stream, part : in natural; first : inout natural) is
     begin
       for lane in 0 to M_LANES-1 loop
-        if place + lane < length_of(number, element) then
+        if first + lane < length_of(number, part) then
           check(m_tkeep(stream)(lane) = '1', "a byte is missing");
-          check(m_tdata(stream)(8*lane+7 downto 8*lane) = byte_of(number, element, place + lane), "a byte is wrong");
+          check(m_tdata(stream)(8*lane+7 downto 8*lane) = byte_of(number, part, first + lane), "a byte is wrong");
         else
           check(m_tkeep(stream)(lane) = '0', "a byte too many");
         end if;
       end loop;
-      place := place + M_LANES;
-      check((m_tlast(stream) = '1') = (place >= length_of(number, element)), "tlast is wrong");
+      first := first + M_LANES;
+      check((m_tlast(stream) = '1') = (first >= length_of(number, part)), "tlast is wrong");
     end procedure take_beat;
 
     procedure begin_message is

@@ -52,7 +52,7 @@ begin
     port map (
       clk          => s_clk,
       rst_n        => rst_n,
-      release      => seen,
+      may_end      => seen,
       synced_rst_n => released
     );
 
@@ -60,7 +60,7 @@ begin
     port map (
       clk          => m_clk,
       rst_n        => rst_n,
-      release      => released,
+      may_end      => released,
       synced_rst_n => m_rst_n
     );
 

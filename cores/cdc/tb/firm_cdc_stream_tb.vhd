@@ -106,7 +106,7 @@ begin
       port map (
         clk          => s_clk,
         rst_n        => s_rst_n,
-        release      => seen,
+        may_end      => seen,
         synced_rst_n => released
       );
 
@@ -114,7 +114,7 @@ begin
       port map (
         clk          => m_clk,
         rst_n        => s_rst_n,
-        release      => released,
+        may_end      => released,
         synced_rst_n => m_rst_n
       );
 
@@ -304,5 +304,38 @@ begin
     end loop;
     wait;
   end process watchdog;
+
+  u_check_in : entity firm.firm_axis_checker
+    generic map (
+      WIDTH      => S_WIDTH,
+      NAME       => "in",
+      IDLE_READY => false,
+      LEVEL      => failure
+    )
+    port map (
+      clk         => s_clk,
+      rst_n       => s_rst_n,
+      axis_tdata  => s_tdata,
+      axis_tkeep  => s_tkeep,
+      axis_tvalid => s_tvalid,
+      axis_tlast  => s_tlast,
+      axis_tready => s_tready
+    );
+
+  u_check_out : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => M_WIDTH,
+      NAME  => "out",
+      LEVEL => failure
+    )
+    port map (
+      clk         => m_clk,
+      rst_n       => m_rst_n,
+      axis_tdata  => m_tdata,
+      axis_tkeep  => m_tkeep,
+      axis_tvalid => m_tvalid,
+      axis_tlast  => m_tlast,
+      axis_tready => m_tready
+    );
 
 end architecture simulation;

@@ -359,4 +359,20 @@ begin
     end if;
   end process take;
 
+  u_check_out : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "out",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => out_tdata,
+      axis_tkeep  => out_tkeep,
+      axis_tvalid => out_tvalid,
+      axis_tlast  => out_tlast,
+      axis_tready => out_tready
+    );
+
 end architecture simulation;

@@ -180,4 +180,36 @@ begin
     pub_tlast(channel)                                      <= '0';
   end generate speechless;
 
+  u_check_in : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "in",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => in_tdata,
+      axis_tkeep  => in_tkeep,
+      axis_tvalid => in_tvalid,
+      axis_tlast  => in_tlast,
+      axis_tready => in_tready
+    );
+
+  u_check_out : entity firm.firm_axis_checker
+    generic map (
+      WIDTH => WIDTH,
+      NAME  => "out",
+      LEVEL => failure
+    )
+    port map (
+      clk         => clk,
+      rst_n       => rst_n,
+      axis_tdata  => out_tdata,
+      axis_tkeep  => out_tkeep,
+      axis_tvalid => out_tvalid,
+      axis_tlast  => out_tlast,
+      axis_tready => out_tready
+    );
+
 end architecture simulation;

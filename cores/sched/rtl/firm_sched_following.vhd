@@ -26,16 +26,16 @@ architecture rtl of firm_sched_following is
   -- Up to this number, rows are not worth their cost.
   constant FEW : positive := 8;
 
-  -- The lowest one above `index`, otherwise the lowest one.
-  function next_of(bits, index : std_logic_vector) return std_logic_vector is
-    constant COUNT : positive := bits'length;
+  -- The lowest one above `now_at`, otherwise the lowest one.
+  function next_of(asking, now_at : std_logic_vector) return std_logic_vector is
+    constant COUNT : positive := asking'length;
     variable later : std_logic_vector(COUNT-1 downto 0);
   begin
-    later := bits and above(index, COUNT);
+    later := asking and above(now_at, COUNT);
     if any_of(later) = '1' then
       return first_of(later);
     end if;
-    return first_of(bits);
+    return first_of(asking);
   end function next_of;
 
 begin

@@ -34,18 +34,18 @@ architecture rtl of firm_sched_lowest is
   function word_at(words, number : std_logic_vector) return std_logic_vector is
     constant HALF         : positive := words'length / 2;
     alias numbered        : std_logic_vector(2*HALF-1 downto 0) is words;
-    alias bits            : std_logic_vector(number'length-1 downto 0) is number;
+    alias number_bits     : std_logic_vector(number'length-1 downto 0) is number;
     variable half_of_word : std_logic_vector(HALF-1 downto 0);
   begin
-    if bits(bits'high) = '1' then
+    if number_bits(number_bits'high) = '1' then
       half_of_word := numbered(2*HALF-1 downto HALF);
     else
       half_of_word := numbered(HALF-1 downto 0);
     end if;
-    if bits'length = 1 then
+    if number_bits'length = 1 then
       return half_of_word;
     end if;
-    return word_at(half_of_word, bits(bits'high-1 downto 0));
+    return word_at(half_of_word, number_bits(number_bits'high-1 downto 0));
   end function word_at;
 
 begin

@@ -59,7 +59,8 @@ begin
     variable sampled  : std_logic_vector(BITS-1 downto 0);
     variable draw     : real;
   begin
-    if level'event then
+    -- Also the first value of a level that never changes.
+    if level /= current then
       before  := current;
       current := level;
       is_new  := true;

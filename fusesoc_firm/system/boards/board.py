@@ -39,6 +39,9 @@ _PORTS = (
     *(name for pins in LINK_PINS.values() for name, _, _ in pins),
     *("led", "led_n", "reset", "reset_n"),
 )
+# Contacts bounce for up to some 10 ms; the cycles are at least those that firm_debounce takes.
+_DEBOUNCE_SECONDS = 0.01
+_SHORTEST_DEBOUNCE = 4
 # The optional keys of a board.
 _OPTIONAL = {"uart_rts_n", "uart_cts_n", "spi_irq"}
 
@@ -242,9 +245,13 @@ def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
         "clock_hz": clock_hz,
         "error_count": len(system.error_blocks),
         "ports": [{"name": name, "direction": direction, "type": type_} for name, direction, type_ in typed],
-        "handed_on": [*(name for name, _ in link), *(pin.name for pin in pins)],
+        # The pad of spi_miso is at the top level.
+        "handed_on": [*(name for name, _ in link if name != "spi_miso"), *(pin.name for pin in pins)],
+        "has_button": bool(ports & {"reset", "reset_n"}),
+        "debounce": max(_SHORTEST_DEBOUNCE, round(clock_hz * _DEBOUNCE_SECONDS)),
         **{name: name in ports for name, _ in own},
         "is_uart": system.link.kind is LinkKind.UART,
+        "is_spi": system.link.kind is LinkKind.SPI,
         "clock_mhz": f"{clock_hz / 10**6:g}",
         "pins": [
             {

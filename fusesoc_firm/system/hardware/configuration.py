@@ -131,8 +131,8 @@ def _resets(system: DerivedSystem) -> Context | None:
     return {"signals": signals, "instances": instances}
 
 
-def _reset(clock: str, release: str, reset: str) -> Context:
-    return {"label": reset_label(reset), "clock": clock, "release": release, "reset": reset}
+def _reset(clock: str, may_end: str, reset: str) -> Context:
+    return {"label": reset_label(reset), "clock": clock, "may_end": may_end, "reset": reset}
 
 
 def top_level_pins(system: DerivedSystem) -> dict[tuple[str, str], str]:

@@ -143,9 +143,9 @@ begin
     variable is_first      : boolean := true;
     variable before        : natural := 0;
 
-    procedure cycles(count : natural) is
+    procedure cycles(number : natural) is
     begin
-      for k in 1 to count loop
+      for k in 1 to number loop
         wait until rising_edge(clk);
       end loop;
     end procedure cycles;

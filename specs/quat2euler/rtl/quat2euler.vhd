@@ -281,7 +281,7 @@ begin
            '0';
 
   -- Roll and yaw go while the third unit still works, into output registers that are empty by then.
-  sequence : process (clk)
+  proceed : process (clk)
   begin
     if rising_edge(clk) then
       if rst_n = '0' then
@@ -300,7 +300,7 @@ begin
         end if;
       end if;
     end if;
-  end process sequence;
+  end process proceed;
 
   wrap : process (clk)
     variable raw    : word_t;

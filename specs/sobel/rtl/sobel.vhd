@@ -281,7 +281,7 @@ begin
   take        <= offered and advance and settled;
   group_ready <= advance and settled when phase_r = ROWS else '0';
 
-  sequence : process (clk)
+  proceed : process (clk)
   begin
     if rising_edge(clk) then
       if run = '0' then
@@ -314,7 +314,7 @@ begin
         end if;
       end if;
     end if;
-  end process sequence;
+  end process proceed;
 
   access_memory : process (clk)
   begin

@@ -68,7 +68,13 @@ class ConverterBench:
     def __post_init__(self) -> None:
         Library("firm", self.directory).analyse(
             core_files(
-                "axis/package", "axis/axis", "sched/package", "sched/fixed_priority", "manager/manager", "sim/host"
+                "axis/package",
+                "axis/axis",
+                "sched/package",
+                "sched/fixed_priority",
+                "manager/manager",
+                "sim/checker",
+                "sim/host",
             )
         )
 

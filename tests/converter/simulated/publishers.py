@@ -56,7 +56,7 @@ class PublisherBench:
     publishers: dict[tuple[Middleware, str, int], Publisher] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        Library("firm", self.directory).analyse(core_files("axis/package", "axis/axis", "sim/host"))
+        Library("firm", self.directory).analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host"))
         Library("bench", self.directory).analyse([HERE / "message_source.vhd"])
 
     def publisher(self, ros: Middleware, name: str, width: int = 8) -> Publisher:

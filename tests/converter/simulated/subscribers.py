@@ -40,7 +40,7 @@ class SubscriberBench:
     made: dict[tuple[Frame, int], Subscriber] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        Library("firm", self.directory).analyse(core_files("axis/package", "axis/axis", "sim/host"))
+        Library("firm", self.directory).analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host"))
 
     def subscriber(self, frame: Frame, width: int) -> Subscriber:
         """The subscriber with its bench, analysed once."""

@@ -172,7 +172,7 @@ def written(folder: Path, library: MessageLibrary, names: list[MessageName]) -> 
 
 def analysed(folder: Path, files: list[Path]) -> Library:
     """The packages in a library, beside that of the project."""
-    Library("firm", folder).analyse(core_files("axis/package", "axis/axis", "sim/host"))
+    Library("firm", folder).analyse(core_files("axis/package", "axis/axis", "sim/checker", "sim/host"))
     work = Library("work", folder)
     work.analyse(files)
     return work

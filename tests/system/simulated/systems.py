@@ -17,12 +17,13 @@ RUNTIME = (
     "axis/axis",
     "sim/sync",
     "cdc/cdc",
+    "cdc/debounce",
     "sched/package",
     *(f"sched/{core}" for core in POLICY_CORES),
     "manager/manager",
     "board/link",
 )
-SIMULATION = ("sim/host", "sim/link")
+SIMULATION = ("sim/checker", "sim/host", "sim/link")
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,11 @@ class GeneratedSystem:
         """Simulate and tell whether every message came back as expected."""
         result = self.run(**generics)
         return result.exit_code == 0 and result.output.splitlines()[-1].startswith("PASS ")
+
+    def use_real_synchronisers(self) -> None:
+        """Replace the synchronisers for simulation, which cannot be synthesised."""
+        Library("firm", self.folder).analyse(core_files("cdc/sync", "cdc/cdc", "cdc/debounce", "board/link"))
+        self.work.analyse(self.files)
 
     def replace_by_netlist(self) -> None:
         """Replace the top level by the netlist that GHDL makes of it."""
@@ -76,14 +82,19 @@ def build(request: Request, folder: Path, *cores: str) -> GeneratedSystem:
 
     Raises `InputError` and `GhdlError`.
     """
+    vhdl = write(request, folder)
+    Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
+    Library("work", folder).analyse(vhdl)
+    return GeneratedSystem(folder, vhdl[-1].stem.removesuffix("_tb"), tuple(vhdl))
+
+
+def write(request: Request, folder: Path) -> list[Path]:
+    """Generate a system and its simulation into `folder`: their VHDL, in order. Raises `InputError`."""
     folder.mkdir(parents=True, exist_ok=True)
     loaded = system_core.load_requested(request)
     *kernels, bench = _write(simulation_core.simulation_core(request, loaded), folder)
     # A kernel before the wrapper that instantiates it, the test bench last.
-    vhdl = [*kernels, *_write(system_core.system_core(loaded), folder), bench]
-    Library("firm", folder).analyse(core_files(*RUNTIME, *SIMULATION, *cores))
-    Library("work", folder).analyse(vhdl)
-    return GeneratedSystem(folder, bench.stem.removesuffix("_tb"), tuple(vhdl))
+    return [*kernels, *_write(system_core.system_core(loaded), folder), bench]
 
 
 def generate_system(spec: Path, folder: Path) -> list[Path]:

@@ -94,3 +94,84 @@ def _build(folder: Path, board: str) -> Path:
 def _bitstream(work: Path) -> bytes:
     (stream,) = (path for path in work.iterdir() if path.suffix in (".bin", ".bit", ".fs"))
     return stream.read_bytes()
+
+
+SPI_BOARD = """\
+description: A board whose host shares its bus
+flow: trellis
+clock: 25 MHz
+interconnect: spi
+pins:
+  - {port: clk, site: A1}
+  - {port: spi_sclk, site: A2}
+  - {port: spi_cs_n, site: A3}
+  - {port: spi_mosi, site: A4}
+  - {port: spi_miso, site: A5}
+  - {port: reset, site: A6}
+"""
+SHARED_BUS = """\
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+
+entity bus_tb is
+end entity bus_tb;
+
+architecture simulation of bus_tb is
+
+  signal clk  : std_logic := '0';
+  signal cs_n : std_logic := '1';
+  signal miso : std_logic;
+
+begin
+
+  clk <= not clk after 20 ns when now < 4 us else '0';
+
+  u_board : entity work.obstacle_board
+    port map (clk => clk, spi_sclk => '0', spi_cs_n => cs_n, spi_mosi => '0', spi_miso => miso, reset => '0');
+
+  -- Another device on the wire.
+  miso <= '0' when cs_n = '1' else 'Z';
+
+  select_board : process
+  begin
+    for selection in 1 to 3 loop
+      wait for 1 us;
+      assert miso = '0' report "the board drives the bus without being selected" severity failure;
+      cs_n <= '0';
+      wait for 100 ns;
+      assert miso = '1' report "the board does not answer" severity failure;
+      cs_n <= '1';
+    end loop;
+    report "PASS";
+    wait;
+  end process select_board;
+
+end architecture simulation;
+"""
+
+
+@_needs("yosys")
+def test_a_board_shares_the_wire_to_the_master(tmp_path: Path) -> None:
+    """The answer to a selection begins with a one, 80 hex, and another device drives the wire before and after it."""
+    (tmp_path / "board.yaml").write_text(SPI_BOARD, encoding="utf-8")
+    board = str(tmp_path / "board.yaml")
+    request = call(OBSTACLE / "obstacle.yaml", OBSTACLE / "stimuli.yaml", OBSTACLE / "model.py", board=board)
+    folder = tmp_path / "work"
+    system = build(request, folder)
+    (folder / "bus_tb.vhd").write_text(SHARED_BUS, encoding="utf-8")
+    system.work.analyse([folder / "bus_tb.vhd"])
+    result = system.work.run("bus_tb")
+    assert result.exit_code == 0 and "PASS" in result.output, result.output
+    # The pad's buffer is at the top level.
+    system.use_real_synchronisers()
+    netlist = folder / "board.v"
+    netlist.write_text(system.work.synthesise("obstacle_board", language="verilog"), encoding="utf-8")
+    script = f"read_verilog {netlist}; hierarchy -top obstacle_board; proc; tribuf"
+    done = subprocess.run(
+        ["yosys", "-q", "-p", f"{script}; select -assert-count 1 obstacle_board/t:$tribuf"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

@@ -49,4 +49,5 @@ def test_a_system_answers_over_any_interconnect(tmp_path: Path, interconnect: st
 @pytest.mark.parametrize("interconnect", ["uart", "spi"])
 def test_a_linked_system_has_no_latch(tmp_path: Path, interconnect: str) -> None:
     system = _built(tmp_path, interconnect, 32)
+    system.use_real_synchronisers()
     assert system.work.latches(system.entity) == []

@@ -260,7 +260,7 @@ begin
   out_step_bytes <= resize(out_columns_r * to_unsigned(OUT_BYTES, 3), 32);
   multiplicand   <= out_step_bytes when state_r = MULTIPLY_OUT else unsigned(in_step);
 
-  sequence : process (clk)
+  proceed : process (clk)
   begin
     if rising_edge(clk) then
       if state_r = IDLE then
@@ -378,7 +378,7 @@ begin
         state_r <= IDLE;
       end if;
     end if;
-  end process sequence;
+  end process proceed;
 
   encoding_last <= '1' when beat_r = OUT_BEATS-1 else '0';
 

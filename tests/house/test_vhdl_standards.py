@@ -1,0 +1,201 @@
+"""All VHDL is analysed as VHDL-93 and as VHDL-2008 without an error or a warning: ours, and what is generated."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fusesoc_firm.converter.converter_core import publisher_files, subscriber_files
+from fusesoc_firm.frame.layout import frame_of
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.library import MessageLibrary
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.message.model import MessageName
+from fusesoc_firm.message.parser import parse_name
+from fusesoc_firm.text.diagnostics import InputError
+from tests import corpus
+from tests.hdl.ghdl import CORES, REPOSITORY, GhdlError, Library
+from tests.system.simulated.systems import call, generate_system, write
+
+SPECS = REPOSITORY / "specs"
+STANDARDS = ("93", "08")
+SEED = 20241130
+# Of fixed and of variable size; with arrays of messages and of strings.
+MESSAGES = ("geometry_msgs/Pose", "sensor_msgs/Image", "sensor_msgs/JointState", "diagnostic_msgs/DiagnosticArray")
+# Of the corpus' messages, of each ROS.
+SAMPLE = 25
+STRICT = ("--warn-error",)
+
+UNIT = re.compile(r"^(?:entity|package) (\w+) is$", re.MULTILINE | re.IGNORECASE)
+USED = re.compile(r"^\s*(?:use|\w+ : entity) (?:firm|work)\.(\w+)", re.MULTILINE | re.IGNORECASE)
+# Instead of the synchroniser of robot:cdc:firm_cdc_sync.
+SIMULATED_SYNC = CORES / "sim" / "rtl" / "firm_cdc_sync.vhd"
+
+
+def in_order(files: Iterable[Path]) -> list[Path]:
+    """Files with each unit after those that it uses."""
+    texts = {file: file.read_text(encoding="utf-8") for file in sorted(files)}
+    homes = {unit.lower(): file for file, text in texts.items() for unit in UNIT.findall(text)}
+    used = {file: {homes.get(unit.lower(), file) for unit in USED.findall(text)} for file, text in texts.items()}
+    return list(TopologicalSorter({file: others - {file} for file, others in used.items()}).static_order())
+
+
+@pytest.fixture(scope="module", params=STANDARDS)
+def standard(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def firm(standard: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    """All cores and their benches, analysed as the standard says; GHDL keeps a library for one standard only."""
+    library = Library("firm", tmp_path_factory.mktemp(f"firm_{standard}"), standard)
+    library.analyse(in_order(set(CORES.rglob("*.vhd")) - {SIMULATED_SYNC}), *STRICT)
+    return library
+
+
+def user_of(firm: Library, folder: Path) -> Library:
+    """A library `work` in `folder`, which finds `firm`."""
+    for file in firm.directory.glob("firm-obj*.cf"):
+        shutil.copy(file, folder)
+    return Library("work", folder, firm.standard)
+
+
+@pytest.mark.usefixtures("firm")
+def test_cores(standard: str, tmp_path: Path) -> None:
+    Library("firm", tmp_path, standard).analyse([SIMULATED_SYNC], *STRICT)
+
+
+def test_a_warning_is_a_fault(standard: str, tmp_path: Path) -> None:
+    path = tmp_path / "e.vhd"
+    path.write_text(
+        "entity e is generic (N : natural := 1); end e;\narchitecture a of e is\n"
+        "  function f(n : natural) return natural is begin return n; end f;\nbegin\nend a;\n"
+    )
+    with pytest.raises(GhdlError, match='hides generic "n"'):
+        Library("work", tmp_path, standard).analyse([path], *STRICT)
+
+
+@pytest.mark.parametrize("core", sorted(SPECS.glob("*/*.core")), ids=lambda path: path.stem)
+def test_systems(firm: Library, core: Path, tmp_path: Path) -> None:
+    """The accelerators and benches of the demo systems, and their generated systems with test benches."""
+    sections = yaml.safe_load(core.read_text(encoding="utf-8").partition("\n")[2])
+    given = sections["generate"]["simulation"]["parameters"]
+    spec, stimuli, model = (core.parent / given.pop(name) for name in ("spec", "stimuli", "model"))
+    # The simulators of accelerators in Verilog have their bench in Verilog, too.
+    is_vhdl = sections["targets"]["sim"]["flow_options"]["tool"] == "ghdl"
+    made = write(call(spec, stimuli, model, **given), tmp_path) if is_vhdl else generate_system(spec, tmp_path)
+    names = {path.name for path in made}
+    others = [path for path in spec.parent.rglob("*.vhd") if path.name not in names]
+    user_of(firm, tmp_path).analyse([*made, *in_order(others)], *STRICT)
+
+
+def analyse_converters(work: Library, library: MessageLibrary, names: list[MessageName], count: int) -> None:
+    """Generate and analyse the converters of `count` messages."""
+    while count:
+        name = names.pop()
+        try:
+            frame = frame_of(name, library.closure(name))
+        except InputError as error:  # an illegal definition
+            print(error)
+            continue
+        for width in (8, 64):
+            made = subscriber_files([frame], width) | publisher_files([frame], width)
+            for file, content in made.items():
+                (work.directory / file).write_text(str(content.content), encoding="ascii")
+            work.analyse([work.directory / file for file in made], *STRICT)
+        count -= 1
+
+
+@pytest.mark.parametrize("ros", [ROS1, ROS2], ids=["ros1", "ros2"])
+def test_converters(firm: Library, ros: Middleware, tmp_path: Path) -> None:
+    names = [parse_name(name) for name in MESSAGES]
+    analyse_converters(user_of(firm, tmp_path), MessageLibrary(ros), names, len(names))
+
+
+@pytest.mark.check
+@pytest.mark.parametrize("ros", [ROS1, ROS2], ids=["ros1", "ros2"])
+def test_converters_of_the_corpus(firm: Library, ros: Middleware, tmp_path: Path) -> None:
+    library = MessageLibrary(ros, [corpus.definitions(f"ros{ros.number}", "can_msgs").parent])
+    names = library.names()
+    random.Random(SEED).shuffle(names)
+    print(f"{SAMPLE} of {len(names)} messages, from seed {SEED}")
+    analyse_converters(user_of(firm, tmp_path), library, names, SAMPLE)
+
+
+MODERN_CORE = """\
+CAPI=2:
+name: user:top:modern:1
+filesets:
+  top:
+    files: [modern.vhd]
+    file_type: vhdlSource-2008
+    depend: ["~robot:cdc:firm_cdc:0.2.0", "~robot:firm:generators:0.2.0"]
+generate:
+  pose: {generator: firm, position: prepend, parameters: {message: geometry_msgs/Pose, ros: 2}}
+targets:
+  sim:
+    filesets: [top]
+    generate: [pose]
+    flow: sim
+    flow_options: {tool: ghdl, analyze_options: [--std=08]}
+    toplevel: modern
+"""
+MODERN = """\
+library ieee;
+use ieee.std_logic_1164.all;
+library firm;
+
+entity modern is
+end entity modern;
+
+architecture simulation of modern is
+
+  signal clk       : std_logic := '0';
+  signal rst_n     : std_logic := '0';
+  signal ends      : std_logic;
+  signal not_ended : std_logic;
+
+begin
+
+  rst_n <= '1' after 12 ns;
+  clk   <= not clk after 5 ns when not_ended else '0';
+
+  u_reset : entity firm.firm_cdc_reset
+    port map (clk => clk, rst_n => rst_n, synced_rst_n => ends);
+
+  invert : process (all)
+  begin
+    not_ended <= not ends;
+  end process invert;
+
+  finish : process
+  begin
+    wait until ends = '1';
+    report "PASS in " & to_string(now);
+    wait;
+  end process finish;
+
+end architecture simulation;
+"""
+
+
+def test_a_project_in_vhdl_2008_uses_the_library(tmp_path: Path) -> None:
+    (tmp_path / "modern.core").write_text(MODERN_CORE)
+    (tmp_path / "modern.vhd").write_text(MODERN)
+    fusesoc = shutil.which("fusesoc", path=f"{Path(sys.executable).parent}:{os.environ['PATH']}")
+    assert fusesoc
+    places = [f"--cores-root={folder}" for folder in (tmp_path, CORES, REPOSITORY / "generators")]
+    command = [fusesoc, *places, "run", "--target=sim", "user:top:modern"]
+    done = subprocess.run(command, cwd=tmp_path, text=True, capture_output=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "PASS in " in done.stdout + done.stderr
