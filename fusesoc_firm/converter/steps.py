@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from fusesoc_firm.converter.program import (
     Block,
     Count,
+    Drop,
     End,
+    Guard,
     Header,
     Open,
     Padding,
@@ -81,6 +83,19 @@ def alignment_of(step: Step) -> int:
     return step.alignment if isinstance(step, Padding) else 0
 
 
+def is_stream(step: Step) -> bool:
+    """Whether the step takes a number of bytes that the step before it knows."""
+    return isinstance(step, Stream | Drop)
+
+
+def _takes(step: Step) -> bool:
+    return is_fixed(step) or is_stream(step) or isinstance(step, Padding)
+
+
+def _settles(step: Step) -> bool:
+    return is_counted(step) or isinstance(step, Guard | Tail | End)
+
+
 def _size_is(size: int) -> Callable[[Step], bool]:
     return lambda step: element_size(step) == size
 
@@ -89,12 +104,13 @@ def _alignment_is(alignment: int) -> Callable[[Step], bool]:
     return lambda step: alignment_of(step) == alignment
 
 
-# The sets of steps that a template uses; except for the first two, empty sets are omitted.
+# The sets of steps that a template uses; empty sets are omitted.
 _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
+    ("TAKES", "Takes bytes.", _takes),
+    ("SETTLES", "Decides in its first cycle.", _settles),
     ("IS_FIXED", "Takes a known number of bytes.", is_fixed),
-    ("IS_REST", "Takes what is left of the payload.", lambda step: isinstance(step, Tail | End)),
-    ("IS_STREAM", "Hands bytes on.", lambda step: isinstance(step, Stream)),
-    ("IS_COUNT", "Takes a count, or the length.", lambda step: isinstance(step, Header | Count)),
+    ("IS_STREAM", "Hands bytes on, or drops them.", is_stream),
+    ("IS_COUNT", "Takes a count.", lambda step: isinstance(step, Count)),
     ("IS_PADDING", "Takes padding.", lambda step: isinstance(step, Padding)),
     ("ALIGNS_TO_2", "Padding up to a multiple of 2.", _alignment_is(2)),
     ("ALIGNS_TO_4", "Padding up to a multiple of 4.", _alignment_is(4)),
@@ -107,17 +123,20 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("HAS_4", "Its elements have 4 bytes.", _size_is(4)),
     ("HAS_8", "Its elements have 8 bytes.", _size_is(8)),
 )
-_ALWAYS_THERE = 2
 # The names of the sets in VHDL, in lower case.
-SET_NAMES = frozenset(f"step_{name}".lower() for name, _, _ in _SETS)
+SET_NAMES = frozenset(f"step_{name}".lower() for name, _, _ in _SETS) | {"step_is_beat"}
 
 
-def step_sets(steps: Sequence[Step]) -> list[Context]:
-    """The sets as rows of digits, one digit for each step."""
+def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
+    """The sets as rows of digits, one digit for each step, on a stream with this number of lanes."""
+    sets = (
+        *_SETS,
+        ("IS_BEAT", "Takes a known number of bytes, in one beat.", lambda step: 0 < fixed_size(step) <= lanes),
+    )
     found = []
-    for number, (name, about, is_in) in enumerate(_SETS):
+    for name, about, is_in in sets:
         digits = "".join(str(int(is_in(step))) for step in steps)
-        if "1" in digits or number < _ALWAYS_THERE:
+        if "1" in digits or name == "IS_BEAT":
             rows = [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
             found.append({"name": name, "about": about, "rows": rows})
     return found

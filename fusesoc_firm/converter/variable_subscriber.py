@@ -26,6 +26,7 @@ from fusesoc_firm.converter.program import (
     Segment,
     Step,
     Stream,
+    Tail,
     subscriber_program,
 )
 from fusesoc_firm.converter.slices import slices_of, windows_of
@@ -36,6 +37,7 @@ from fusesoc_firm.converter.steps import (
     fixed_size,
     is_counted,
     is_hollow,
+    is_stream,
     is_text,
     number_rows,
     step_list,
@@ -95,6 +97,7 @@ class _Subscriber:
             "width": self.window.width,
             "lanes": self.lanes,
             "count_bits": self.lanes.bit_length(),
+            "lane_bits": (self.lanes - 1).bit_length(),
             "is_byte_wide": self.lanes == 1,
             "is_narrow": self.lanes < _LARGEST_ALIGNMENT,
             # A count or the payload's length fits into one beat.
@@ -112,7 +115,8 @@ class _Subscriber:
             "parts": [found for part in self.side.parts for found in self._part(part)],
             "elements": [self._element(ports) for ports in self._elements],
             "fields": [field for _, block, named in self._stores for field in self._field_slices(block, named)],
-            "streams": self._streams(),
+            "streams": (streams := self._streams()),
+            "stream_count": len(streams),
             "stores": [
                 _store(place, block, *item, self.lanes) for place, block, named in self._stores for item in named
             ],
@@ -135,10 +139,13 @@ class _Subscriber:
         last_bytes = [size - self.lanes * beat for size, beat in zip(sizes, last_beats, strict=True)]
         return {
             "steps": step_list(self.steps),
-            "step_sets": step_sets(self.steps),
-            "largest_number": max(*last_beats, *last_bytes),
+            "step_sets": step_sets(self.steps, self.lanes),
+            "largest_number": max(self.lanes, *last_beats),
+            # The header is step 0.
+            "is_first_last": int(last_beats[0] == 0),
             "beat_bits": max(1, max(last_beats).bit_length()),
             "last_beats": number_rows(last_beats),
+            "first_bytes": number_rows([min(size, self.lanes) for size in sizes]),
             "last_bytes": number_rows(last_bytes),
         }
 
@@ -146,9 +153,17 @@ class _Subscriber:
         """The kinds of steps that occur in the program, with the cases that the template must distinguish."""
         sizes = {element_size(step) for step in self.steps}
         alignments = {alignment_of(step) for step in self.steps}
+        has_data = any(isinstance(step, Stream) for step in self.steps)
+        has_opens = any(map(is_counted, self.steps))
+        tail = [{"step": place} for place, step in enumerate(self.steps) if isinstance(step, Tail)]
         return {
-            "has_data": any(isinstance(step, Stream) for step in self.steps),
-            "has_opens": any(map(is_counted, self.steps)),
+            "has_data": has_data,
+            "has_stream": any(map(is_stream, self.steps)),
+            "has_opens": has_opens,
+            "has_left": has_opens or bool(tail),
+            "has_zero": any(isinstance(step, Guard | Tail) or is_counted(step) for step in self.steps),
+            "tail": tail,
+            "opened_bytes": "count_bytes" if has_data else "left_r",
             "has_text": any(map(is_text, self.steps)),
             "has_hollow": any(map(is_hollow, self.steps)),
             "element_sizes": [
@@ -203,6 +218,7 @@ class _Subscriber:
                 "has_length": has_length,
                 "is_closed": is_closed,
                 "count": step.part.count if isinstance(step.part, Loop) else None,
+                "is_single": int(isinstance(step.part, Loop) and step.part.count == 1),
             }
 
     def _loop(self, place: int) -> Context:
@@ -221,9 +237,11 @@ class _Subscriber:
         """The jumps of a step, past an empty part and at the end of an element."""
         match self.steps[place]:
             case Guard():
-                yield _jump("is_guard", place, self.program.behind_guard(place))
+                yield _jump("is_skip", place, self.program.behind_guard(place))
             case Open() as step if is_counted(step) and self.program.behind(place) != place + 1:
-                yield _jump("is_open", place, self.program.behind(place))
+                yield _jump("is_skip", place, self.program.behind(place))
+            case Tail():
+                yield _jump("is_skip", place, place + 2)
             case Close(loop=loop):
                 yield _jump("is_last_element", place, place + 1, self._number(loop))
                 yield _jump("is_element", place, self.program.body(place), self._number(loop))
@@ -248,7 +266,11 @@ class _Subscriber:
     def _streams(self) -> list[Context]:
         """All used streams; the bytes of other streams are dropped."""
         streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, Stream)]
-        return [{"name": self.side.stream(part).name, "step": place} for place, part in streams if part.is_used]
+        used = [(place, part) for place, part in streams if part.is_used]
+        return [
+            {"name": self.side.stream(part).name, "step": place, "number": number}
+            for number, (place, part) in enumerate(used)
+        ]
 
     @cached_property
     def _stores(self) -> list[tuple[int, Block, list[tuple[str, Store]]]]:
@@ -312,7 +334,7 @@ class _Subscriber:
         return f"segment_valid_{self._number(loop)}_r({segment.number})"
 
 
-_JUMPS = ("is_guard", "is_open", "is_last_element", "is_element")
+_JUMPS = ("is_skip", "is_last_element", "is_element")
 
 
 def _jump(kind: str, place: int, target: int, number: int | None = None) -> Context:
