@@ -100,10 +100,6 @@ def _size_is(size: int) -> Callable[[Step], bool]:
     return lambda step: element_size(step) == size
 
 
-def _alignment_is(alignment: int) -> Callable[[Step], bool]:
-    return lambda step: alignment_of(step) == alignment
-
-
 # The sets of steps that a template uses; empty sets are omitted.
 _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("TAKES", "Takes bytes.", _takes),
@@ -112,8 +108,6 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("IS_STREAM", "Hands bytes on, or drops them.", is_stream),
     ("IS_COUNT", "Takes a count.", lambda step: isinstance(step, Count)),
     ("IS_PADDING", "Takes padding.", lambda step: isinstance(step, Padding)),
-    ("ALIGNS_TO_2", "Padding up to a multiple of 2.", _alignment_is(2)),
-    ("ALIGNS_TO_4", "Padding up to a multiple of 4.", _alignment_is(4)),
     ("IS_OPEN", "Knows a count.", is_counted),
     ("IS_TEXT", "Its count includes a closing zero.", is_text),
     ("CLOSES_TEXT", "Begins with that zero.", closes_text),
@@ -124,7 +118,9 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("HAS_8", "Its elements have 8 bytes.", _size_is(8)),
 )
 # The names of the sets in VHDL, in lower case.
-SET_NAMES = frozenset(f"step_{name}".lower() for name, _, _ in _SETS) | {"step_is_beat"}
+SET_NAMES = frozenset(
+    f"{kind}_{name}".lower() for kind in ("step", "next") for name in ("IS_BEAT", *(name for name, _, _ in _SETS))
+) | {"next_aligns_to_2", "next_aligns_to_4"}
 
 
 def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
@@ -137,9 +133,39 @@ def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
     for name, about, is_in in sets:
         digits = "".join(str(int(is_in(step))) for step in steps)
         if "1" in digits or name == "IS_BEAT":
-            rows = [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
-            found.append({"name": name, "about": about, "rows": rows})
+            found.append({"name": name, "about": about, "rows": digit_rows(digits)})
     return found
+
+
+def digit_rows(digits: str) -> list[str]:
+    """The rows of a table with one digit for each step."""
+    return [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
+
+
+_REGISTERS = {
+    "TAKES": ("wants_r", "it takes bytes"),
+    "SETTLES": ("settles_r", "it decides in this cycle, and acts in the next one"),
+    "IS_BEAT": ("ends_r", "its bytes in the next beat are its last ones, if that is known"),
+    "IS_FIXED": ("fixed_r", "its number of bytes is known"),
+    "IS_STREAM": ("stream_r", "it is a stream"),
+    "IS_PADDING": ("padded_r", "it is padding"),
+    "IS_COUNT": ("count_r", "it takes a count"),
+    "CLOSES_TEXT": ("closes_r", "its next byte ends a text"),
+    "IS_OPEN": ("counted_r", "it knows a count"),
+    "IS_TEXT": ("text_r", "of a text, with its terminating zero"),
+    "OPENS_DATA": ("opens_r", "of a stream"),
+    **{f"HAS_{size}": (f"has_{size}_r", f"with elements of {size} bytes") for size in (2, 4, 8)},
+}
+
+
+def step_classes(sets: Sequence[Context]) -> list[Context]:
+    """The sets that a subscriber keeps in a register for its current step."""
+    names = {found["name"] for found in sets}
+    return [
+        {"set": name, "register": register, "about": about}
+        for name, (register, about) in _REGISTERS.items()
+        if name in names
+    ]
 
 
 def number_rows(numbers: Sequence[int]) -> list[str]:
