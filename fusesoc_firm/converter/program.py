@@ -9,11 +9,11 @@ steps:
     Count, Guard, Open  a part's number of elements; a skip of an empty part's padding; the beginning of a part
     Stream              the elements of a string or an array of numbers
     Close               the end of an element of an array of messages or strings
-    Tail                the unused rest of the payload
+    Tail, Drop          the unused rest of the payload: its length, and its bytes
     End                 the end of the message
 
 The index in the list identifies a step. Each step is followed by the next step in the list, with three exceptions whose
-targets `Program` computes: `Guard` and `Open` of an empty part, and `Close`.
+targets `Program` computes: `Guard`, `Open` and `Tail` of an empty part, and `Close`.
 """
 
 from __future__ import annotations
@@ -124,7 +124,12 @@ class Close:
 
 @dataclass(frozen=True)
 class Tail:
-    """The rest of the payload."""
+    """The length of the rest of the payload; it skips an empty rest."""
+
+
+@dataclass(frozen=True)
+class Drop:
+    """The bytes of the rest of the payload."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +137,7 @@ class End:
     """The end of the message."""
 
 
-Step = Header | Block | Padding | Count | Guard | Open | Stream | Close | Tail | End
+Step = Header | Block | Padding | Count | Guard | Open | Stream | Close | Tail | Drop | End
 
 
 @dataclass(frozen=True)
@@ -391,7 +396,7 @@ def _is_valued(step: Step) -> bool:
 
 
 def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Replace the steps after the last used one by a `Tail`, unless they only close a text."""
+    """Replace the steps after the last used one by a `Tail` and a `Drop`, unless they only close a text."""
     last = max(place for place, step in enumerate(steps) if _is_used(step))
     # A loop always runs to its end.
     closings = {step.loop.path: place for place, step in enumerate(steps) if isinstance(step, Close)}
@@ -401,7 +406,7 @@ def _cut_behind_last_use(steps: Sequence[Step]) -> tuple[Step, ...]:
     rest = steps[last + 1 : -1]
     if not any(isinstance(step, Count | Open) or (isinstance(step, Block) and not step.checks) for step in rest):
         return tuple(steps)
-    return (*steps[: last + 1], Tail(), steps[-1])
+    return (*steps[: last + 1], Tail(), Drop(), steps[-1])
 
 
 def _is_used(step: Step) -> bool:

@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from fusesoc_firm.converter.program import (
     Block,
     Count,
+    Drop,
     End,
+    Guard,
     Header,
     Open,
     Padding,
@@ -81,23 +83,31 @@ def alignment_of(step: Step) -> int:
     return step.alignment if isinstance(step, Padding) else 0
 
 
+def is_stream(step: Step) -> bool:
+    """Whether the step takes a number of bytes that the step before it knows."""
+    return isinstance(step, Stream | Drop)
+
+
+def _takes(step: Step) -> bool:
+    return is_fixed(step) or is_stream(step) or isinstance(step, Padding)
+
+
+def _settles(step: Step) -> bool:
+    return is_counted(step) or isinstance(step, Guard | Tail | End)
+
+
 def _size_is(size: int) -> Callable[[Step], bool]:
     return lambda step: element_size(step) == size
 
 
-def _alignment_is(alignment: int) -> Callable[[Step], bool]:
-    return lambda step: alignment_of(step) == alignment
-
-
-# The sets of steps that a template uses; except for the first two, empty sets are omitted.
+# The sets of steps that a template uses; empty sets are omitted.
 _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
+    ("TAKES", "Takes bytes.", _takes),
+    ("SETTLES", "Decides in its first cycle.", _settles),
     ("IS_FIXED", "Takes a known number of bytes.", is_fixed),
-    ("IS_REST", "Takes what is left of the payload.", lambda step: isinstance(step, Tail | End)),
-    ("IS_STREAM", "Hands bytes on.", lambda step: isinstance(step, Stream)),
-    ("IS_COUNT", "Takes a count, or the length.", lambda step: isinstance(step, Header | Count)),
+    ("IS_STREAM", "Hands bytes on, or drops them.", is_stream),
+    ("IS_COUNT", "Takes a count.", lambda step: isinstance(step, Count)),
     ("IS_PADDING", "Takes padding.", lambda step: isinstance(step, Padding)),
-    ("ALIGNS_TO_2", "Padding up to a multiple of 2.", _alignment_is(2)),
-    ("ALIGNS_TO_4", "Padding up to a multiple of 4.", _alignment_is(4)),
     ("IS_OPEN", "Knows a count.", is_counted),
     ("IS_TEXT", "Its count includes a closing zero.", is_text),
     ("CLOSES_TEXT", "Begins with that zero.", closes_text),
@@ -107,20 +117,55 @@ _SETS: tuple[tuple[str, str, Callable[[Step], bool]], ...] = (
     ("HAS_4", "Its elements have 4 bytes.", _size_is(4)),
     ("HAS_8", "Its elements have 8 bytes.", _size_is(8)),
 )
-_ALWAYS_THERE = 2
 # The names of the sets in VHDL, in lower case.
-SET_NAMES = frozenset(f"step_{name}".lower() for name, _, _ in _SETS)
+SET_NAMES = frozenset(
+    f"{kind}_{name}".lower() for kind in ("step", "next") for name in ("IS_BEAT", *(name for name, _, _ in _SETS))
+) | {"next_aligns_to_2", "next_aligns_to_4"}
 
 
-def step_sets(steps: Sequence[Step]) -> list[Context]:
-    """The sets as rows of digits, one digit for each step."""
+def step_sets(steps: Sequence[Step], lanes: int) -> list[Context]:
+    """The sets as rows of digits, one digit for each step, on a stream with this number of lanes."""
+    sets = (
+        *_SETS,
+        ("IS_BEAT", "Takes a known number of bytes, in one beat.", lambda step: 0 < fixed_size(step) <= lanes),
+    )
     found = []
-    for number, (name, about, is_in) in enumerate(_SETS):
+    for name, about, is_in in sets:
         digits = "".join(str(int(is_in(step))) for step in steps)
-        if "1" in digits or number < _ALWAYS_THERE:
-            rows = [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
-            found.append({"name": name, "about": about, "rows": rows})
+        if "1" in digits or name == "IS_BEAT":
+            found.append({"name": name, "about": about, "rows": digit_rows(digits)})
     return found
+
+
+def digit_rows(digits: str) -> list[str]:
+    """The rows of a table with one digit for each step."""
+    return [digits[start : start + _DIGITS_IN_A_ROW] for start in range(0, len(digits), _DIGITS_IN_A_ROW)]
+
+
+_REGISTERS = {
+    "TAKES": ("wants_r", "it takes bytes"),
+    "SETTLES": ("settles_r", "it decides in this cycle, and acts in the next one"),
+    "IS_BEAT": ("ends_r", "its bytes in the next beat are its last ones, if that is known"),
+    "IS_FIXED": ("fixed_r", "its number of bytes is known"),
+    "IS_STREAM": ("stream_r", "it is a stream"),
+    "IS_PADDING": ("padded_r", "it is padding"),
+    "IS_COUNT": ("count_r", "it takes a count"),
+    "CLOSES_TEXT": ("closes_r", "its next byte ends a text"),
+    "IS_OPEN": ("counted_r", "it knows a count"),
+    "IS_TEXT": ("text_r", "of a text, with its terminating zero"),
+    "OPENS_DATA": ("opens_r", "of a stream"),
+    **{f"HAS_{size}": (f"has_{size}_r", f"with elements of {size} bytes") for size in (2, 4, 8)},
+}
+
+
+def step_classes(sets: Sequence[Context]) -> list[Context]:
+    """The sets that a subscriber keeps in a register for its current step."""
+    names = {found["name"] for found in sets}
+    return [
+        {"set": name, "register": register, "about": about}
+        for name, (register, about) in _REGISTERS.items()
+        if name in names
+    ]
 
 
 def number_rows(numbers: Sequence[int]) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 from fusesoc_firm.converter.message_ports import (
     ElementPorts,
@@ -26,18 +27,22 @@ from fusesoc_firm.converter.program import (
     Segment,
     Step,
     Stream,
+    Tail,
     subscriber_program,
 )
 from fusesoc_firm.converter.slices import slices_of, windows_of
 from fusesoc_firm.converter.steps import (
     alignment_of,
     closes_text,
+    digit_rows,
     element_size,
     fixed_size,
     is_counted,
     is_hollow,
+    is_stream,
     is_text,
     number_rows,
+    step_classes,
     step_list,
     step_sets,
     terminator_of,
@@ -95,6 +100,7 @@ class _Subscriber:
             "width": self.window.width,
             "lanes": self.lanes,
             "count_bits": self.lanes.bit_length(),
+            "lane_bits": (self.lanes - 1).bit_length(),
             "is_byte_wide": self.lanes == 1,
             "is_narrow": self.lanes < _LARGEST_ALIGNMENT,
             # A count or the payload's length fits into one beat.
@@ -112,7 +118,8 @@ class _Subscriber:
             "parts": [found for part in self.side.parts for found in self._part(part)],
             "elements": [self._element(ports) for ports in self._elements],
             "fields": [field for _, block, named in self._stores for field in self._field_slices(block, named)],
-            "streams": self._streams(),
+            "streams": (streams := self._streams()),
+            "stream_count": len(streams),
             "stores": [
                 _store(place, block, *item, self.lanes) for place, block, named in self._stores for item in named
             ],
@@ -123,7 +130,6 @@ class _Subscriber:
                 if isinstance(step, Header | Block | Open) and (bit := self._segment_bit(step.completes))
             ],
             "loops": [self._loop(place) for place, step in enumerate(self.steps) if isinstance(step, Close)],
-            "jumps": [jump for place in range(len(self.steps)) for jump in self._jumps(place)],
         }
 
     # --- steps --------------------------------------------------------------------------------------------------
@@ -135,10 +141,13 @@ class _Subscriber:
         last_bytes = [size - self.lanes * beat for size, beat in zip(sizes, last_beats, strict=True)]
         return {
             "steps": step_list(self.steps),
-            "step_sets": step_sets(self.steps),
-            "largest_number": max(*last_beats, *last_bytes),
+            "step_sets": (sets := step_sets(self.steps, self.lanes)),
+            "classes": step_classes(sets),
+            "targets": number_rows([self._target(*choice) for choice in self._choices]),
+            "largest_number": max(self.lanes, *last_beats),
             "beat_bits": max(1, max(last_beats).bit_length()),
             "last_beats": number_rows(last_beats),
+            "first_bytes": number_rows([min(size, self.lanes) for size in sizes]),
             "last_bytes": number_rows(last_bytes),
         }
 
@@ -146,9 +155,17 @@ class _Subscriber:
         """The kinds of steps that occur in the program, with the cases that the template must distinguish."""
         sizes = {element_size(step) for step in self.steps}
         alignments = {alignment_of(step) for step in self.steps}
+        has_data = any(isinstance(step, Stream) for step in self.steps)
+        has_opens = any(map(is_counted, self.steps))
+        tail = [{"step": place} for place, step in enumerate(self.steps) if isinstance(step, Tail)]
         return {
-            "has_data": any(isinstance(step, Stream) for step in self.steps),
-            "has_opens": any(map(is_counted, self.steps)),
+            "has_data": has_data,
+            "has_stream": any(map(is_stream, self.steps)),
+            "has_opens": has_opens,
+            "has_left": has_opens or bool(tail),
+            "has_zero": any(isinstance(step, Guard | Tail) or is_counted(step) for step in self.steps),
+            "tail": tail,
+            "opened_bytes": "count_bytes" if has_data else "left_r",
             "has_text": any(map(is_text, self.steps)),
             "has_hollow": any(map(is_hollow, self.steps)),
             "element_sizes": [
@@ -156,16 +173,12 @@ class _Subscriber:
                 for size, shift in ((2, 1), (4, 2), (8, 3))
                 if size in sizes
             ],
-            "alignments": [
-                {"alignment": alignment, "mask": mask}
+            "aligned_sets": [
+                {"alignment": alignment, "mask": mask, "rows": digit_rows(self._aligned(alignment))}
                 for alignment, mask in ((2, "001"), (4, "011"))
                 if alignment in alignments
             ],
-            "paddings": [
-                {"step": place, "bits": step.alignment.bit_length() - 1, "behind": place + 1}
-                for place, step in enumerate(self.steps)
-                if isinstance(step, Padding)
-            ],
+            "paddings": [{} for step in self.steps if isinstance(step, Padding)],
         }
 
     def _checks(self) -> Context:
@@ -203,6 +216,7 @@ class _Subscriber:
                 "has_length": has_length,
                 "is_closed": is_closed,
                 "count": step.part.count if isinstance(step.part, Loop) else None,
+                "is_single": int(isinstance(step.part, Loop) and step.part.count == 1),
             }
 
     def _loop(self, place: int) -> Context:
@@ -213,20 +227,50 @@ class _Subscriber:
             "number": self._number(step.loop),
             "about": dotted(step.loop.names),
             "step": place,
-            "is_joined": isinstance(self.steps[place - 1], Block | Stream),
+            "is_joined": self._is_joined(place),
             "is_used": step.loop.path in self._element_paths,
         }
 
-    def _jumps(self, place: int) -> Iterator[Context]:
-        """The jumps of a step, past an empty part and at the end of an element."""
+    @cached_property
+    def _choices(self) -> list[tuple[int, bool, bool]]:
+        """The arguments of `_target` in the order of the table."""
+        return list(product(range(len(self.steps)), (False, True), (False, True)))
+
+    def _target(self, place: int, turns: bool, is_aligned: bool) -> int:
+        """The step after a step; `is_aligned` skips the padding there."""
+        target = self._successor(place, turns)
+        while is_aligned and isinstance(self.steps[target], Padding):
+            target += 1
+        return target
+
+    def _successor(self, place: int, turns: bool) -> int:
+        """The step after a step: `turns` skips an empty part, and leaves a loop at its last element."""
+        if place in self._ends:
+            close = self._ends[place]
+            return close + 1 if turns else self.program.body(close)
         match self.steps[place]:
-            case Guard():
-                yield _jump("is_guard", place, self.program.behind_guard(place))
-            case Open() as step if is_counted(step) and self.program.behind(place) != place + 1:
-                yield _jump("is_open", place, self.program.behind(place))
-            case Close(loop=loop):
-                yield _jump("is_last_element", place, place + 1, self._number(loop))
-                yield _jump("is_element", place, self.program.body(place), self._number(loop))
+            case Guard() if turns:
+                return self.program.behind_guard(place)
+            case Open() as step if is_counted(step) and turns:
+                return self.program.behind(place)
+            case Tail() if turns:
+                return place + 2
+        return min(place + 1, len(self.steps) - 1)
+
+    @cached_property
+    def _ends(self) -> dict[int, int]:
+        """The steps with which an element may end, and the `Close` of each."""
+        closes = [place for place, step in enumerate(self.steps) if isinstance(step, Close)]
+        return {place - joined: place for place in closes for joined in (0, 1) if not joined or self._is_joined(place)}
+
+    def _is_joined(self, place: int) -> bool:
+        """Whether the element ends with the bytes of the step before its `Close`."""
+        return isinstance(self.steps[place - 1], Block | Stream)
+
+    def _aligned(self, alignment: int) -> str:
+        """The digits of the steps and choices that lead to padding of an alignment."""
+        choices = product(range(len(self.steps)), (False, True))
+        return "".join(str(int(alignment_of(self.steps[self._successor(*choice)]) == alignment)) for choice in choices)
 
     # --- ports --------------------------------------------------------------------------------------------------
 
@@ -248,7 +292,11 @@ class _Subscriber:
     def _streams(self) -> list[Context]:
         """All used streams; the bytes of other streams are dropped."""
         streams = [(place, step.part) for place, step in enumerate(self.steps) if isinstance(step, Stream)]
-        return [{"name": self.side.stream(part).name, "step": place} for place, part in streams if part.is_used]
+        used = [(place, part) for place, part in streams if part.is_used]
+        return [
+            {"name": self.side.stream(part).name, "step": place, "number": number}
+            for number, (place, part) in enumerate(used)
+        ]
 
     @cached_property
     def _stores(self) -> list[tuple[int, Block, list[tuple[str, Store]]]]:
@@ -310,14 +358,6 @@ class _Subscriber:
         if self.side.element(loop).segments is None:
             return ""
         return f"segment_valid_{self._number(loop)}_r({segment.number})"
-
-
-_JUMPS = ("is_guard", "is_open", "is_last_element", "is_element")
-
-
-def _jump(kind: str, place: int, target: int, number: int | None = None) -> Context:
-    """A jump of the given kind; `number` is the number of a loop."""
-    return {"step": place, "target": target, "number": number, **{name: name == kind for name in _JUMPS}}
 
 
 def _store(place: int, block: Block, name: str, store: Store, lanes: int) -> Context:

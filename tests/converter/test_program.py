@@ -98,7 +98,7 @@ def test_segment_0_is_there_without_a_field() -> None:
 def test_behind_the_last_used_part_is_a_tail() -> None:
     frame = select(standard(ROS2, "sensor_msgs/Image"), {"height": None})
     words = outline(subscriber_program(frame))
-    assert words[-3:] == ["Block8 height 0", "Tail", "End"]
+    assert words[-4:] == ["Block8 height 0", "Tail", "Drop", "End"]
     assert "Stream header.frame_id" in words
 
 

@@ -31,8 +31,13 @@ entity firm_axis_window is
     available : out std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     -- The frame ends with the available bytes, which may be none.
     is_last : out std_logic;
+    -- For a reader whose `take` is a register: the first `take` bytes are available; and if so, the frame ends with
+    -- them. Both are a cycle late for bytes that reach into the frame's last beat, which keeps the paths short.
+    shown : out std_logic;
+    ends  : out std_logic;
 
-    -- Takes the first `take` bytes, at most `available`. The frame is over when `is_last` and all were taken.
+    -- Takes the first `take` bytes, at most `available`, or any larger number for all of a frame's last ones. The frame
+    -- is over when `is_last` and all were taken.
     take_valid : in std_logic;
     take       : in std_logic_vector(clog2(WIDTH/8+1)-1 downto 0);
     -- A pulse drops the rest of the frame and overrides `take`; if the window shows no frame, it drops the next one.
@@ -67,6 +72,8 @@ begin
     window        <= s_axis_tdata;
     available(0)  <= s_axis_tvalid and not skipping_r;
     is_last       <= s_axis_tvalid and s_axis_tlast and not skipping_r;
+    shown         <= (s_axis_tvalid and not skipping_r) or not take(0);
+    ends          <= s_axis_tlast and take(0);
     s_axis_tready <= dropping or (take_valid and take(0));
 
     remember_skip : process (clk)
@@ -93,6 +100,19 @@ begin
     begin
       return 8 * (LANES + step_of(stage) - 1) - 1;
     end function top_of;
+
+    -- Yosys makes a carry chain of `<`, which is slower at so few bits.
+    function is_less(number, bound : unsigned) return std_logic is
+      variable low, high : unsigned(COUNT_BITS downto 0);
+      variable is_so     : std_logic := '0';
+    begin
+      low  := resize(number, COUNT_BITS+1);
+      high := resize(bound, COUNT_BITS+1);
+      for place in 0 to COUNT_BITS loop
+        is_so := (not low(place) and high(place)) or (not (low(place) xor high(place)) and is_so);
+      end loop;
+      return is_so;
+    end function is_less;
 
     -- LANES bytes from lane `offset` of 2*LANES-1 lanes.
     function bytes_from(lanes_in : std_logic_vector; offset : unsigned) return std_logic_vector is
@@ -145,9 +165,15 @@ begin
     signal joined     : unsigned(COUNT_BITS downto 0);  -- the frame's bytes in both beats
     signal overflow   : std_logic;                      -- they are more than the window shows
     signal ends_next  : std_logic;                      -- the frame ends in the next beat, and within the window
-    signal taken      : count_t;
+    signal wanted     : count_t;
+    signal exceeds    : std_logic;                      -- more bytes are wanted than the first beat holds
+    signal empties    : std_logic;                      -- all of them are wanted
+    signal has_next   : std_logic;                      -- the next beat belongs to the frame
+    signal is_empty   : std_logic;                      -- and holds no byte
     signal move       : std_logic;                      -- the next beat becomes the first
     signal uses_up    : std_logic;                      -- its bytes are taken already
+    signal joined_r   : unsigned(COUNT_BITS downto 0);  -- `joined` of the cycle before
+    signal is_same_r  : std_logic := '0';               -- nothing has moved since
 
     signal s_axis_tready_out : std_logic;
 
@@ -226,11 +252,22 @@ begin
       end if;
     end process show_count;
 
-    taken   <= unsigned(take) when take_valid = '1' else (others => '0');
-    move    <= '1' when filled_r = '0' or dropping = '1' or (take_valid = '1' and taken >= left_r) else '0';
-    uses_up <= '1' when filled_r = '1' and dropping = '0' and ends_next = '1' and take_valid = '1'
-                        and taken = joined else
-               '0';
+    wanted   <= unsigned(take);
+    exceeds  <= is_less(left_r, wanted);
+    empties  <= not is_less(wanted, left_r);
+    has_next <= next_tvalid and not last_r;
+    is_empty <= is_equal(std_logic_vector(next_bytes), 0);
+
+    -- A frame's beats are full but for the last one.
+    shown <= filled_r and not skipping_r
+             and (not exceeds
+                  or (has_next and (not next_tlast or (is_same_r and not is_less(joined_r, wanted)))));
+    ends  <= empties when last_r = '1' else
+             has_next and next_tlast
+             and ((is_empty and empties) or (is_same_r and not is_less(wanted, joined_r)));
+
+    move    <= not filled_r or dropping or (take_valid and empties);
+    uses_up <= filled_r and not dropping and ends_next and take_valid and not is_less(wanted, joined);
 
     move_beat : process (clk)
     begin
@@ -250,16 +287,20 @@ begin
           left_r     <= (others => '0');
         else
           skipping_r <= dropping and not (filled_r and last_r);
-          offset_r   <= offset_r + taken(OFFSET_BITS-1 downto 0);
-          if move = '0' then
-            left_r <= left_r - taken;
-          elsif next_tvalid = '1' and next_first = '1' then
-            offset_r <= to_unsigned(VOID, OFFSET_BITS);
-            left_r   <= next_bytes;
-          else
-            left_r <= resize(joined - taken, COUNT_BITS);
+          joined_r   <= joined;
+          is_same_r  <= next_tvalid and not move and not take_valid;
+          if take_valid = '1' then
+            offset_r <= offset_r + wanted(OFFSET_BITS-1 downto 0);
+            left_r   <= left_r - wanted;
           end if;
           if move = '1' then
+            left_r <= next_bytes;
+            if filled_r = '1' and next_first = '0' then
+              left_r <= left_r - wanted + next_bytes;
+            end if;
+            if next_tvalid = '1' and next_first = '1' then
+              offset_r <= to_unsigned(VOID, OFFSET_BITS);
+            end if;
             filled_r <= next_tvalid and not uses_up;
             last_r   <= next_tlast and next_tvalid;
           end if;

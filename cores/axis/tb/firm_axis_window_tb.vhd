@@ -48,6 +48,8 @@ architecture simulation of firm_axis_window_tb is
   signal window     : std_logic_vector(WIDTH-1 downto 0);
   signal available  : std_logic_vector(COUNT_BITS-1 downto 0);
   signal is_last    : std_logic;
+  signal shown      : std_logic;
+  signal ends       : std_logic;
   signal take_valid : std_logic := '0';
   signal take_count : std_logic_vector(COUNT_BITS-1 downto 0);
   signal skip       : std_logic := '0';
@@ -77,6 +79,8 @@ begin
       window        => window,
       available     => available,
       is_last       => is_last,
+      shown         => shown,
+      ends          => ends,
       take_valid    => take_valid,
       take          => take_count,
       skip          => skip
@@ -240,6 +244,19 @@ begin
     is_done <= true;
     wait;
   end process read;
+
+  check_shown : process
+  begin
+    wait until falling_edge(clk);
+    wait for 3 ns;
+    if take_valid = '1' and skip = '0' then
+      assert is_defined(shown & "") and (shown = '0' or is_defined(ends & ""))
+        report "an output is undefined" severity failure;
+      assert shown = '0' or unsigned(take_count) <= unsigned(available) report "it shows too much" severity failure;
+      assert shown = '0' or unsigned(available) = 0 or (ends = '1') = (is_last = '1' and take_count = available)
+        report "the frame ends elsewhere" severity failure;
+    end if;
+  end process check_shown;
 
   -- Sampled before the inputs change, and again before the clock rises.
   find_paths : process

