@@ -44,4 +44,4 @@ class Table:
 
 def filled(text: str) -> str:
     """A paragraph in lines as long as docs have them."""
-    return textwrap.fill(" ".join(text.split()), _LINE_LENGTH)
+    return textwrap.fill(" ".join(text.split()), _LINE_LENGTH, break_on_hyphens=False)
