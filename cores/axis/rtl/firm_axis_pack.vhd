@@ -2,8 +2,8 @@
 -- Packs frames that arrive as any number of bytes per cycle into full beats. The last 1 to LANES bytes of a frame wait
 -- in `rest_r` until more arrive or the frame ends, so the end may be signalled later, without a byte. A rotation of
 -- radix 4 aligns arriving bytes after the waiting ones; excess bytes are then already in the lanes where the next beat
--- needs them. While a tail leaves, the next frame enters: only `m_axis_tready` ever stalls the input, a cycle late, since
--- a register slice holds the output.
+-- needs them. While a tail leaves, the next frame enters: only `m_axis_tready` ever stalls the input, a cycle late,
+-- since a register slice holds the output.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;

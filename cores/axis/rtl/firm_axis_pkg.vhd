@@ -30,7 +30,7 @@ package firm_axis_pkg is
   -- `word` if `enable` is '1', else zeros. ORs of such words select one of them in parallel.
   function gated(word : std_logic_vector; enable : std_logic) return std_logic_vector;
 
-  -- '1' if all bits are. A comparison with a constant would be limited to 32 bits, and unknown bits would give a warning.
+  -- '1' if all bits are. A comparison with a constant would be limited to 32 bits, and give a warning for unknown bits.
   function are_ones(bits : std_logic_vector) return std_logic;
 
   -- The number of ones in a contiguous `keep` of a stream, which has 1 to 64 bits.

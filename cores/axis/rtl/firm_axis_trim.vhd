@@ -1,8 +1,8 @@
 -- SPDX-License-Identifier: Apache-2.0
 -- Makes a frame exactly as long as its header announces: excess bytes are dropped, and a frame that ends early is
 -- padded. It is placed before firm_axis_pack and has the same ports on both sides. Its output is a register; only
--- `m_ready` reaches `ready` in the same cycle. The remaining bytes are counted with 32 bits, but compared with few: they
--- are less than two beats if they were before the previous piece, or they are enough for any piece.
+-- `m_ready` reaches `ready` in the same cycle. The remaining bytes are counted with 32 bits, but compared with few:
+-- they are less than two beats if they were before the previous piece, or they are enough for any piece.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
