@@ -50,7 +50,7 @@ _LITERAL_BYTES = 4
 _COUNTER_BITS = 32
 _LARGEST_NATURAL = 2**31 - 1
 _ZEROS = "(others => '0')"
-_TRUE = "'1'"
+_ALWAYS = ""
 
 
 def variable_publisher_configuration(frame: Frame, width: int, entity: str) -> Context:
@@ -102,8 +102,8 @@ class _Publisher:
             "early_bits": 8 * self._early_bytes,
             "is_length_parted": self._early_bytes < LENGTH_BYTES,
             "pieces": list(self._pieces()),
-            "supplies": _by_place(self._supplies()),
-            "sizes": _by_place(self._sizes()),
+            "supplies": _gathered(self._supplies()),
+            "sizes": [size for size in _gathered(self._sizes()) if int(size["size"].strip('"'), 2)],
             **self._repeats(),
             **self._stream_keys(),
             **self._opening_keys(),
@@ -172,7 +172,7 @@ class _Publisher:
                 if area.last > area.first:
                     yield area.last - 1, {"signal": signal, "element": ""}
                 whole = self.side.element(closing.loop).valid
-                signal, element = (whole, "") if signal in (_TRUE, whole) else (signal, whole)
+                signal, element = (whole, "") if signal in (_ALWAYS, whole) else (signal, whole)
             yield area.last, {"signal": signal, "element": element}
 
     def _supply(self, step: Step) -> str:
@@ -183,12 +183,12 @@ class _Publisher:
                 return self.side.element(loop).valid
             case Header(segment=segment) | Block(segment=segment) | Count(segment=segment):
                 return self._segment(segment)
-        return _TRUE
+        return _ALWAYS
 
     def _segment(self, segment: Segment | None) -> str:
         # After the first place, the message's first segment either stays valid or the message is withdrawn.
         if segment is None or segment == Segment((), 0):
-            return _TRUE
+            return _ALWAYS
         if not segment.scope:
             return f"segment_valid({segment.number})"
         ports = self.side.element(segment.scope[-1])
@@ -228,13 +228,20 @@ class _Publisher:
         extra_bits = max((_shift(port.part) for _, port in self._streams), default=0)
         return {
             "streams": [{"name": port.name, "place": area.first} for area, port in self._streams],
-            "in_stream": _any_place(area.first for area, _ in self._streams),
+            "in_stream": _at(area.first for area, _ in self._streams),
+            "can_be_long": bool(self._streams or self._closings),
             # The counter counts the bytes of up to 2**32 - 1 elements.
             "left_bits": _COUNTER_BITS + extra_bits,
             "has_extra_bits": extra_bits > 0,
+            "near_bits": self._near_bits,
             "step_bits": max(2, self.lanes).bit_length(),
             "counts_data": _any_area(area for area in self._counts if isinstance(_part(area), Data)),
         }
+
+    @property
+    def _near_bits(self) -> int:
+        """The bits of a number of bytes that can end with the next beat; a text's count has one byte more."""
+        return max(2, self.lanes.bit_length())
 
     @property
     def _counts(self) -> list[Area]:
@@ -248,39 +255,48 @@ class _Publisher:
 
     def _opening_keys(self) -> Context:
         data = [(area.first, part) for area in self._opens if isinstance(part := _part(area), Data)]
-        jumps = [*map(self._opening_jump, self._opens), *map(self._closing_jump, self._closings)]
+        jumps = [*self._opening_jumps(), *map(self._closing_jump, self._closings)]
+        never = {area.last for area in self._opens} - {place for place, _ in jumps}
         return {
             "opens_data": _any_place(place for place, _ in data),
             "opens_text": _any_place(place for place, part in data if part.terminator),
+            "opens_text_here": _at(place for place, part in data if part.terminator),
+            "opens_plain": _any_place(place for place, part in data if not part.terminator),
+            "has_plain": any(not part.terminator for _, part in data),
+            "opens_bytes": _any_place(place for place, part in data if not _shift(part)),
             "shifts": [
-                {"places": _any_place(place for place, part in data if _shift(part) == shift), "shift": shift}
+                {
+                    "places": _any_place(place for place, part in data if _shift(part) == shift),
+                    "shift": shift,
+                    # From this bit on, the number of elements is zero if they take at most two beats.
+                    "near_bit": max(0, self._near_bits - shift),
+                }
                 for shift in sorted({_shift(part) for _, part in data} - {0})
             ],
-            "jumps": sorted(jumps, key=lambda jump: int(jump["place"])),
-            "targets": _by_place((place, {"target": target}) for place, target in self.places.jumps),
+            "jumps": _gathered(sorted(jumps, key=lambda jump: jump[0]), is_dense=False),
+            "targets": _gathered(
+                (
+                    (place, {"target": binary(target, self.places.end.bit_length())})
+                    for place, target in self.places.jumps
+                    if place not in never
+                ),
+                is_dense=False,
+            ),
         }
 
-    def _opening_jump(self, area: Area) -> Context:
-        """The jump past a part without elements; an array of fixed size is never empty."""
-        part = _part(area)
-        is_array = isinstance(part, Loop) and part.count is None
-        return {
-            "place": area.last,
-            "is_stream": isinstance(part, Data),
-            "array": self._counter(self._depth_of(part)) if is_array and isinstance(part, Loop) else None,
-            "is_fixed_array": isinstance(part, Loop) and not is_array,
-            "is_closing": False,
-        }
+    def _opening_jumps(self) -> Iterator[tuple[int, Context]]:
+        """(place, the jump past a part without elements); an array of fixed size is never empty."""
+        for area in self._opens:
+            part = _part(area)
+            if isinstance(part, Data):
+                yield area.last, {"empty_stream": True, "array": None, "is_closing": False}
+            elif part.count is None:
+                array = self._counter(self._depth_of(part))
+                yield area.last, {"empty_stream": False, "array": array, "is_closing": False}
 
-    def _closing_jump(self, closing: tuple[Close, int]) -> Context:
-        """The jump back to the next element."""
-        return {
-            "place": closing[1],
-            "is_stream": False,
-            "array": None,
-            "is_fixed_array": False,
-            "is_closing": True,
-        }
+    def _closing_jump(self, closing: tuple[Close, int]) -> tuple[int, Context]:
+        """(place, the jump back to the next element)."""
+        return closing[1], {"empty_stream": False, "array": None, "is_closing": True}
 
     # --- loops --------------------------------------------------------------------------------------------------
 
@@ -293,8 +309,10 @@ class _Publisher:
             "closings": [
                 {"name": self.side.element(close.loop).name, "place": place} for close, place in self._closings
             ],
-            "is_closing": _any_place(place for _, place in self._closings),
-            "element_ends": _by_place((place, self._counter(len(close.scope))) for close, place in self._closings),
+            "is_closing": _at(place for _, place in self._closings),
+            "element_ends": _gathered(
+                ((place, self._counter(len(close.scope))) for close, place in self._closings), is_dense=False
+            ),
             "depths": [self._depth(depth) for depth in sorted({len(close.scope) for close, _ in self._closings})],
         }
 
@@ -347,10 +365,10 @@ class _Publisher:
         ahead = ID_BYTES + LENGTH_BYTES + len(self.frame.prefix)
         return {
             "gaps": _by_place((place, {"bits": own, "zeros": "0" * (bits - own)}) for place, own in found),
-            "in_padding": _any_place(place for place, _ in found),
+            "in_padding": _at(place for place, _ in found),
             "phase_bits": bits,
             "first_phase": binary(-ahead % 2**bits, bits),
-            "gap_fits": self.lanes >= 2**bits,
+            "gap_fits": self.lanes >= 2**bits - 1,
         }
 
 
@@ -385,6 +403,41 @@ def _constants(block: Block) -> Iterator[tuple[int, int, str]]:
 def _by_place(choices: Iterable[tuple[int, Context]]) -> list[Context]:
     """The choices with their last places, in order; equal neighbours are merged."""
     return [{**value, "last": list(group)[-1][0]} for value, group in groupby(choices, key=lambda choice: choice[1])]
+
+
+def _gathered(choices: Iterable[tuple[int, Context]], *, is_dense: bool = True) -> list[Context]:
+    """The different values of the choices in order, each with the condition that it applies.
+
+    A choice applies from the place after the choice before, or at its own place only unless `is_dense`.
+    """
+    found: list[tuple[Context, list[tuple[int, int]]]] = []
+    first = 0
+    for last, value in choices:
+        ranges = next((ranges for known, ranges in found if known == value), None)
+        if ranges is None:
+            found.append((value, ranges := []))
+        start = first if is_dense else last
+        if ranges and ranges[-1][1] == start - 1:
+            start = ranges.pop()[0]
+        ranges.append((start, last))
+        first = last + 1
+    return [{**value, "places": _one_of(ranges)} for value, ranges in found]
+
+
+def _one_of(ranges: Sequence[tuple[int, int]]) -> str:
+    """The bit that is '1' at the places of these ranges only, as an operand."""
+    places = any_of(_within(*span) for span in ranges)
+    return f"({places})" if len(ranges) > 1 else places
+
+
+def _at(places: Iterable[int]) -> str:
+    """The bit that is '1' at these places only."""
+    return any_of(_within(place, place) for place in places)
+
+
+def _within(first: int, last: int) -> str:
+    """The bit that is '1' at the places `first` to `last`."""
+    return f"is_equal(place_index, {first})" if first == last else f"is_within(place_index, {first}, {last})"
 
 
 def _any_place(places: Iterable[int]) -> str:

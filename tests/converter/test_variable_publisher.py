@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
 
 import pytest
 
@@ -130,11 +131,62 @@ def test_every_name_of_the_text_is_kept_from_fields() -> None:
     template = (TEMPLATES / f"{VARIABLE_PUBLISHER_TEMPLATE}.mustache").read_text(encoding="utf-8")
     template = template.replace("{{{depth}}}", "1")
     declared = set(re.findall(r"^  (?:signal|constant) (\w+)", template, re.MULTILINE))
-    declared |= set(re.findall(r"^  (\w+) : (?:process|entity)", template, re.MULTILINE)) | {"lanes_kept"}
+    declared |= set(re.findall(r"^  (\w+) : (?:process|entity|for)", template, re.MULTILINE))
+    declared |= set(re.findall(r"^use firm\.\w+\.(\w+);", template, re.MULTILINE))
     assert len(declared) > 60
     frame = layout(ROS1, "string text\n" + "".join(f"uint8 {name}\n" for name in sorted(declared)))
     ports = {port.name.lower() for port in message_ports(frame, 8)}
     assert not ports & {name.lower() for name in declared}
+
+
+def chains(text: str) -> Iterator[list[str]]:
+    """The conditions of each conditional assignment and of each `if` with an `elsif`, in order, with "" for `else`."""
+    body = re.sub(r"--.*", "", text).partition("\nbegin")[2]
+    for statement in body.split(";"):
+        if conditions := re.findall(r"\bwhen\s(.*?)\selse\b", statement, re.DOTALL):
+            yield [*conditions, ""]
+    for process in re.findall(r"\bprocess\b.*?\bend process\b", body, re.DOTALL):
+        for chain in re.findall(r"\n      if .*?\n      end if;", process, re.DOTALL):
+            yield re.findall(r"\n      (?:els)?if (.*?) then\n", chain, re.DOTALL)
+
+
+def holds(condition: str, place: int, bits: Mapping[str, str]) -> bool | None:
+    """Whether the condition holds at a place; None if other signals decide, too."""
+    for name, definition in bits.items():
+        condition = condition.replace(f"{name} = '1'", definition)
+    condition = re.sub(r"\bplace_r = (\d+)", lambda found: str(place == int(found[1])), condition)
+    condition = re.sub(r"is_equal\(place_index, (\d+)\)", lambda found: str(place == int(found[1])), condition)
+    condition = re.sub(r"is_below\(place_index, (\d+)\) = '1'", lambda found: str(place < int(found[1])), condition)
+    is_pure = re.fullmatch(r"(?:True|False|or|\s)+", condition)
+    return eval(" ".join(condition.split())) if is_pure else None
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "string a\n",
+        "float64[] a\n",
+        "uint8[3] a\nstring[2] b\n",
+        "E[] e\nuint16[] f\n",
+        "uint8[70] a\nE[3] e\nstring s\n",
+        "string a\nuint32 b\nstring c\nuint8[] d\n",
+    ],
+)
+@pytest.mark.parametrize("ros", [ROS1, ROS2])
+def test_each_branch_is_that_of_some_place(ros: Middleware, text: str, width: int) -> None:
+    """A branch that earlier ones cover, or whose places do not exist, is neither read nor tested by anyone."""
+    configuration = configured(layout(ros, text, {"p/E": "uint8 x\nstring t\n"}), width)
+    vhdl = render(VARIABLE_PUBLISHER_TEMPLATE, configuration)
+    bits = dict(re.findall(r"\n  (in_stream|in_padding) +<= (.*?);", vhdl, re.DOTALL))
+    found = list(chains(vhdl))
+    assert found
+    for conditions in found:
+        left = set(range(configuration["end"] + 1))
+        for condition in conditions:
+            decided = {place: holds(condition, place, bits) if condition else True for place in left}
+            assert any(is_held is not False for is_held in decided.values()), (condition, conditions)
+            left -= {place for place, is_held in decided.items() if is_held}
 
 
 @pytest.mark.parametrize("ros", [ROS1, ROS2])

@@ -221,7 +221,7 @@ def test_the_packer_joins_what_the_window_cuts(library: Library, tmp_path: Path,
     assert result.exit_code == 0, result.output
     assert result.output.splitlines()[-1] == "PASS 100/100"
     if stall == 0:
-        latency = 1 if width == 8 else 4
+        latency = 2 if width == 8 else 4
         assert traffic(result.output).cycles == sum(frame.beats(width) for frame in frames) + latency
 
 

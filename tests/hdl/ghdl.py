@@ -113,7 +113,7 @@ class Library:
         again and use the same generics.
         """
         netlist = self.directory / f"{entity}_netlist.vhd"
-        netlist.write_text(self.synthesise(entity, generics), encoding="utf-8")
+        netlist.write_text(_in_order(self.synthesise(entity, generics)), encoding="utf-8")
         self.analyse([netlist])
         return netlist
 
@@ -131,6 +131,27 @@ class Library:
         if process.returncode != 0:
             raise GhdlError(process.stdout + process.stderr)
         return process.stdout
+
+
+def _in_order(netlist: str) -> str:
+    """A netlist with each unit after the units that it instantiates; GHDL 2.0 does not always write it so."""
+    texts = re.split(r"^(?=library ieee;$)", netlist, flags=re.MULTILINE)
+    named = [(re.search(r"^entity (\S+) is$", text, re.MULTILINE), text) for text in texts]
+    units = {found[1]: text for found, text in named if found}
+    # The architecture of the whole, which is apart from its entity.
+    last = [text for found, text in named if not found]
+    ordered: dict[str, str] = {}
+
+    def place(name: str) -> None:
+        for inner in re.findall(r"entity work\.(\w+)", units.get(name, "")):
+            if inner not in ordered:
+                place(inner)
+        if name in units:
+            ordered[name] = units[name]
+
+    for name in units:
+        place(name)
+    return "".join([*ordered.values(), *last])
 
 
 def _is_complete(case: str) -> bool:

@@ -2,7 +2,8 @@
 -- Packs frames that arrive as any number of bytes per cycle into full beats. The last 1 to LANES bytes of a frame wait
 -- in `rest_r` until more arrive or the frame ends, so the end may be signalled later, without a byte. A rotation of
 -- radix 4 aligns arriving bytes after the waiting ones; excess bytes are then already in the lanes where the next beat
--- needs them. While a tail leaves, the next frame enters: only `m_axis_tready` ever stalls the input.
+-- needs them. While a tail leaves, the next frame enters: only `m_axis_tready` ever stalls the input, a cycle late,
+-- since a register slice holds the output.
 library ieee;
 use ieee.std_logic_1164.all;
 use ieee.numeric_std.all;
@@ -42,7 +43,12 @@ architecture rtl of firm_axis_pack is
   subtype count_t is unsigned(COUNT_BITS-1 downto 0);
 
   signal rest_r  : std_logic_vector(WIDTH-1 downto 0);
-  signal advance : std_logic;  -- the output takes the available bytes
+  signal advance : std_logic;  -- the slice takes the available bytes
+
+  signal beat_data  : std_logic_vector(WIDTH-1 downto 0);
+  signal beat_keep  : std_logic_vector(LANES-1 downto 0);
+  signal beat_last  : std_logic;
+  signal beat_valid : std_logic;
 
 begin
 
@@ -50,7 +56,7 @@ begin
     report "firm_axis_pack: WIDTH is " & integer'image(WIDTH) & "; legal: 8, 16, 32, 64, 128, 256, 512"
     severity failure;
 
-  -- The waiting byte is the output; it is offered as soon as the input tells whether it is the last one.
+  -- The waiting byte is the beat; it is complete as soon as the input tells whether it is the last one.
   byte_wide : if WIDTH = 8 generate
 
     signal waiting_r : std_logic;  -- rest_r holds a byte
@@ -59,8 +65,7 @@ begin
 
   begin
 
-    shown   <= waiting_r and (ended_r or (valid and (count(0) or last)));
-    advance <= m_axis_tready or not shown;
+    shown <= waiting_r and (ended_r or (valid and (count(0) or last)));
 
     hold_byte : process (clk)
     begin
@@ -78,10 +83,10 @@ begin
       end if;
     end process hold_byte;
 
-    m_axis_tdata  <= rest_r;
-    m_axis_tkeep  <= "1";
-    m_axis_tvalid <= shown;
-    m_axis_tlast  <= ended_r or not count(0);
+    beat_data  <= rest_r;
+    beat_keep  <= "1";
+    beat_valid <= shown;
+    beat_last  <= ended_r or not count(0);
 
   end generate byte_wide;
 
@@ -128,20 +133,23 @@ begin
     signal filled   : unsigned(COUNT_BITS downto 0);       -- the bytes of the frame that arrives
     signal overflow : std_logic;                           -- they are more than a beat
 
-    signal valid_r : std_logic;
-
   begin
 
-    advance  <= m_axis_tready or not valid_r;
     turned   <= rotated(data, shift_r);
     arriving <= unsigned(count) when valid = '1' else (others => '0');
     filled   <= resize(arriving, COUNT_BITS+1) when tail_r = '1' else
                 resize(arriving, COUNT_BITS+1) + waiting_r;
     overflow <= not is_below(std_logic_vector(filled), LANES+1);
 
-    find_waiting : for lane in 0 to LANES-1 generate
-      waits(lane) <= not is_below(std_logic_vector(waiting_r), lane+1);
-    end generate find_waiting;
+    fill_lanes : for lane in 0 to LANES-1 generate
+      waits(lane)     <= not is_below(std_logic_vector(waiting_r), lane+1);
+      beat_keep(lane) <= waits(lane) or not tail_r;
+      beat_data(8*lane+7 downto 8*lane) <= rest_r(8*lane+7 downto 8*lane) when waits(lane) = '1' else
+                                           turned(8*lane+7 downto 8*lane);
+    end generate fill_lanes;
+
+    beat_last  <= tail_r;
+    beat_valid <= tail_r or overflow;
 
     move_bytes : process (clk)
     begin
@@ -150,13 +158,7 @@ begin
           if overflow = '1' or tail_r = '1' or waits(lane) = '0' then
             rest_r(8*lane+7 downto 8*lane) <= turned(8*lane+7 downto 8*lane);
           end if;
-          m_axis_tdata(8*lane+7 downto 8*lane) <= turned(8*lane+7 downto 8*lane);
-          if waits(lane) = '1' then
-            m_axis_tdata(8*lane+7 downto 8*lane) <= rest_r(8*lane+7 downto 8*lane);
-          end if;
-          m_axis_tkeep(lane) <= waits(lane) or not tail_r;
         end loop;
-        m_axis_tlast <= tail_r;
       end if;
     end process move_bytes;
 
@@ -167,9 +169,7 @@ begin
           waiting_r <= (others => '0');
           tail_r    <= '0';
           shift_r   <= (others => '0');
-          valid_r   <= '0';
         elsif advance = '1' then
-          valid_r   <= tail_r or overflow;
           waiting_r <= filled(COUNT_BITS-1 downto 0);
           if overflow = '1' then
             waiting_r <= resize(filled - LANES, COUNT_BITS);
@@ -184,9 +184,33 @@ begin
       end if;
     end process count_bytes;
 
-    m_axis_tvalid <= valid_r;
-
   end generate wider;
+
+  -- The assert reports another width.
+  legal : if is_stream_width(WIDTH) generate
+
+    u_slice : entity firm.firm_axis_register_slice
+      generic map (
+        WIDTH => WIDTH
+      )
+      port map (
+        clk           => clk,
+        rst_n         => rst_n,
+        s_axis_tdata  => beat_data,
+        s_axis_tkeep  => beat_keep,
+        s_axis_tvalid => beat_valid,
+        s_axis_tlast  => beat_last,
+        s_axis_tready => advance,
+        m_axis_tdata  => m_axis_tdata,
+        m_axis_tkeep  => m_axis_tkeep,
+        m_axis_tuser  => open,
+        m_axis_tid    => open,
+        m_axis_tvalid => m_axis_tvalid,
+        m_axis_tlast  => m_axis_tlast,
+        m_axis_tready => m_axis_tready
+      );
+
+  end generate legal;
 
   ready <= advance;
 

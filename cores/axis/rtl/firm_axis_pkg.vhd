@@ -24,6 +24,15 @@ package firm_axis_pkg is
   -- '1' if `index` is `value`.
   function is_equal(index : std_logic_vector; value : natural) return std_logic;
 
+  -- '1' if `index` is in the range `first` to `last`.
+  function is_within(index : std_logic_vector; first, last : natural) return std_logic;
+
+  -- `word` if `enable` is '1', else zeros. ORs of such words select one of them in parallel.
+  function gated(word : std_logic_vector; enable : std_logic) return std_logic_vector;
+
+  -- '1' if all bits are. A comparison with a constant would be limited to 32 bits, and give a warning for unknown bits.
+  function are_ones(bits : std_logic_vector) return std_logic;
+
   -- The number of ones in a contiguous `keep` of a stream, which has 1 to 64 bits.
   function lanes_kept(keep : std_logic_vector) return std_logic_vector;
 
@@ -119,6 +128,30 @@ package body firm_axis_pkg is
     end loop;
     return equal;
   end function is_equal;
+
+  function is_within(index : std_logic_vector; first, last : natural) return std_logic is
+  begin
+    return is_below(index, last+1) and not is_below(index, first);
+  end function is_within;
+
+  function gated(word : std_logic_vector; enable : std_logic) return std_logic_vector is
+    variable result : std_logic_vector(word'length-1 downto 0);
+  begin
+    result := word;
+    for place in result'range loop
+      result(place) := result(place) and enable;
+    end loop;
+    return result;
+  end function gated;
+
+  function are_ones(bits : std_logic_vector) return std_logic is
+    variable all_are : std_logic := '1';
+  begin
+    for place in bits'range loop
+      all_are := all_are and bits(place);
+    end loop;
+    return all_are;
+  end function are_ones;
 
   function decode(index : std_logic_vector; enable : std_logic; outputs : natural) return std_logic_vector is
     constant LOW_BITS  : natural := index'length / 2;

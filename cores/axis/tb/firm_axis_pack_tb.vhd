@@ -123,6 +123,7 @@ begin
       wait until falling_edge(clk);
     end loop;
     rst_n <= '1';
+    wait until falling_edge(clk) and ready = '1';
     frame := content.first;
     while frame /= null loop
       place    := 0;

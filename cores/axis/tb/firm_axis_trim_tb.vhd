@@ -178,7 +178,9 @@ begin
       frame  := frame.next_frame;
       frames := frames + 1;
     end loop;
-    assert frames_taken = frames report integer'image(frames_taken) & " frames came" severity failure;
+    while frames_taken < frames loop
+      wait until falling_edge(clk);
+    end loop;
     print(integer'image(waits) & " waits");
     print("PASS");
     is_done <= true;
