@@ -80,8 +80,10 @@ _METHODS = {
         and FDPE. A design with a latch fails. The dissertation's values are LUT/FF by Vivado for an UltraScale+.""",
     "manager": "Measured as in [Area](converters.md#area).",
     "timing": f"""The clock frequency that all paths meet after Yosys' `{nextpnr.SYNTHESIS}` and nextpnr
-        (`{nextpnr.DEVICE} --seed {nextpnr.SEED}`), in a harness with registers at all ports. With another seed, the
-        figures differ by some percent.""",
+        (`{nextpnr.DEVICE}`), in a harness with registers at all ports. MHz is the median of the seeds of the placement,
+        {", ".join(map(str, nextpnr.SEEDS))} unless fewer are listed. LUT4 and FF are without the harness; a carry cell
+        counts as the two LUT4 that it occupies. `make bench BENCH='timing --row "Image.* 64 bits"'` measures only the
+        rows whose names match. A design that is unchanged since its last measurement is not placed again.""",
     "use": "Counted in the cycle-exact models of the schedulers.",
     "cycles": "Verilator simulates the netlist of `ghdl --synth`, and the cycles are counted.",
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
