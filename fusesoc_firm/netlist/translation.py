@@ -23,6 +23,7 @@ from typing import Any
 
 from fusesoc_firm.netlist import dump, lost_constants, verilog
 from fusesoc_firm.netlist.corrections import correct, doubts
+from fusesoc_firm.netlist.loops import loops
 from fusesoc_firm.netlist.model import LostMemoryError, Module, Modules, NetlistError
 from fusesoc_firm.netlist.sources import LIBRARY, Copies, use_numbers
 from fusesoc_firm.tools.launcher import starts_everything
@@ -80,8 +81,8 @@ class Translation:
     """A translation: VHDL files by library, in any order; the top unit, `[library.]unit`; and the top unit's generics.
 
     `verilog` lists the sources that may define the modules for components without an entity; a later step links them.
-    `programs` lists the known programs that read the netlist; if they are missing, nothing is translated. All paths are
-    relative to the current folder.
+    `programs` lists the known programs that read the netlist; if they are missing, nothing is translated. If
+    `refuses_loops` is set, a combinational loop is an error. All paths are relative to the current folder.
     """
 
     top: str
@@ -92,6 +93,7 @@ class Translation:
     std: str = "93"
     options: Sequence[str] = ()
     programs: Sequence[str] = ()
+    refuses_loops: bool = False
 
     def to_json(self) -> str:
         """Return a text that `from_json` reads."""
@@ -128,15 +130,7 @@ def translate(translation: Translation, folder: Path) -> str:
         raise NetlistError(explanation(absent))
     output = Path(translation.output)
     output.unlink(missing_ok=True)
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    ghdl = _Ghdl(translation, folder, Copies(folder / "copies"))
-    if is_copied := use_numbers(chain.from_iterable(translation.libraries.values())):
-        ghdl.run("-a", f"--work={LIBRARY}", str(ghdl.copies.write_package()))
-    for library, files in translation.libraries.items():
-        if files:
-            ghdl.run("-i", f"--work={library}", *(ghdl.copies.copy(files) if is_copied else files))
-    ghdl.run("-m", f"--work={translation.library}", translation.unit)
+    ghdl = _analysed(translation, folder)
     try:
         netlist, warnings = _netlist(ghdl)
     except LostMemoryError as error:
@@ -151,6 +145,28 @@ def translate(translation: Translation, folder: Path) -> str:
     return warnings
 
 
+def find_loops(translation: Translation, folder: Path) -> list[str]:
+    """Return a sentence for each combinational loop of a design, with GHDL's libraries in `folder`; write no netlist.
+
+    Raises `NetlistError`.
+    """
+    return loops(dump.read(_analysed(translation, folder).synthesise("dump")[0]))
+
+
+def _analysed(translation: Translation, folder: Path) -> _Ghdl:
+    """Return GHDL with all files in its libraries, which are in the emptied `folder`."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    ghdl = _Ghdl(translation, folder, Copies(folder / "copies"))
+    if is_copied := use_numbers(chain.from_iterable(translation.libraries.values())):
+        ghdl.run("-a", f"--work={LIBRARY}", str(ghdl.copies.write_package()))
+    for library, files in translation.libraries.items():
+        if files:
+            ghdl.run("-i", f"--work={library}", *(ghdl.copies.copy(files) if is_copied else files))
+    ghdl.run("-m", f"--work={translation.library}", translation.unit)
+    return ghdl
+
+
 def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     """Return the Verilog netlist and GHDL's relevant warnings."""
     text, warnings = ghdl.synthesise("dump")
@@ -160,6 +176,8 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
             "\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"])
         )
     modules = dump.read(text)
+    if ghdl.translation.refuses_loops and (found := loops(modules)):
+        raise NetlistError("\n".join(found))
     components = _components(modules, ghdl.translation.verilog)
     # The dump lacks only the generics.
     generics = _generics(ghdl.synthesise("verilog")[0]) if any(module.parameters for module in components) else {}
