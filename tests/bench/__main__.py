@@ -22,6 +22,7 @@ from tests.bench import (
     images,
     links,
     live,
+    loops,
     manager,
     replay,
     simulators,
@@ -50,7 +51,7 @@ def main() -> int:
         "--row",
         default="",
         metavar="PATTERN",
-        help="for timing: only rows whose names match, such as 'Image.* 64 bits'",
+        help="for timing and loops: only rows whose names match, such as 'Image.* 64 bits'",
     )
     parser.add_argument(
         "--seeds", type=int, nargs="+", default=SEEDS, metavar="N", help="for timing: of placements (default: 1 2 3)"
@@ -79,6 +80,7 @@ def _measure(part: str, arguments: argparse.Namespace) -> list[Table]:
         "area": lambda: area.measure(Yosys(), _tell),
         "manager": lambda: manager.measure(Yosys(), _tell),
         "timing": lambda: timing.measure(Nextpnr(Yosys()), _tell, figures.written(), arguments.row, arguments.seeds),
+        "loops": lambda: loops.measure(seed, _tell, figures.written(), arguments.row),
         "use": lambda: use.measure(seed, _tell),
         "cycles": lambda: cycles.measure(seed, _tell),
         "fuzz": lambda: fuzz.measure(seed, _tell, broken),

@@ -19,6 +19,7 @@ from tests.bench import (
     images,
     links,
     live,
+    loops,
     manager,
     nextpnr,
     replay,
@@ -46,7 +47,12 @@ class Page:
 
 
 PAGES = (
-    Page("converters", "Figures of converters", "area, cycles and broken frames", ("area", "cycles", "fuzz")),
+    Page(
+        "converters",
+        "Figures of converters",
+        "area, cycles, broken frames and loops",
+        ("area", "cycles", "fuzz", "loops"),
+    ),
     Page(
         "manager",
         "Figures of the Manager and the schedulers",
@@ -64,6 +70,7 @@ _HEADINGS = {
     "use": "Channel use",
     "cycles": "Cycles",
     "fuzz": "Fuzzing",
+    "loops": "Combinational loops",
     "images": "Images",
     "links": "Links and crossings",
     "applications": "Applications",
@@ -89,6 +96,7 @@ _METHODS = {
     "fuzz": """Correct and broken frames are sent in random order to a subscriber's stream, in a simulation of the
         netlist. Every correct frame must be delivered unchanged. Each broken frame must cause one frame_error and must
         not be delivered.""",
+    "loops": """The netlists are searched bit by bit, as [`lint`](../reference/netlist.md) does.""",
     "images": """The accelerators of specs/image_pipeline and specs/sobel are measured alone, LUT/FF as in
         [Area](converters.md#area), and cycles as in [Cycles](converters.md#cycles).""",
     "links": "Measured as in [Area](converters.md#area).",
@@ -127,6 +135,7 @@ def keys() -> dict[str, list[tuple[str, ...]]]:
         use,
         cycles,
         fuzz,
+        loops,
         images,
         links,
         applications,
@@ -173,6 +182,8 @@ def _versions(part: str) -> str:
         return f"With {', '.join([f'Python {platform.python_version()}', *map(_package, packages)])}."
     if part == "builds":
         return f"With Python {platform.python_version()}, {_package('fusesoc')} and two processors."
+    if part == "loops":
+        return f"With {_first_line('ghdl')}, {_package('rosbags')}."
     if part == "use":
         return f"With Python {platform.python_version()}, NumPy {metadata.version('numpy')}."
     tools = [_first_line("ghdl"), f"Python {platform.python_version()}"]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from fusesoc_firm.scheduling.tables import grid
 
 NOT_CONVERTED = "not converted"
+NOT_MEASURED = "not measured"
 MET, MISSED, FAILED = "met", "MISSED", "FAILED"
 
 _LINE_LENGTH = 100

@@ -19,13 +19,13 @@ from fusesoc_firm.message.middleware import Middleware
 from fusesoc_firm.message.parser import parse_name
 from fusesoc_firm.system.system_core import load_system
 from tests import yowasp
-from tests.bench import figures, fuzz, nextpnr, store, systems, timing
+from tests.bench import figures, fuzz, loops, nextpnr, store, systems, timing
 from tests.bench.cycles import cycles_of
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, ports_of
 from tests.bench.model import FrameError, Message, publisher_model, subscriber_model
 from tests.bench.nextpnr import Nextpnr, Placement
 from tests.bench.payloads import BrokenPayloadError, Payloads
-from tests.bench.tables import FAILED, MISSED, Table, known_rows
+from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, known_rows
 from tests.bench.yosys import ECP5, ICE40, Cells, SynthesisError, Yosys, count_cells
 from tests.hdl.ghdl import Library
 
@@ -157,7 +157,7 @@ def test_rows_of_the_clock_are_measured_alone(tmp_path: Path) -> None:
     assert told == ["geometry_msgs/Pose, subscriber, 64 bits: 20.0 MHz (10 20 30), 7/9; slowest: a > b"]
     measured = ("geometry_msgs/Pose, subscriber", "64", "20.0", "10 20 30", "7", "9", "180", MISSED, "")
     assert [row for row in first.rows if row[2]] == [measured]
-    assert {row[7] for row in first.rows if not row[2]} == {timing.NOT_MEASURED}
+    assert {row[7] for row in first.rows if not row[2]} == {NOT_MEASURED}
     assert not first.is_good
     written = str(first)
     (second, *_) = timing.measure(fake, told.append, written, "^geometry_msgs/Pose, publisher", (1,))
@@ -170,6 +170,22 @@ def test_rows_of_the_clock_are_measured_alone(tmp_path: Path) -> None:
 def test_every_row_of_the_clock_has_a_name_of_its_own() -> None:
     names = [row.name for rows in timing.rows().values() for row in rows]
     assert len(names) == len(set(names)) > 60
+
+
+def test_loops_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over all parts of a row; other rows keep their figures."""
+    told: list[str] = []
+    parts = [lambda folder: [], lambda folder: [f"{folder.is_dir()} loop", "another"]]
+    monkeypatch.setattr(loops, "rows", lambda seed: [loops.Row("a", "8", 7, parts), loops.Row("b", "8", 9, parts[:1])])
+    (table,) = loops.measure(SEED, told.append, "", "^a, 8 bits")
+    assert table.rows == (("a", "8", "7", "2", "0", MISSED), ("b", "8", "9", "", "0", NOT_MEASURED))
+    assert told == ["a, 8 bits: True loop", "a, 8 bits: another", "a, 8 bits: 2 loops"]
+    (table,) = loops.measure(SEED, told.append, str(table), "^b")
+    assert table.rows == (("a", "8", "7", "2", "0", MISSED), ("b", "8", "9", "0", "0", MET))
+
+
+def test_the_names_of_loops_rows() -> None:
+    assert [row.key for row in loops.rows(SEED, 1)] == loops.keys()[loops.TITLE]
 
 
 class _CalledError(Exception):

@@ -20,14 +20,13 @@ from tests.bench.applications import NotBuiltError, netlist_of
 from tests.bench.area import Subject
 from tests.bench.designs import PUBLISHER, SUBSCRIBER, Converter, generate
 from tests.bench.nextpnr import SEEDS, Nextpnr, Placement
-from tests.bench.tables import FAILED, MET, MISSED, Table, Tell, known_rows
+from tests.bench.tables import FAILED, MET, MISSED, NOT_MEASURED, Table, Tell, known_rows
 from tests.bench.yosys import SynthesisError
 from tests.converter.simulated.pass_through import PassThrough
 from tests.hdl.ghdl import GhdlError, Library, core_files
 from tests.hdl.verilog import netlist
 from tests.system.simulated.systems import RUNTIME, generate_system
 
-NOT_MEASURED = "not measured"
 CHANNELS = (8, 32, 256)
 # MHz, by the number of channels.
 BARS = {32: 100.0, 256: 80.0}
