@@ -1,4 +1,4 @@
-"""`firm build`: runs FuseSoC for many cores and targets at once."""
+"""`firm build`: run FuseSoC for many cores and targets in parallel."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _build(arguments: argparse.Namespace) -> None:
     from fusesoc_firm.building.plan import make_plan
     from fusesoc_firm.plugin.build import How, build
 
-    # Build processes are forked, which is safe only without other threads; tqdm's monitor would be one.
+    # Build processes are forked, which is safe only without other threads, such as tqdm's monitor.
     tqdm.monitor_interval = 0
     plan = make_plan(arguments.cores, arguments.targets, arguments.build_root)
     how = How(
@@ -81,7 +81,7 @@ def _build(arguments: argparse.Namespace) -> None:
 
 
 def _report(outcomes: Sequence[Outcome], seconds: float) -> None:
-    """Print the results of the builds. Raises `InputError` if one failed."""
+    """Print the results of the builds. Raise `InputError` if a build failed."""
     from fusesoc_firm.text.outputs import shown
 
     failed = [outcome for outcome in outcomes if not outcome.is_good]

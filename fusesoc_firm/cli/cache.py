@@ -95,7 +95,7 @@ def _verify_cache(_: argparse.Namespace) -> None:
 
 
 def _shown(size: float) -> str:
-    """Return a number of bytes in readable form."""
+    """Return a number of bytes as a readable text with a unit."""
     if size < _UNIT:
         return f"{size} bytes"
     for unit in ("KiB", "MiB", "GiB"):

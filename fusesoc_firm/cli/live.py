@@ -1,4 +1,4 @@
-"""`firm live`: a simulated system as a node of a running ROS. `firm trace`: a picture of its messages' stages."""
+"""`firm live`: run a simulated system as a ROS node. `firm trace`: draw the stages of the node's messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`firm replay`: sends a recorded bag through a simulated system."""
+"""`firm replay`: send a recorded bag through a simulated system."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`firm scheduler`: the evaluation of the schedulers, and the best one for a system."""
+"""`firm scheduler`: the evaluation of the schedulers, and the best scheduler for a system."""
 
 from __future__ import annotations
 

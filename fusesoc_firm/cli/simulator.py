@@ -1,4 +1,4 @@
-"""`firm simulator`: builds the simulator of a system for another program to start."""
+"""`firm simulator`: build a system's simulator, which another program starts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def add_simulator(commands: Any) -> None:
 
 
 def add_simulator_options(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of commands that simulate a system live; `built_simulator` reads these arguments and `spec`."""
+    """Add the arguments of commands that simulate a system live; `built_simulator` reads them, and `spec`."""
     tools, default = [*fitting(is_live=True)], default_simulator(is_live=True)
     parser.add_argument("--tool", choices=tools, default=default, help="default: %(default)s")
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""`firm system`: specifications and what is derived from them."""
+"""`firm system`: specifications, and the files and data derived from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`firm tool`: starts a program of a build for Edalize."""
+"""`firm tool`: start a program of a build for Edalize."""
 
 from __future__ import annotations
 

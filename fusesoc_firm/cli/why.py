@@ -1,4 +1,4 @@
-"""`firm why`: the source lines of a generated line."""
+"""`firm why`: show the source lines of a generated line."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The rules for `.msg` files in ROS 1 and ROS 2: one table each, so that the parser needs no special cases.
+"""The rules for `.msg` files in ROS 1 and ROS 2, one table for each, so that the parser needs no special cases.
 
-ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few places where FIRM
-accepts more (blanks, `pkg/msg/Type`) or less (values that no generator could use).
+ROS 1 follows genmsg 0.6.0, ROS 2 rosidl_adapter 4.9.5. docs/reference/messages.md lists the few cases in which FIRM
+accepts more text (blanks, `pkg/msg/Type`) or less text (values that no generator could use).
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ class NameRule:
     description: str
 
     def accepts(self, name: str) -> bool:
-        """Whether all of `name` is legal."""
+        """Return whether the whole `name` is legal."""
         return len(name) <= LONGEST_TEXT and self.pattern.fullmatch(name) is not None
 
     def fault(self, name: str, title: str) -> str:
-        """The fault of a name that is not accepted."""
+        """Return the fault of a name that is not accepted."""
         if len(name) > LONGEST_TEXT:
             return f"a {self.kind} has at most {LONGEST_TEXT} characters, not {len(name)}"
         return f"'{name}' is not a legal {self.kind} in {title}" if name else f"the {self.kind} is missing"
@@ -42,7 +42,7 @@ class NameRule:
 
 @dataclass(frozen=True)
 class Dialect:
-    """The rules of one ROS version. `integer_ranges` holds the smallest and largest legal values."""
+    """The rules of one ROS version; `integer_ranges` holds each type's smallest and largest legal value."""
 
     title: str
     package_name: NameRule
@@ -53,7 +53,7 @@ class Dialect:
     # Primitives that cannot be constants: ROS 1's `time` and `duration`.
     opaque_primitives: frozenset[str]
     strings: frozenset[str]
-    # Words that abbreviate a message type, and whether they may precede `[`.
+    # Words that abbreviate a message type, and whether each may precede `[`.
     shorthands: Mapping[str, MessageName]
     has_array_shorthands: bool
     booleans: Mapping[str, bool]

@@ -1,4 +1,4 @@
-r"""Parses `.msg` text. rosbags' parser loses defaults and gives no line and column for errors.
+r"""Parse `.msg` text; the parser in rosbags loses defaults and reports no line and column for errors.
 
     line        = [ declaration ] [ "#" comment ]
     declaration = type name [ default ]             a field; defaults: ROS 2
@@ -8,7 +8,7 @@ r"""Parses `.msg` text. rosbags' parser loses defaults and gives no line and col
     default     = scalar | "[" [ scalar { "," scalar } ] "]"
 
 `dialect` lists the differences between the versions. In both, a line with "=" after its first word is a constant. Each
-line is parsed on its own, so a faulty line does not hide faults in the next.
+line is parsed separately, so a faulty line does not hide faults in later lines.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def parse_name(text: str) -> MessageName:
 
 
 def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
-    """Like `parse_name`, but also return the kind that the text names, if any."""
+    """Parse a name like `parse_name`, and also return the kind that the text names, or None."""
     match = _NAME.fullmatch(text.strip())
     if match is None:
         fail(f"'{text}' is not a message name", hint="write 'package/Type', like 'geometry_msgs/Quaternion'")
@@ -58,7 +58,7 @@ def parse_full_name(text: str) -> tuple[InterfaceKind | None, MessageName]:
 
 
 def dialect_of(ros: Middleware) -> Dialect:
-    """The rules of a middleware's `.msg` files."""
+    """Return the rules of a middleware's `.msg` files."""
     assert ros.dialect is not None, f"{ros.title} has no .msg files"
     return ros.dialect
 
@@ -66,7 +66,7 @@ def dialect_of(ros: Middleware) -> Dialect:
 def parse_message(
     text: str, name: MessageName, ros: Middleware, file: str, diagnostics: Diagnostics
 ) -> MessageDefinition:
-    """Parse the text of a `.msg` file; faults are added to `diagnostics`, and valid parts are returned."""
+    """Parse the text of a `.msg` file; add faults to `diagnostics`, and return the valid parts."""
     return _parse_lines(read_lines(text, file), name, ros, file, diagnostics)
 
 
@@ -92,12 +92,12 @@ def parse_sections(
 
 
 def service_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of a service's request and response in this middleware."""
+    """Return the names of a service's request and response in this middleware."""
     return _derived_names(name, ros, ("Request", "Response"))
 
 
 def action_names(name: MessageName, ros: Middleware) -> tuple[MessageName, ...]:
-    """The names of an action's goal, result and feedback in this middleware."""
+    """Return the names of an action's goal, result and feedback in this middleware."""
     return _derived_names(name, ros, ("Goal", "Result", "Feedback"))
 
 
@@ -119,7 +119,7 @@ def _parse_lines(
 
 
 class _Reader:
-    """Parses the lines of one message, reports every fault, and keeps the valid declarations."""
+    """A parser for the lines of one message, which reports every fault and keeps the valid declarations."""
 
     def __init__(self, name: MessageName, dialect: Dialect, diagnostics: Diagnostics) -> None:
         self.fields: list[Field] = []
@@ -193,7 +193,7 @@ class _Reader:
 
     def _check_name(self, name: Piece, rule: NameRule) -> bool:
         if not rule.accepts(name.text):
-            # A default such as `s "a=b"` gets here: the reference parser, too, takes the line for a constant.
+            # This case includes a default such as `s "a=b"`: the reference parser also treats the line as a constant.
             is_default = len(name.text.split()) > 1
             hint = "a line with '=' is a constant, even if the '=' is in quotes" if is_default else rule.hint
             self._diagnostics.error(rule.fault(name.text, self._dialect.title), name.source, hint)
@@ -227,7 +227,7 @@ class _Reader:
         return ArrayType(element, length) if element and length is not None else None
 
     def _bound(self, piece: Piece) -> int | None:
-        """The number after the `<=` at the start of `piece`."""
+        """Return the number after the `<=` at the start of `piece`, or None if a fault was reported."""
         if not self._dialect.has_bounds:
             self._diagnostics.error(f"{self._dialect.title} has no bounds like '{piece.text}'", piece.source)
             return None

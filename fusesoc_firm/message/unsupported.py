@@ -1,7 +1,7 @@
 """Features of other definition languages that `.msg` lacks, each with a name and the equivalent in `.msg`.
 
-docs/explanation/frames.md describes how a Frame could represent each feature. No feature is legal in ROS 1 or ROS 2:
-both reference parsers reject every form, and a word is looked up only if no message has, or can have, that name.
+docs/explanation/frames.md describes how a Frame could represent each feature. None of the features is legal in ROS 1 or
+ROS 2: both reference parsers reject every form, and a word is looked up only if no message has, or can have, that name.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def _feature(name: str, words: str, forms: tuple[str, ...], hint: str) -> Featur
     return Feature(name, re.compile("|".join(f"(?:{form})" for form in forms)), frozenset(words.split()), hint)
 
 
-# A keyword followed by two words or a block; followed by one word, it is a field's type.
+# A keyword followed by two words or a block; a keyword followed by one word is a field's type.
 _DECLARATION = r"{}(?=\s+\S+\s+\S|\s*\{{|\s+\w+\s*\{{)"
 
 FEATURES = (
@@ -87,7 +87,7 @@ FEATURES = (
 
 
 def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
-    """The feature that a line (without its comment) uses, and the part of the line that uses it."""
+    """Return the feature that a line (without its comment) uses, and the part of the line that uses it."""
     for feature in FEATURES:
         if match := feature.form.match(code.text):
             return feature, code.part(0, match.end())
@@ -95,5 +95,5 @@ def unsupported_form(code: Piece) -> tuple[Feature, Piece] | None:
 
 
 def unsupported_word(type_name: str) -> Feature | None:
-    """The unsupported feature that this type name suggests, or None."""
+    """Return the unsupported feature that this type name suggests, or None."""
     return next((feature for feature in FEATURES if type_name.lower() in feature.words), None)

@@ -1,4 +1,4 @@
-"""Parses the values of constants and defaults, and checks them against the ranges of their types."""
+"""Parse the values of constants and defaults, and check them against the ranges of their types."""
 
 from __future__ import annotations
 
@@ -20,15 +20,18 @@ from fusesoc_firm.message.piece import Piece
 from fusesoc_firm.text.diagnostics import Diagnostics
 
 _QUOTES = ('"', "'")
-# An array element is either quoted, with `\"` for a quote, or extends to the comma. The match is possessive, since
-# otherwise the quote of `\"` could also close the string.
+# An array element is either quoted, with `\"` for a quote, or extends to the comma. The match is possessive; otherwise,
+# the quote of `\"` could also close the string.
 _ELEMENT = re.compile(r"""\s*("(?:\\"|[^"])*+"|'(?:\\'|[^'])*+'|[^\s,"'](?:[^,]*[^\s,])?)\s*(?:,|$)""")
 
 
 def read_value(
     piece: Piece, kind: PrimitiveType | StringType, dialect: Dialect, diagnostics: Diagnostics
 ) -> Scalar | None:
-    """The value of a constant, a default or an element of a default; None if a fault was reported."""
+    """Return the value of a constant, a default or an element of a default.
+
+    After a fault, report it and return None.
+    """
     try:
         return _scalar(piece.text, kind, dialect)
     except ValueError as fault:
@@ -38,7 +41,7 @@ def read_value(
 
 
 def read_default(piece: Piece, kind: FieldType, dialect: Dialect, diagnostics: Diagnostics) -> DefaultValue | None:
-    """The default value of a field; None if a fault was reported."""
+    """Return the default value of a field; after a fault, report it and return None."""
     element = kind.element if isinstance(kind, ArrayType | SequenceType) else kind
     if isinstance(element, MessageType):
         diagnostics.error(f"a field of type {kind} has no default value", piece.source, "only primitive types have one")
@@ -70,7 +73,7 @@ def _array(
 
 
 def _elements(inner: Piece, diagnostics: Diagnostics) -> list[Piece] | None:
-    """The elements between the brackets; None if a fault was reported."""
+    """Return the elements between the brackets; after a fault, report it and return None."""
     elements: list[Piece] = []
     position = 0
     while inner.text.strip():
@@ -94,7 +97,7 @@ def _count_fault(kind: ArrayType | SequenceType, count: int) -> str:
 
 
 def _scalar(text: str, kind: PrimitiveType | StringType, dialect: Dialect) -> Scalar:
-    """The value of `text`. Raises ValueError, which names the legal values."""
+    """Return the value of `text`. Raise `ValueError`, with the legal values, if it is illegal."""
     if isinstance(kind, StringType):
         return _string(text, kind, dialect)
     if kind.name == "bool":
@@ -152,7 +155,7 @@ def _string(text: str, kind: StringType, dialect: Dialect) -> str:
 
 
 def _unquoted(text: str) -> str:
-    """Remove the surrounding quotes; a text that is not quoted at both ends is returned unchanged."""
+    """Return a text without surrounding quotes; a text that is not quoted at both ends is unchanged."""
     for quote in _QUOTES:
         if text.startswith(quote) and text.endswith(quote):
             inner = text[1:-1]

@@ -1,4 +1,4 @@
-"""Joins the bursts from a preemptive Manager into frames (docs/reference/manager.md, 'Bursts').
+"""Join the bursts from a preemptive Manager into frames (docs/reference/manager.md, 'Bursts').
 
     joiner = BurstJoiner(publishers=4, width=64)
     for burst in bursts:                    # the bytes between two `tlast` that `tkeep` marks as valid
@@ -6,8 +6,8 @@
             deliver(frame.id, frame.payload)
     joiner.close()
 
-An uninterrupted frame is one burst, so the class also supports a Manager without preemption. `cpp/firm/bursts.hpp` is
-the C++ version.
+Without preemption, each frame is one burst, so the class also supports a Manager without preemption.
+`cpp/firm/bursts.hpp` is the C++ version.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _HEADER_BYTES = ID_BYTES + LENGTH_BYTES
 
 
 class BurstError(ValueError):
-    """A burst that no Manager sends. The received part of the burst's frame is dropped."""
+    """A burst that a Manager never sends; the received part of the burst's frame is dropped."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,13 @@ class JoinedFrame:
 
 
 class BurstJoiner:
-    """Joins bursts by id until a frame has the length that its header announces; each stream needs its own joiner."""
+    """A joiner of bursts by id, until a frame has the length in its header; each stream needs a separate joiner."""
 
     def __init__(self, publishers: int, width: int, longest: int | None = None) -> None:
         """Create a joiner for a Manager with `publishers` (1 to 256) and a stream of `width` bits.
 
         A frame that announces a payload of more than `longest` bytes is rejected as soon as its header is complete,
-        before it takes memory.
+        before the joiner allocates memory for the payload.
         """
         if not 1 <= publishers <= MOST_PUBLISHERS:
             raise ValueError(f"publishers is {publishers}; legal: 1 to {MOST_PUBLISHERS}")
@@ -59,7 +59,7 @@ class BurstJoiner:
     def push(self, burst: bytes, tid: int | None = None) -> JoinedFrame | None:
         """Take a burst and return the frame that it completes, if any.
 
-        `tid` is the stream's `tid`, if the transport has one; it must equal the id. Raises `BurstError`.
+        `tid` is the stream's `tid`, if the transport has one; it must equal the id. May raise `BurstError`.
         """
         identifier = self._id(burst, tid)
         begun = self._begun.pop(identifier, None)
@@ -68,7 +68,8 @@ class BurstJoiner:
         else:
             if len(burst) <= self._beat_bytes:
                 raise BurstError(f"the burst that resumes the frame of id {identifier} holds nothing but the id")
-            # Only these bytes were inserted. They fill a beat, so that the following bytes stay in their lanes.
+            # The first beat of the burst is inserted and not part of the frame; the following bytes stay in their
+            # lanes.
             frame = begun
             frame += memoryview(burst)[self._beat_bytes :]
         whole = self._frame_bytes(identifier, frame)
@@ -83,7 +84,7 @@ class BurstJoiner:
         return None
 
     def close(self) -> None:
-        """End the stream. Raises `BurstError` if a frame is incomplete."""
+        """End the stream. Raise `BurstError` if a frame is incomplete."""
         if not self._begun:
             return
         parts = ", ".join(f"{len(self._begun[identifier])} bytes of id {identifier}" for identifier in self.unfinished)
@@ -101,7 +102,7 @@ class BurstJoiner:
         return identifier
 
     def _frame_bytes(self, identifier: int, frame: bytearray) -> int | None:
-        """Return the number of bytes of the whole frame; None while its header is incomplete."""
+        """Return the number of bytes in the whole frame, or None while its header is incomplete."""
         if len(frame) < _HEADER_BYTES:
             return None
         length = int.from_bytes(frame[ID_BYTES:_HEADER_BYTES], "little")
@@ -116,10 +117,10 @@ class BurstJoiner:
 
 
 def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
-    """Split a frame into bursts, as the Manager does: `runs` has the beats of each burst except the last one.
+    """Split a frame into bursts, as the Manager does; `runs` lists the beats in each burst except the last.
 
-    This serves tests and models of the Manager. The meaningless bits of an extra beat are zero.
-    Raises `ValueError` if a run has no beats, or if the runs have more beats than the frame.
+    The function serves tests and models of the Manager. The unused bits of an extra beat are zero.
+    Raise `ValueError` if a run has no beats, or if the runs have more beats than the frame.
     """
     _check_width(width)
     beat_bytes = width // 8

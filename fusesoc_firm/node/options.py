@@ -14,7 +14,7 @@ _REMAPPING = re.compile(r"[~/\w]+:=.*", re.DOTALL)
 
 
 def add_node_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a node to a parser; the rest of the command line is for `remappings`."""
+    """Add the options of a node to a parser; `remappings` handles the arguments that the parser leaves."""
     parser.add_argument("--name", metavar="NAME", help="the node's name (default: the system's)")
     parser.add_argument(
         "--qos",
@@ -59,7 +59,7 @@ def add_node_options(parser: argparse.ArgumentParser) -> None:
 
 
 def remappings(rest: Sequence[str], error: Callable[[str], object]) -> tuple[str, ...]:
-    """Return the arguments that the parser left, if all belong to ROS; otherwise call `error`."""
+    """Return the arguments that the parser left, all of which must be for ROS; call `error` for any other argument."""
     if wrong := [argument for argument in rest if not _REMAPPING.fullmatch(argument)]:
         error(f"unrecognized arguments: {' '.join(wrong)}")
     return tuple(rest)

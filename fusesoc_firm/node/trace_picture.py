@@ -1,4 +1,4 @@
-"""Draws the table of a trace with matplotlib, which is an extra: `pip install 'fusesoc-firm[plots]'`."""
+"""Draw the table of a trace with matplotlib, an extra dependency: `pip install 'fusesoc-firm[plots]'`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _CYCLES = (
 )
 _ROW_INCHES = 2.6
 _WIDTH_INCHES = 11.0
-# Without a date and matplotlib's random names, the same table gives the same bytes.
+# Without a date and matplotlib's random names, the same table always results in the same bytes.
 _SETTINGS = {"svg.hashsalt": "firm", "font.size": 9}
 _METADATA: dict[str, dict[str, None]] = {
     ".png": {"Software": None},
@@ -42,9 +42,9 @@ _METADATA: dict[str, dict[str, None]] = {
 
 
 def draw_trace(table: Path, picture: Path) -> None:
-    """Draw a table that `Trace` has written: a row of panels for each route, wall time beside simulated time.
+    """Draw a table that `Trace` wrote: a row of panels for each route, with wall time beside simulated time.
 
-    Raises `InputError` for another kind of file, an unknown picture format, and if matplotlib is missing.
+    Raise `InputError` for another kind of file, for an unknown picture format, and if matplotlib is missing.
     """
     check_output(picture, SUFFIXES)
     ways = _ways(table)
@@ -69,7 +69,7 @@ def draw_trace(table: Path, picture: Path) -> None:
 def _draw(
     axis: Any, rows: Sequence[_Row], parts: Sequence[tuple[str, str, str]], scale: Callable[[float], float], unit: str
 ) -> None:
-    """Draw each message as a bar of its stages, stacked upwards; a stage that began before the one below is omitted."""
+    """Draw each message as a bar of stacked stages; a stage that began before the stage below it is omitted."""
     whole = [row for row in rows if all(row[name] is not None for _, *names in parts for name in names)]
     axis.set_xlabel("message")
     axis.set_ylabel(unit)
@@ -87,7 +87,7 @@ def _draw(
 
 
 def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:
-    """Return the rows of each route, for the messages with a response."""
+    """Return the rows of messages with a response, by route."""
     try:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)

@@ -1,6 +1,6 @@
-"""The table of generators: the parameters of each, and the functions that it calls.
+"""The table of generators, with each generator's parameters and functions.
 
-A generator imports its stages when it is called, since these imports take longer than most of its work.
+A generator imports its stages only when it is called, since these imports take longer than most of the work.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _LARGEST_SEED = 2147483562
 
 @dataclass(frozen=True)
 class Generator:
-    """A generator: its parameters, and the function that derives a request.
+    """A generator: its parameters, and the function that derives the data of a request.
 
-    `load` derives all data of a request, and raises `InputError` for the user's faults. `programs` are required to run
-    the core. `tools` are the versions of programs that generate part of it.
+    `load` derives all data of a request, and raises `InputError` for faults in the user's input. `programs` returns the
+    programs required to run the core. `tools` returns the versions of the programs that generate part of the core.
     """
 
     parameters: tuple[Parameter, ...]

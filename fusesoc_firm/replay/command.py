@@ -1,4 +1,4 @@
-"""The command `firm replay`: sends a bag through a system, with a progress bar, error lines and a summary."""
+"""The command `firm replay`: send a bag through a system, with a progress bar, error lines and a summary."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fusesoc_firm.system.derived.model import Topic, absolute_name
 from fusesoc_firm.system.system_core import LoadedSystem
 from fusesoc_firm.text.diagnostics import Diagnostics, InputError, fail, nearest
 
-# The most lines about rejected messages; further ones are only counted.
+# The maximum number of lines about rejected messages; further messages are only counted.
 _SHOWN = 100
 
 
@@ -44,7 +44,7 @@ class Source:
     duration: float | None = None
 
     def messages(self, bag: Bag, topics: Collection[str]) -> Iterator[Recorded]:
-        """The selected messages of some topics."""
+        """Return the selected messages of some topics."""
         first = bag.start + round(self.start * 10**9)
         stop = None if self.duration is None else first + round(self.duration * 10**9)
         return islice((item for item in bag.messages(topics, stop) if item.stamp >= first), self.limit)
@@ -52,7 +52,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Target:
-    """The bag for the responses. The format is `form`, or else the one that the name implies, or else the source's."""
+    """The bag for the responses; without `form`, the name's ending or else the source determines the format."""
 
     path: Path
     form: Form | None = None
@@ -63,8 +63,8 @@ class Target:
 class Settings:
     """The settings of a replay: `names` renames topics of blocks.
 
-    The hardware is at rest after `quiet` cycles without a beat. With latency, a stamp is the cause's stamp plus the
-    hardware's latency.
+    The hardware is at rest after `quiet` cycles without a beat. If latency is included, a response's stamp is the
+    cause's stamp plus the hardware's latency.
     """
 
     names: Mapping[str, str]
@@ -81,7 +81,7 @@ def replay(
 ) -> None:
     """Replay a bag and print a summary; `start_simulator` is called after all other checks.
 
-    Raises `InputError`, also if a message was rejected; the responses to the others are then recorded.
+    May raise `InputError`, also if messages were rejected; the responses to all other messages are then recorded.
     """
     if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
         fail(f"{target.path} is the bag to replay; write to another")
@@ -114,7 +114,7 @@ def replay(
 
 @dataclass
 class _Replay:
-    """A replay in progress: the messages played from each stream, and the messages sent by each block."""
+    """A replay in progress: the numbers of messages played from each stream and sent by each block."""
 
     bag: Bag
     routes: Mapping[Stream, Route]
@@ -129,7 +129,7 @@ class _Replay:
     is_over: bool = False
 
     def play(self, source: Source) -> None:
-        """Replay all messages; an early end is reported."""
+        """Replay all messages, and report an early end."""
         expected = sum(count for stream, count in self.bag.streams.items() if stream in self.routes)
         total = expected if source.limit is None else min(expected, source.limit)
         topics = {stream.topic for stream in self.routes}
@@ -185,7 +185,7 @@ class _Replay:
             tqdm.write(f"error: {self.bag.path}: {fault}", file=sys.stderr)
 
     def print_summary(self, path: Path) -> None:
-        """Print the messages that went in and came out, topic by topic."""
+        """Print the numbers of received and sent messages, topic by topic."""
         if self.errors > _SHOWN:
             print(f"and {self.errors - _SHOWN} more errors", file=sys.stderr)
         rows = [("in", *self._way(stream), str(self.played[stream])) for stream in self.routes]
@@ -207,7 +207,7 @@ class _Replay:
 
 
 def seconds(stamp: int) -> str:
-    """A time in ns as readable seconds, with all digits."""
+    """Return the text of a time in seconds with all digits; `stamp` is in ns."""
     return f"{stamp // 10**9}.{stamp % 10**9:09d}"
 
 
@@ -231,7 +231,7 @@ def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
 
 
 def _form(target: Target, like: Form) -> Form:
-    """The format of the bag to write."""
+    """Return the format of the bag to write."""
     said = form_of(target.path)
     if target.form and said and target.form is not said:
         fail(f"the format of {target.path} is to be {target.form.value}, but its ending means {said.value}")
@@ -239,7 +239,7 @@ def _form(target: Target, like: Form) -> Form:
 
 
 def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
-    """Raise `InputError` if the bag to write cannot hold the messages that the system publishes."""
+    """Raise `InputError` if the format of the bag cannot represent the messages that the system publishes."""
     faults = Diagnostics()
     for topic in topics:
         if topic.frame.ros != form.ros:
@@ -251,7 +251,7 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
 def _routes(
     bag: Bag, loaded: LoadedSystem, subscribers: Sequence[Topic], names: Mapping[str, str]
 ) -> dict[Stream, Route]:
-    """The route of each stream. Raises `InputError` if there is no route, or a requested topic is missing."""
+    """Return the route of each stream. Raise `InputError` if there is no route, or if a requested topic is missing."""
     faults = Diagnostics()
     topics = {absolute_name(stream.topic) for stream in bag.streams}
     for item in subscribers:

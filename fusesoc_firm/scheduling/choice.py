@@ -1,4 +1,4 @@
-"""`firm scheduler choose`: presents a choice in words or as data."""
+"""`firm scheduler choose`: present the choice of a scheduler as text or as data."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FORMATS = ("text", "yaml", "json")
 
 
 def show(choice: Choice, form: str) -> str:
-    """The choice in one of `FORMATS`, with a final newline."""
+    """Return the choice in one of `FORMATS`, with a final newline."""
     if form == "text":
         return _text(choice)
     data = as_data(choice)
@@ -24,7 +24,7 @@ def show(choice: Choice, form: str) -> str:
 
 
 def as_data(choice: Choice) -> dict[str, Any]:
-    """The choice as plain data; a missing bound is None."""
+    """Return the choice as plain data; a missing bound is None."""
     return {
         "scheduler": choice.best.policy,
         "criterion": str(choice.criterion),

@@ -15,10 +15,10 @@ from fusesoc_firm.text.naming import identifier
 def environment_files(
     paths: Mapping[Path, SourceRef | None], system: DerivedSystem
 ) -> dict[PurePosixPath, GeneratedFile]:
-    """Return the environment's files, in order, as files of the simulation core.
+    """Return the environment's files by path in the simulation core, in order.
 
-    The test bench instantiates the entity named like the last file. Raises `InputError` for a file that cannot be part
-    of the environment.
+    The test bench instantiates the entity that has the name of the last file. Raise `InputError` for a file that cannot
+    be part of the environment.
     """
     taken = {
         system.entity,

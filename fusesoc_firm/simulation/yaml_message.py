@@ -1,7 +1,7 @@
-"""Reads a message written in YAML, checks each value against its type, and reports each fault at its place.
+"""Read a message written in YAML, check each value against its type, and report each fault at its place.
 
-The message's types determine the values, not YAML: `1e-3` is text to PyYAML and `1` an integer, but both are legal for
-a float64.
+The message's types, not YAML's rules, determine the values: to PyYAML, `1e-3` is text and `1` is an integer, but both
+are legal for a float64.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _SPECIAL_FLOAT = re.compile(r"([-+]?)\.?(inf|infinity|nan)", re.IGNORECASE)
 
 @dataclass
 class _Branch:
-    """A field: each of its elements is a value of `type`, a `text`, or a message of `fields`.
+    """A field, each element of which is a value of `type`, a `text`, or a message with `fields`.
 
-    An array of fixed size has `count` elements; one of variable size is an `array`. A field is required if it `is_used`
-    or if any of its `fields` is.
+    An array of fixed size has `count` elements; `array` describes an array of variable size. A field is required if it
+    `is_used` or if one of its `fields` is required.
     """
 
     count: int | None = None
@@ -53,7 +53,7 @@ class _Branch:
 
 
 def read_message(text: YamlText, node: yaml.Node, frame: Frame, faults: Diagnostics) -> dict[str, Any]:
-    """Return the message of `frame` that a node holds; faults are noted and their values omitted.
+    """Return the message of `frame` in a node; note faults and omit the faulty values.
 
     Unused fields may be missing.
     """
@@ -85,14 +85,14 @@ def _tree(frame: Frame) -> _Branch:
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads one message; `name` names it in faults of the whole message."""
+    """A reader for one message; `name` is the message's name in faults that concern the whole message."""
 
     text: YamlText
     faults: Diagnostics
     name: str
 
     def message(self, node: yaml.Node, branch: _Branch, path: str) -> dict[str, Any]:
-        """Return the message at `path`, which is empty for the whole."""
+        """Return the message at `path`, which is empty for the whole message."""
         what = f"'{path}'" if path else f"a {self.name}"
         if not isinstance(node, yaml.MappingNode):
             fields = ", ".join(branch.fields)
@@ -157,7 +157,7 @@ class _Reader:
 
 
 def _value(text: str, type_: WireType) -> bool | int | float:
-    """Return the value of a word. Raises `ValueError` with the legal values if the word is not one of them."""
+    """Return the value of a text. Raise `ValueError`, with the legal values, for an illegal text."""
     if type_.code == "?":
         return _boolean(text)
     return _float(text, type_) if type_.code in "fd" else _integer(text, type_)

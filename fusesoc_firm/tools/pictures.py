@@ -8,7 +8,7 @@ from pathlib import Path
 from fusesoc_firm.text.diagnostics import fail
 from fusesoc_firm.text.outputs import check_output, write
 
-# The formats of a picture, by the ending of the file's name; DOT is Graphviz's own language.
+# The picture formats, by the ending of the file's name; DOT is Graphviz's own language.
 ENDINGS = (".svg", ".png", ".pdf", ".dot")
 # The text formats, which can be printed.
 TEXTS = ("svg", "dot")
@@ -27,7 +27,7 @@ def check_picture(path: Path | None, form: str | None) -> None:
 
 
 def draw(dot: str, path: Path | None, form: str | None) -> None:
-    """Write a DOT graph as a picture to `path`, or print it in `form`, by default SVG. Raises `InputError`."""
+    """Write a DOT graph as a picture to `path`, or print the picture in `form`. May raise `InputError`."""
     if path:
         write(path, picture(dot, path.suffix.removeprefix(".")))
     else:
@@ -35,7 +35,7 @@ def draw(dot: str, path: Path | None, form: str | None) -> None:
 
 
 def picture(dot: str, form: str) -> bytes:
-    """Convert a DOT graph to `svg`, `png`, `pdf` or `dot`. Raises `InputError` if Graphviz is missing."""
+    """Return a DOT graph converted to `svg`, `png`, `pdf` or `dot`. Raise `InputError` if Graphviz is missing."""
     if form == "dot":
         return dot.encode()
     try:

@@ -29,7 +29,7 @@ _PLAIN = {"byte": "uint8", "char": "uint8"}
 
 @cache
 def version() -> str:
-    """Return the package's version; empty if the package is not installed."""
+    """Return the package's version, or an empty string if the package is not installed."""
     try:
         return metadata.version(TITLE)
     except metadata.PackageNotFoundError:
@@ -61,7 +61,7 @@ def check(
 
 
 def _renamed(definitions: Definitions) -> dict[MessageName, MessageDefinition]:
-    """Rename messages so that the package accepts them: action messages contain a `_`, which only ROS may use."""
+    """Return definitions with names that the package accepts: it rejects the `_` in action messages."""
     names = {name: MessageName("renamed", f"M{number}") for number, name in enumerate(definitions)}
     return {
         names[name]: replace(

@@ -10,10 +10,10 @@ from fusesoc_firm.scheduling.models.base import Bools, Ints, Scheduler
 
 
 class Combined(Scheduler):
-    """A combined scheduler; a group requests if its granted requester does, and only the chosen group sees beats.
+    """A combined scheduler: a group requests if its granted requester does, and only the chosen group sees beats.
 
-    The requesters of the first of `groups` have the lowest indices. `top` has a requester for each group. Raises
-    `ValueError` if the number of groups or the sizes of the batches do not match.
+    The requesters of the first group in `groups` have the lowest indices. `top` has one requester for each group.
+    Raises `ValueError` if the number of groups or the sizes of the batches do not match.
     """
 
     def __init__(self, groups: Sequence[Scheduler], top: Scheduler) -> None:

@@ -29,7 +29,7 @@ BOARD_TEMPLATE = "vhdl/board.vhd"
 
 # Edalize's flows for boards with pins, each with the template and FuseSoC file type of the constraints.
 FLOWS = {"trellis": ("lpf", "LPF"), "icestorm": ("pcf", "PCF"), "apicula": ("cst", "CST")}
-# Tools that implement the system with streams as ports: Vivado next to a processor, Quartus without changes.
+# Tools for systems whose streams are ports: Vivado places the system next to a processor, Quartus uses it unchanged.
 VIVADO, QUARTUS = "vivado", "quartus"
 # The keys of a board that each tool requires.
 _NEEDED = {VIVADO: ("part", "processor"), QUARTUS: ("device", "deviceFamily")}
@@ -48,7 +48,7 @@ _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.,:+/()-]*")
 
 
 def word_fault(text: str) -> tuple[str, str] | None:
-    """The reason why `text` is not a legal name of an FPGA, a family or a pin; None if it is."""
+    """Return the reason why `text` is not a legal name of an FPGA, a family or a pin, or None if the name is legal."""
     if fault := text_fault(text):
         return fault
     legal = "legal are letters, digits, blanks and '_.,:+/()-', a letter or digit first"
@@ -57,7 +57,7 @@ def word_fault(text: str) -> tuple[str, str] | None:
 
 @dataclass(frozen=True)
 class BoardPin(Section):
-    """A pin of the FPGA that the top level uses."""
+    """An FPGA pin that the top level uses."""
 
     port: Text = key(
         "the connected port of the top level: a standard one, or a pin of an accelerator", is_required=True
@@ -68,7 +68,7 @@ class BoardPin(Section):
 
 @dataclass(frozen=True)
 class Board(Section):
-    """The board file."""
+    """The contents of a board file."""
 
     description: Text = key("maker, board and FPGA", is_required=True)
     flow: Text = key("the Edalize flow that builds for the board", is_required=True, choices=(*FLOWS, *_NEEDED))
@@ -91,13 +91,13 @@ class Board(Section):
 
     @property
     def is_linked(self) -> bool:
-        """Whether a byte link connects the host."""
+        """Whether a byte link connects the host to the system."""
         return self.flow in FLOWS
 
 
 @dataclass(frozen=True)
 class _Port:
-    """A pin of an accelerator at the top level: the pin's bits, None for a scalar, and the pin's name in messages."""
+    """An accelerator's pin at the top level; `width` is None for a scalar, and `what` is the pin's name in messages."""
 
     name: str
     direction: str
@@ -106,22 +106,22 @@ class _Port:
     source: SourceRef | None
 
     def bits(self) -> list[str]:
-        """All bits; each bit has a separate place on the board."""
+        """Return the names of all bits; the board assigns an FPGA pin to each bit."""
         return [self.name] if self.width is None else [f"{self.name}[{bit}]" for bit in range(self.width)]
 
 
 def boards() -> tuple[str, ...]:
-    """The names of the package's boards."""
+    """Return the names of the package's boards."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.yaml")))
 
 
 def board_path(name: str, folder: Path) -> Path:
-    """The file of the package's board of this name, or a file below `folder`."""
+    """Return the path of the package's board with this name; the name of a YAML file is relative to `folder`."""
     return folder / name if name.endswith((".yaml", ".yml")) else FOLDER / f"{name}.yaml"
 
 
 def read_board(name: str, folder: Path = Path()) -> Board:
-    """Read the board file that `board_path` identifies; raises `InputError`."""
+    """Read the board file that `board_path` identifies; may raise `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
         fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
@@ -172,7 +172,7 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
 
 
 def on_board(specification: Specification, board: Board) -> Specification:
-    """The specification of the system on the board, with the board's interconnect.
+    """Return the specification of the system on the board, with the board's interconnect.
 
     On a board without a processor, the clock pin determines the frequency of clk. On other boards, a PLL provides the
     frequency that the specification requests.
@@ -182,7 +182,7 @@ def on_board(specification: Specification, board: Board) -> Specification:
 
 
 def check_fits(system: DerivedSystem, board: Board) -> None:
-    """Raise `InputError` for features of a system that a board's file cannot describe."""
+    """Raise `InputError` if the clocks or pins of a system and of its board do not match."""
     clocks = 1 + len(system.clocks)
     if board.processor and clocks > MOST_CLOCKS:
         fail(f"board '{board.name}' has at most {MOST_CLOCKS} clocks, including clk; the system has {clocks}")
@@ -196,7 +196,7 @@ def check_fits(system: DerivedSystem, board: Board) -> None:
 
 
 def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> None:
-    """Note every accelerator pin without a place on the board, and every place without a pin."""
+    """Note every accelerator pin without a site on the board, and every port of the board file without a pin."""
     places = {pin.port.lower() for pin in board.pins}
     for pin in pins:
         if pin.name in _PORTS:
@@ -212,12 +212,12 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
 
 
 def board_entity(system: DerivedSystem, board: Board) -> str:
-    """The top-level entity of a system on a board; next to a processor, the name of the block design."""
+    """Return the name of a system's top-level entity on a board or, next to a processor, of the block design."""
     return system.entity if board.flow == QUARTUS else f"{system.name}_{board.name}"
 
 
 def board_configuration(system: DerivedSystem, board: Board) -> dict[str, Any]:
-    """The configuration of the top level and of its constraints."""
+    """Return the configuration of the top level and of its constraints."""
     assert system.link is not None
     clock_hz = system.link.clock_hz
     ports = {pin.port.lower() for pin in board.pins}
@@ -255,7 +255,7 @@ def _standard(pin: BoardPin, board: Board) -> dict[str, str] | None:
 
 
 def _accelerator_pins(system: DerivedSystem) -> list[_Port]:
-    """The accelerators' pins with their names and bits at the top level."""
+    """Return the accelerators' pins as ports of the top level."""
     names = top_level_pins(system)
     return [
         _Port(

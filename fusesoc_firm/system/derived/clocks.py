@@ -13,7 +13,7 @@ from fusesoc_firm.text.naming import identifier
 
 
 def clocks_of(specification: Specification, own: Fraction | None, faults: Diagnostics) -> tuple[Clock, ...]:
-    """The clocks of the specification other than clk, in the order of the specification; faults are noted.
+    """Return all clocks except clk, in the order of the specification, and note their faults.
 
     `own` is the frequency of clk in Hz, if it is known.
     """
@@ -55,7 +55,7 @@ def _check_names(specification: Specification, faults: Diagnostics) -> None:
 
 
 def _pin_called(specification: Specification, port: str) -> str:
-    """The pin whose port at the top level has this name; empty if there is no such pin."""
+    """Return the pin whose port at the top level has this name, or an empty string if there is no such pin."""
     pins = {str(item.name): item.pins for item in specification.accelerators}
     for block in specification.blocks:
         for pin in pins.get(str(block.type), ()):

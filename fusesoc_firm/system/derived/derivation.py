@@ -1,8 +1,8 @@
 """Specification -> derived System: data types and data flow.
 
-This module resolves every message, assigns ids, and uses `connections` to find the port and block to which each
-connection refers. Faults are reported at their places in the specification; as many checks as possible run before an
-error is raised.
+This module resolves every message, assigns ids, and uses `connections` to find the block and port at each end of every
+connection. Faults are reported at their places in the specification; as many checks as possible run before an error is
+raised.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def derive(
 ) -> DerivedSystem:
     """Derive the system of a specification in `folder`; unless `needs_sources` is set, source files may be missing.
 
-    Raises `InputError` with the faults found here and the faults already in `faults`.
+    Raise `InputError` with the faults found here and the faults already in `faults`.
     """
     analysis = _Analysis(specification, folder, libraries, faults, needs_sources)
     analysis.check_names()
@@ -118,7 +118,7 @@ def derive(
 
 
 def source_files(specification: Specification, folder: Path) -> list[Path]:
-    """The source files of all accelerators, in the order of the specification."""
+    """Return the source files of all accelerators, in the order of the specification."""
     return [folder / source for accelerator in specification.accelerators for source in accelerator.sources]
 
 
@@ -191,7 +191,7 @@ class _Analysis:
                 self.faults.error(f"'{source}' is not a source of type {accelerator.type}", source.source, hint)
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
-        """The message sides of an interface, numbered if there are several sides; None if a message has a fault."""
+        """Return an interface's message sides, numbered if there are several, or None if a message has a fault."""
         frames = [self._frame(item.middleware, item.message, item.include, item.exclude) for item in interface]
         prefixes = [f"{word}_"] if len(frames) == 1 else [f"{word}{number}_" for number in range(len(frames))]
         sides = [
@@ -205,7 +205,7 @@ class _Analysis:
         return output_length(item, frame, self.faults) if isinstance(item, OutputType) else None
 
     def _frame(self, middleware: Text, message: Text, include: Sequence[Text], exclude: Sequence[Text]) -> Frame | None:
-        """The frame of a message's fields; None if a fault was noted, at the message's name in the specification."""
+        """Return the frame of a message's fields; if it has a fault, note it at the message's name and return None."""
         if not middleware or not message:
             return None
         library = self.libraries[MIDDLEWARES[middleware]]
@@ -239,7 +239,7 @@ class _Analysis:
     def _resolve_accelerator_block(self, block: Block) -> None:
         assert block.type is not None
         names = [accelerator.name for accelerator in self.specification.accelerators]
-        # A block may refer to an accelerator that could not be read.
+        # The block's accelerator may be one that could not be read.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
             hint = nearest(block.type, names) or "add it to 'accelerators'"
@@ -294,7 +294,7 @@ class _Analysis:
             )
 
     def topic_uses(self, names: Mapping[End, str]) -> Iterator[TopicUse]:
-        """The topics of all converters and of software in other programs; `names` are its messages' names."""
+        """Yield the topics of all converters and of software in other programs; `names` are from `message_names`."""
         for name, block in self.blocks.items():
             is_elsewhere = block.type in self.types and self.types[block.type].is_elsewhere
             if block.type is not None and not is_elsewhere:
@@ -306,7 +306,7 @@ class _Analysis:
                     yield TopicUse(topic, is_published, block.topic.source if block.topic else block.name.source)
 
     def wiring(self) -> Wiring:
-        """The wiring of the resolved blocks."""
+        """Return the wiring of the resolved blocks."""
         blocks = self.specification.blocks
         lost = [block for block in blocks if self.blocks.get(block.name) is not block]
         unsound = [block for block in self.blocks.values() if not block.is_sound]
@@ -324,12 +324,12 @@ class _Analysis:
         )
 
     def parts(self, connections: Sequence[Connection], names: Mapping[End, str]) -> Parts:
-        """The system in hardware and software."""
+        """Return the system, partitioned into hardware and software."""
         software = self.instances(is_software=True)
         return Parting(self.blocks, software, self.inputs, self.outputs, connections, names).parts()
 
     def instances(self, *, is_software: bool) -> tuple[AcceleratorBlock, ...]:
-        """The accelerators' blocks with known types, in hardware or in software."""
+        """Return the accelerators' blocks with known types, in hardware or in software."""
         found = [
             AcceleratorBlock(str(block.name), self.types[block.type], str(block.clock or ""))
             for block in self.blocks.values()
@@ -339,7 +339,7 @@ class _Analysis:
 
 
 def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> tuple[Converter, ...]:
-    """The converters with the fields that connections carry; unconnected fields need no ports."""
+    """Return the converters with the fields that connections carry; unconnected fields need no ports."""
     names: dict[str, set[Names]] = {}
     for connection in connections:
         for sink, frame in zip(connection.sinks, connection.frames, strict=True):
@@ -351,7 +351,7 @@ def _converters(parts: Parts, mode: str, connections: Iterable[Connection]) -> t
     for number, name in enumerate(parts.of_mode(mode)):
         whole = select(sides[name][0].frame)
         frame = with_names_in_use(whole, names[name])
-        # Blocks with the same fields share the first one's entity.
+        # Converters with the same fields share the entity of the first one.
         suffix = "" if frame == whole else suffixes.setdefault(frame, f"_{identifier(name).lower()}")
         given_name = str(parts.blocks[name].topic or "")
         software = parts.crossings.get(name)

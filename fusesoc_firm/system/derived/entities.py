@@ -1,4 +1,4 @@
-"""The design units of a system; their names must be unique, since a tool keeps one unit of each name."""
+"""The design units of a system; their names must be unique, since a tool keeps only one unit of each name."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fusesoc_firm.text.naming import identifier
 
 
 def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: Diagnostics) -> None:
-    """Note every block and accelerator whose message, name or sources require an entity with a conflicting name."""
+    """Note every block and accelerator that needs a design unit whose name conflicts with another unit's name."""
     owners = {
         system.entity: "the system",
         f"{system.entity}_tb": "the system's test bench",
@@ -55,7 +55,7 @@ def check_entities(system: DerivedSystem, blocks: Mapping[str, Block], faults: D
 
 
 def _converters(system: DerivedSystem) -> Iterator[tuple[str, str, Frame]]:
-    """The entity of each converter, with its block and its frame."""
+    """Yield the entity of each converter, with its block and its frame."""
     for converter in system.subscribers:
         yield subscriber_entity(converter.frame, converter.suffix), converter.block, converter.frame
     for converter in system.publishers:

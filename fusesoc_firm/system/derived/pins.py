@@ -8,7 +8,7 @@ from fusesoc_firm.system.written.specification import SOFTWARE, Pin
 from fusesoc_firm.text.diagnostics import Diagnostics
 from fusesoc_firm.text.naming import identifier
 
-# The width of the largest array that fits a message's port.
+# The width of the largest port that a message can have.
 _MOST_BITS = 65536
 _OWN_PORTS = ("clk", "rst_n")
 # The kinds of ports that are missing in accelerators of some types.

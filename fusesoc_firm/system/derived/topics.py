@@ -26,7 +26,7 @@ class TopicUse:
 
 
 def check_topic_name(name: Text, faults: Diagnostics) -> None:
-    """Note a private name, and a name that ROS 1 or ROS 2 does not accept."""
+    """Note a fault if a name is private, or if ROS 1 or ROS 2 does not accept it."""
     if name.startswith("~"):
         message = f"topic '{name}' depends on the node's name, which is unknown before the node starts"
         faults.error(message, name.source, _LEGAL)
@@ -56,7 +56,7 @@ def _check_type(name: str, first: TopicUse, other: TopicUse, faults: Diagnostics
 
 
 def _check_loop(name: str, uses: Iterable[TopicUse], faults: Diagnostics) -> None:
-    """Warn of a message that returns to the system."""
+    """Warn if the system both publishes and subscribes to a topic, since the system then receives its own messages."""
     uses = tuple(uses)
     taking = next((use for use in uses if not use.is_published), None)
     giving = next((use for use in uses if use.is_published), None)

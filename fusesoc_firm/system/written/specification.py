@@ -20,7 +20,7 @@ from fusesoc_firm.text.naming import LONGEST_PATH, text_fault
 from fusesoc_firm.text.yaml_sections import Section, key, read
 from fusesoc_firm.text.yaml_text import Text, is_null, read_yaml
 
-# The type of an accelerator that is a function on the host.
+# The type of an accelerator that is a function in software.
 SOFTWARE = "ROS-SW"
 # The types of accelerators, with the suffixes of their source files.
 SOURCE_SUFFIXES = {
@@ -50,7 +50,7 @@ _SOURCE = re.compile(r"/?([A-Za-z0-9_.+][A-Za-z0-9_.+-]{0,199}/)*[A-Za-z0-9_.+][
 
 
 def source_fault(text: str) -> tuple[str, str] | None:
-    """The reason why `text` is not a legal name of a source file; None if it is."""
+    """Return the reason why `text` is not a legal name of a source file, or None if the name is legal."""
     if fault := text_fault(text, LONGEST_PATH):
         return fault
     legal = "legal are letters, digits, '_', '.', '+' and '-', which no part of the path begins with; 200 each"
@@ -76,7 +76,7 @@ class ClockDomain(Section):
 
 @dataclass(frozen=True)
 class Project(Section):
-    """Settings of the whole system."""
+    """The settings of the whole system."""
 
     name: Text = key("the system's name; the top level is <name>_system", is_required=True)
     # The dissertation's listings 6.1, 6.6 and 5.1 use three spellings.
@@ -161,7 +161,7 @@ class Accelerator(Section):
 
 @dataclass(frozen=True)
 class Outgoing(Section):
-    """A connection from the block that contains it."""
+    """A connection from the block whose section contains it."""
 
     name: Text = key("the block that receives the message", is_required=True)
     include: tuple[Text, ...] = key(**_INCLUDE)
@@ -206,7 +206,7 @@ class Block(Section):
 
 @dataclass(frozen=True)
 class Specification(Section):
-    """The whole file."""
+    """The contents of a specification file."""
 
     project: Project = key("settings of the whole system", form="section", section=Project, is_required=True)
     paths: tuple[Text, ...] = key(
@@ -215,7 +215,7 @@ class Specification(Section):
     )
     accelerators: tuple[Accelerator, ...] = key("the types of accelerators", form="sections", section=Accelerator)
     blocks: tuple[Block, ...] = key("instances and connections", form="sections", section=Block, is_required=True)
-    # From some place on, the file is invalid YAML, so any section may have more items.
+    # The file is invalid YAML from some line on, so any section may have further items.
     is_cut: bool = False
 
     @property
@@ -225,21 +225,21 @@ class Specification(Section):
 
     @property
     def middlewares(self) -> set[str]:
-        """The middlewares of the specification, by the words that the specification uses."""
+        """The names of the middlewares that the specification uses, as written there."""
         sides = [side for item in self.accelerators for side in (*item.interface.input, *item.interface.output)]
         words = [*(block.middleware for block in self.blocks), *(side.middleware for side in sides)]
         return {str(word) for word in words if word}
 
 
 def is_core(path: str) -> bool:
-    """Whether an item of `paths` is the name of a core."""
+    """Return whether an item of `paths` is the name of a core."""
     return _CORE.fullmatch(path) is not None
 
 
 def read_specification(path: Path, file: str, faults: Diagnostics) -> Specification:
     """Read the specification in a file, which messages call `file`, and note all faults.
 
-    Raises `InputError` if the file cannot be read, is empty, or is not YAML from the start.
+    Raise `InputError` if the file cannot be read, is empty, or is not YAML from the start.
     """
     text = read_yaml(path, file, faults)
     if text.root is None or is_null(text.root):
