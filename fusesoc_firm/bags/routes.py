@@ -84,12 +84,12 @@ class _Routing:
         if len(found) == len(rivals) == 1:
             return found[0]
         names = ", ".join(item.block for item in rivals)
-        hint = "name the topic like one of them, or give one the key 'topic'"
+        hint = "give the topic the name of one of these blocks, or add the key 'topic' to one of them"
         if len(rivals) > 1:
             for topic in found:
-                self.faults.error(f"topic {topic} of {self.bag.path} could go to {names}", hint=hint)
+                self.faults.error(f"topic {topic} in {self.bag.path} could go to several blocks: {names}", hint=hint)
         elif found:
-            self.faults.error(f"topics {', '.join(found)} of {self.bag.path} could go to {names}", hint=hint)
+            self.faults.error(f"several topics in {self.bag.path} could go to {names}: {', '.join(found)}", hint=hint)
         return ""
 
     def _fits(self, stream: Stream, subscriber: Topic) -> bool:
@@ -107,20 +107,20 @@ class _Routing:
             fitting = [item for item in self.subscribers if self._is_of(stream, item)]
             wrong = [item for item in takers[stream.topic] or fitting if item.frame.ros != ros]
             if wrong and not any(item.frame.ros == ros for item in fitting):
-                versions = f"is of {ros.title}, but '{wrong[0].block}' speaks {wrong[0].frame.ros.title}"
-                self.faults.error(f"topic {stream.topic} of {self.bag.path} {versions}")
+                versions = f"uses {ros.title}, but '{wrong[0].block}' uses {wrong[0].frame.ros.title}"
+                self.faults.error(f"topic {stream.topic} in {self.bag.path} {versions}")
 
     def _misfit(self, stream: Stream, subscribers: Sequence[Topic]) -> str:
         """Return the reason why subscribers cannot accept a stream with their topic's name, or an empty string."""
         for item in subscribers:
             wanted = item.frame.message
             if not self._is_of(stream, item):
-                return f"it is a {_spelled(stream)}, but '{item.block}' takes {wanted}"
+                return f"its type is {_spelled(stream)}, but '{item.block}' takes {wanted}"
             if item.frame.ros != self.bag.form.ros:
-                return f"it is of {self.bag.form.ros.title}, but '{item.block}' speaks {item.frame.ros.title}"
+                return f"it uses {self.bag.form.ros.title}, but '{item.block}' uses {item.frame.ros.title}"
             ours, theirs = self.signatures.get((item.frame.ros, wanted)), self._signatures(stream, wanted)
             if ours and theirs and ours not in theirs:
-                return f"its {wanted} differs from that of '{item.block}': {theirs[0]}, not {ours}"
+                return f"its definition of {wanted} differs from the one of '{item.block}': {theirs[0]}, not {ours}"
         return ""
 
     def _signatures(self, stream: Stream, message: MessageName) -> list[str]:
@@ -171,7 +171,7 @@ def read_bag(
         routes = routes_of(bag, subscribers)
         for stream, route in routes.items():
             if route.misfit:
-                fail(f"topic {stream.topic} of {path}: {route.misfit}")
+                fail(f"topic {stream.topic} in {path}: {route.misfit}")
         for recorded in bag.messages({stream.topic for stream in routes}):
             for subscriber in routes[recorded.stream].subscribers:
                 try:

@@ -79,9 +79,9 @@ def check_writable(path: Path, *, force: bool) -> None:
     """Raise `InputError` if `path` is not a bag and must not be replaced, or if it is a bag and `force` is not set."""
     check_parent(path)
     if path.is_dir() and (other := next((file for file in path.iterdir() if not _is_of_bag(file)), None)):
-        fail(f"{path} is a folder, but not a bag: it holds {other.name}")
+        fail(f"the folder {path} is not a bag: it contains {other.name}")
     if path.exists() and not force:
-        fail(f"{path} already exists", hint="--force replaces it")
+        fail(f"{path} already exists", hint="use --force to replace it")
 
 
 def _is_of_bag(file: Path) -> bool:

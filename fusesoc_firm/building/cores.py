@@ -92,7 +92,7 @@ def _git(folder: Path, *arguments: str) -> str:
     try:
         done = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=False)
     except FileNotFoundError:
-        fail("this needs the program 'git'", hint="Debian and Ubuntu: apt install git")
+        fail("the program 'git' is not installed", hint="on Debian and Ubuntu: apt install git")
     if done.returncode:
         fail(f"git {arguments[0]}: {done.stderr.strip()}")
     return done.stdout
@@ -162,7 +162,7 @@ def _found(core: str) -> tuple[Any, Any]:
     try:
         return fusesoc, fusesoc.get_core(core)
     except (DependencyError, SyntaxError):
-        fail(f"unknown core '{core}'", hint="fusesoc core list")
+        fail(f"unknown core '{core}'", hint="'fusesoc core list' lists all cores")
 
 
 def calls_of(core: Any, flags: Mapping[str, Any]) -> Iterator[GeneratorCall]:

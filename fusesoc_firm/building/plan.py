@@ -60,7 +60,10 @@ class Plan:
                 if core.provider and core.cache_status() != "downloaded":
                     lock = FolderLock(Path(f"{core.files_root}.lock"))
                     if owner := lock.acquire():
-                        fail(f"{core.name} is being downloaded by {owner}", hint="start again after the download")
+                        fail(
+                            f"{core.name} is being downloaded by {owner}",
+                            hint="run the command again after the download",
+                        )
                     try:
                         core.setup()
                     finally:
@@ -103,14 +106,14 @@ def _full_name(fusesoc: Any, core: str, targets: Sequence[str], faults: Diagnost
     known = [name for name in fusesoc.get_cores() if name.split(":")[2].lower() == core.lower()]
     families = sorted({name.rpartition(":")[0] for name in known})
     if len(families) > 1:
-        faults.error(f"'{core}' can be {' or '.join(families)}")
+        faults.error(f"'{core}' is ambiguous: {' or '.join(families)}")
         return None
     try:
         return str(fusesoc.get_core(families[0] if families else core).name)
     except (DependencyError, SyntaxError):
         fitting = [name for name, item in fusesoc.get_cores().items() if {*targets} <= item.get_data({}).targets.keys()]
         listed = f"cores with {' and '.join(targets)}: {', '.join(sorted(fitting))}" if fitting else ""
-        faults.error(f"unknown core '{core}'", hint=listed or "fusesoc core list")
+        faults.error(f"unknown core '{core}'", hint=listed or "'fusesoc core list' lists all cores")
         return None
 
 
@@ -119,10 +122,12 @@ def _flags(fusesoc: Any, name: str, target: str, faults: Diagnostics) -> dict[st
     core = fusesoc.get_core(name)
     known = core.get_data({}).targets
     if target not in known:
-        faults.error(f"{name} has no target '{target}'", hint=f"it has: {', '.join(known) or 'none'}")
+        faults.error(f"{name} has no target '{target}'", hint=f"its targets: {', '.join(known) or 'none'}")
         return None
     flags = {**core.get_flags(target), "target": target}
     if not core.get_flow(flags) and "tool" not in flags:
-        faults.error(f"target '{target}' of {name} cannot be built", hint="it has neither 'flow' nor 'default_tool'")
+        faults.error(
+            f"target '{target}' of {name} cannot be built", hint="the target has neither 'flow' nor 'default_tool'"
+        )
         return None
     return flags

@@ -103,7 +103,9 @@ def _finish(item: _Running) -> Outcome:
         return Outcome(item.build, True, seconds)
     lines = last_lines(item.build.log, SHOWN_LINES)
     if status is None:
-        lines = [f"another machine took over {item.build.work_root} because it had not seen this build for a while"]
+        lines = [
+            f"another machine took over {item.build.work_root} because this build had shown no activity for a while"
+        ]
     elif status < 0:
         lines.append(f"ended by {signal.Signals(-status).name}")
     return Outcome(item.build, False, seconds, tuple(lines))

@@ -70,10 +70,12 @@ def _parser() -> argparse.ArgumentParser:
         _print_path,
     )
     kind = path.add_mutually_exclusive_group()
-    kind.add_argument("--demos", action="store_true", help="the library of demo systems instead")
-    kind.add_argument("--docs", action="store_true", help="the folder of the documentation instead")
+    kind.add_argument("--demos", action="store_true", help="print the folder of the demo systems instead")
+    kind.add_argument("--docs", action="store_true", help="print the folder of the documentation instead")
     path.add_argument(
-        "--relative", action="store_true", help="relative to the current folder, for a fusesoc.conf in version control"
+        "--relative",
+        action="store_true",
+        help="print a path relative to the current folder, for a fusesoc.conf in version control",
     )
     add_message(commands)
     add_system(commands)

@@ -66,7 +66,7 @@ def add_sources(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PLACE",
-        help="a folder or bag with message definitions; may be given more than once",
+        help="a folder or bag with message definitions; may be repeated",
     )
     parser.add_argument("--distro", metavar="NAME", help="the ROS distribution that provides the standard messages")
 
@@ -109,6 +109,6 @@ def add_picture(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=Path,
         metavar="F.svg",
-        help="the file to write, also F.png, F.pdf or F.dot (default: print the picture)",
+        help="the file to write; .png, .pdf and .dot are legal, too (default: print the picture)",
     )
     parser.add_argument("--format", choices=("svg", "dot"), help="format of the printed picture (default: svg)")

@@ -30,8 +30,8 @@ class Project(Section):
 
     name: Text = key("the project's name", is_required=True)
     platform: Platform | None = key("the target hardware", form="section", section=Platform)
-    width: int = key("bits of the streams", form="integer", choices=WIDTHS, default=8)
-    prefix: Text | None = key("prefix of the names of all generated units except the interfaces, such as left")
+    width: int = key("width in bits of the streams", form="integer", choices=WIDTHS, default=8)
+    prefix: Text | None = key("prefix for the names of all generated units except the interfaces, such as left")
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,11 @@ def _check_names(config: ConfigFile, faults: Diagnostics) -> None:
     for message in config.messages:
         names = (*message.subscribers, *message.publishers)
         if not names and message.is_sound:
-            hint = "it needs 'subscribers' or 'publishers', or both"
+            hint = "add 'subscribers', 'publishers' or both"
             faults.error(f"'{message.name}' has no interface", message.name.source, hint)
         for name in names:
             if identifier(name) != name:
-                hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
+                hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
                 faults.error(f"'{name}' is not a legal entity name", name.source, hint)
             first = seen.setdefault(name.lower(), name)
             if first is not name:

@@ -119,14 +119,15 @@ def _first_position(stream: Stream) -> int:
 def check_width(width: int) -> None:
     """Raise `InputError` if converters do not support a stream of this width."""
     if width not in WIDTHS:
-        fail(f"a converter cannot have a stream of {width} bits", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
+        fail(f"converters do not support {width}-bit streams", hint=f"legal here: {', '.join(map(str, WIDTHS))}")
 
 
 def _check_size(frame: Frame) -> None:
     if frame.frame_bytes > _LARGEST_FRAME:
         fail(
-            f"{frame.message} takes {frame.payload_bytes} bytes, too many for a converter",
-            hint=f"at most {_LARGEST_FRAME - ID_BYTES - LENGTH_BYTES}, since VHDL counts bits up to 2**31-1",
+            f"{frame.message} has {frame.payload_bytes} bytes, which is too many for a converter",
+            hint=f"legal here: at most {_LARGEST_FRAME - ID_BYTES - LENGTH_BYTES}, since VHDL"
+            " cannot count more than 2**31-1 bits",
         )
 
 

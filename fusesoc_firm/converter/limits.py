@@ -15,7 +15,7 @@ def check_fixed_size(frame: Frame) -> None:
         faults.error(
             f"field '{'.'.join(part.names)}' of type '{part.ros_type}' has no fixed size",
             part.source if part.source and part.source.line else None,
-            "converters take messages of fixed size: numbers, time, duration, fixed arrays and messages of these",
+            "legal here: numbers, time, duration, and fixed arrays and messages of these types",
         )
     faults.raise_if_any()
 

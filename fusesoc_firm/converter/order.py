@@ -110,7 +110,7 @@ def _check_no_selection(selection: Selection, text: str) -> None:
         fail(
             f"'{text}' consists of several messages, so its fields cannot be selected",
             source,
-            "name one of them instead",
+            "name one of these messages instead",
         )
 
 
@@ -166,7 +166,7 @@ def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, 
         package = constants_package(wanted.message, prefix=prefix)
         _, twin = owners.setdefault(package, ("package", wanted.frame))
         if twin.message != wanted.message:
-            message = f"'{wanted.message}' and '{twin.message}' need the package '{package}'"
+            message = f"'{wanted.message}' and '{twin.message}' both need the package '{package}'"
             faults.error(message, entry.name.source)
         for direction in wanted.interfaces:
             entity = ENTITIES[direction](wanted.frame, prefix=prefix)
@@ -174,11 +174,11 @@ def _check_entities(found: list[tuple[MessageInterfaces, Wanted]], prefix: str, 
             if twin.message == wanted.message and twin.ros is not wanted.ros:
                 message = f"'{wanted.message}' already needs the entity '{entity}' for {twin.ros.title}"
                 faults.error(
-                    message, entry.name.source, "a project can have a message in only one ROS version per direction"
+                    message, entry.name.source, "a project can use a message in only one ROS version per direction"
                 )
     for entry, wanted in found:
         own = {"subscriber": entry.subscribers, "publisher": entry.publishers}
         for name, direction in ((name, direction) for direction, names in own.items() for name in names):
             what, frame = owners.get(name.lower(), ("", wanted.frame))
             if what and (what, frame) != (direction, wanted.frame):
-                faults.error(f"'{name}' is already the name of the {what} of {frame.message}", name.source)
+                faults.error(f"the name '{name}' is already used for the {what} of {frame.message}", name.source)

@@ -32,10 +32,10 @@ def used_bytes(frame: Frame, payload: bytes) -> bytes:
 def _read(frame: Frame, payload: bytes) -> tuple[dict[str, Any], list[tuple[int, int]]]:
     """Return the message, and the (first, end) ranges of the payload bytes that carry the message."""
     if frame.is_fixed_size and not 0 <= len(payload) - frame.payload_bytes <= frame.trailing_bytes:
-        raise CodecError(f"{frame.message} takes {frame.payload_bytes} bytes, not {len(payload)}")
+        raise CodecError(f"the payload of {frame.message} must have {frame.payload_bytes} bytes, not {len(payload)}")
     checked = payload[: frame.checked_prefix]
     if checked != frame.prefix[: frame.checked_prefix]:
-        raise CodecError(f"unknown encoding {checked.hex()} of {frame.message}")
+        raise CodecError(f"the payload of {frame.message} has the unknown encoding {checked.hex()}")
     reader = _Reader(frame, payload)
     message = reader.read(frame.nodes, 0)
     if len(payload) - reader.position > frame.trailing_bytes:

@@ -91,7 +91,7 @@ class _Writer:
     def _loop(self, node: Loop, value: Any) -> None:
         if not isinstance(value, list | tuple) or node.count not in (None, len(value)):
             length = "" if node.count is None else f" of {node.count}"
-            raise CodecError(f"'{dotted(node.names)}' takes a list{length}, not {shown(value)}")
+            raise CodecError(f"'{dotted(node.names)}' must be a list{length}, not {shown(value)}")
         check_bound(node, len(value))
         if node.count is None:
             self._count(len(value))
@@ -106,7 +106,7 @@ def _pack_array(node: Data, value: Any) -> BytesLike:
     if node.element.code == "B" and isinstance(value, BytesLike):
         return value
     if not isinstance(value, list | tuple):
-        raise CodecError(f"'{dotted(node.names)}' takes a list, not {shown(value)}")
+        raise CodecError(f"'{dotted(node.names)}' must be a list, not {shown(value)}")
     return _pack(node.element, value, node.names)
 
 
@@ -119,7 +119,7 @@ def _pack(type_: WireType, values: Sequence[Any], names: tuple[str, ...]) -> byt
             try:
                 _packed(type_, [value])
             except (struct.error, OverflowError, TypeError, ValueError) as error:
-                raise CodecError(f"'{dotted(names)}' takes a {type_.name}, not {shown(value)}") from error
+                raise CodecError(f"'{dotted(names)}' must be of type {type_.name}, not {shown(value)}") from error
         raise
 
 

@@ -119,13 +119,13 @@ def reject_unknown(frame: Frame, message: MessageValue) -> None:
 def units_of(data: Data, text: object) -> BytesLike:
     """Return the bytes of a text on the wire, without count and terminator. Raise `CodecError` for any other value."""
     if not isinstance(text, str):
-        raise CodecError(f"'{dotted(data.names)}' takes a {data.kind.value}, not {shown(text)}")
+        raise CodecError(f"'{dotted(data.names)}' must be of type {data.kind.value}, not {shown(text)}")
     try:
         if data.kind is DataKind.STRING:
             return text.encode("utf-8", "surrogateescape")
         units = text.encode("utf-16-le", "surrogatepass")
     except UnicodeEncodeError as error:
-        raise CodecError(f"'{dotted(data.names)}' cannot hold a lone surrogate: {shown(text)}") from error
+        raise CodecError(f"'{dotted(data.names)}' cannot contain a lone surrogate: {shown(text)}") from error
     count = len(units) // 2
     return struct.pack(f"<{count}I", *struct.unpack(f"<{count}H", units))
 
@@ -139,13 +139,13 @@ def text_of(data: Data, units: bytes) -> str:
     try:
         return struct.pack(f"<{count}H", *numbers).decode("utf-16-le", "surrogatepass")
     except struct.error:
-        raise CodecError(f"'{dotted(data.names)}' holds a unit that is not UTF-16: {max(numbers):#x}") from None
+        raise CodecError(f"'{dotted(data.names)}' contains a unit that is not UTF-16: {max(numbers):#x}") from None
 
 
 def check_bound(part: Data | Loop, count: int) -> None:
     """Raise `CodecError` if `count` exceeds the bound in the definition."""
     if part.bound is not None and count > part.bound:
-        raise CodecError(f"'{dotted(part.names)}' holds at most {part.bound}, not {count}")
+        raise CodecError(f"the length of '{dotted(part.names)}' must be at most {part.bound}, not {count}")
 
 
 def _member(value: Any, name: str) -> Any:
@@ -181,7 +181,7 @@ def _elements(value: Any, path: Path, leaf: FrameField) -> Iterator[Any]:
         return
     is_array = isinstance(inner, list | tuple) or (not rest and leaf.type.code == "B" and isinstance(inner, BytesLike))
     if not is_array or len(inner) != step.count:
-        raise CodecError(f"'{step.name}' takes a list of {step.count}, not {shown(inner)}")
+        raise CodecError(f"'{step.name}' must be a list of {step.count}, not {shown(inner)}")
     if not rest:
         yield from inner
         return

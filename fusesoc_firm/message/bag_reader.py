@@ -36,16 +36,16 @@ from fusesoc_firm.text.diagnostics import InputError, fail
 
 Reader = Rosbag1Reader | Rosbag2Reader
 
-BAGS = "a bag is a .bag of ROS 1, or a folder, .mcap or .db3 of ROS 2"
+BAGS = "a bag is a ROS 1 .bag file, or a ROS 2 folder, .mcap file or .db3 file"
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _METADATA = "metadata.yaml"
 _ROS1_MAGIC = b"#ROSBAG"
 # The errors that rosbags reports for a damaged bag, and the remedy for each.
 _REMEDIES = {
-    "not indexed": "it was not closed: rosbag reindex {path}",
-    "index looks damaged": "it is cut off: rosbag reindex {path}",
-    "are in its journal": "it was not closed: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
-    "end magic is invalid": "it was not closed, or is cut off: mcap recover {path}",
+    "not indexed": "the bag was not closed; run: rosbag reindex {path}",
+    "index looks damaged": "the bag is cut off; run: rosbag reindex {path}",
+    "are still in the journal": "the bag was not closed; run: sqlite3 FILE 'pragma wal_checkpoint(truncate)'",
+    "end magic is invalid": "the bag was not closed or is cut off; run: mcap recover {path}",
 }
 
 
@@ -186,7 +186,7 @@ def _readers(path: Path) -> list[Reader]:
         # A recorder writes the metadata file last. Without it, the finished part of the bag is still readable.
         files = sorted((file for file in path.iterdir() if file.suffix in _SUFFIXES[1:]), key=_natural)
         if not files:
-            raise FileNotFoundError("it contains neither metadata.yaml nor a .db3 or .mcap file")
+            raise FileNotFoundError("the folder contains neither metadata.yaml nor a .db3 or .mcap file")
         return [Rosbag2Reader(file) for file in files]
     return [Rosbag1Reader(path) if _is_ros1(path) else Rosbag2Reader(path)]
 
@@ -196,7 +196,7 @@ def _check_journals(path: Path) -> None:
     for file in path.glob("*.db3") if path.is_dir() else [path]:
         journal = file.with_name(f"{file.name}-wal")
         if journal.exists() and journal.stat().st_size:
-            raise ValueError(f"messages of {file.name} are in its journal {journal.name}")
+            raise ValueError(f"messages of {file.name} are still in the journal {journal.name}")
 
 
 def _is_ros1(path: Path) -> bool:

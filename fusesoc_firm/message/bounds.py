@@ -59,9 +59,9 @@ class Extent:
 
 # The limits, each with its name in error messages.
 _BOUNDS = {
-    "levels": (MOST_LEVELS, "levels of messages within messages"),
-    "fields": (MOST_FIELDS, "fields, with those of all messages within"),
-    "nodes": (MOST_NODES, "fields, with those of every element of its fixed arrays"),
+    "levels": (MOST_LEVELS, "levels of nested messages"),
+    "fields": (MOST_FIELDS, "fields, including those of nested messages"),
+    "nodes": (MOST_NODES, "fields, including those of each element in fixed arrays"),
     "bytes": (MOST_BYTES, "bytes of fixed size"),
 }
 

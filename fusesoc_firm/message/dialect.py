@@ -18,7 +18,7 @@ LARGEST_SIZE = 2**32 - 1  # element and character counts are uint32 on the wire
 
 @dataclass(frozen=True)
 class NameRule:
-    """The legal spellings of one kind of name; `description` completes the hint "a field name has ..."."""
+    """The legal spellings of one kind of name; `description` completes the hint "a field name consists of ..."."""
 
     kind: str
     pattern: re.Pattern[str]
@@ -37,7 +37,7 @@ class NameRule:
     @property
     def hint(self) -> str:
         """A description of the legal names."""
-        return f"a {self.kind} has {self.description}"
+        return f"a {self.kind} consists of {self.description}"
 
 
 @dataclass(frozen=True)
@@ -89,16 +89,16 @@ def _integer_ranges(byte: tuple[int, int]) -> dict[str, tuple[int, int]]:
 
 
 _ANY_CASE = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_ANY_CASE_TEXT = "letters, digits and '_' and starts with a letter"
+_ANY_CASE_TEXT = "letters, digits and '_', and starts with a letter"
 _LOWER_SNAKE = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
-_LOWER_SNAKE_TEXT = "lower-case letters, digits and single '_' between them and starts with a letter"
+_LOWER_SNAKE_TEXT = "lower-case letters, digits and single '_' between them, and starts with a letter"
 _UPPER_SNAKE = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
-_UPPER_SNAKE_TEXT = "upper-case letters, digits and single '_' between them and starts with a letter"
+_UPPER_SNAKE_TEXT = "upper-case letters, digits and single '_' between them, and starts with a letter"
 # The suffixes end the names of messages that ROS 2 derives from services and actions.
 _UPPER_CAMEL = re.compile(
     r"[A-Z][A-Za-z0-9]*(?:_(?:Request|Response|Event|Goal|Result|Feedback|FeedbackMessage|SendGoal|GetResult))*"
 )
-_UPPER_CAMEL_TEXT = "letters and digits and starts with a capital"
+_UPPER_CAMEL_TEXT = "letters and digits, and starts with a capital letter"
 
 ROS1 = Dialect(
     title="ROS 1",

@@ -27,7 +27,7 @@ from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, by
 from fusesoc_firm.text.files import read_regular
 
 # The means by which users name additional sources.
-_FURTHER = "; further places: 'paths' of the specification or core, --path"
+_FURTHER = "; add places with 'paths' in the specification or core, or with --path"
 _WORDS = {InterfaceKind.SERVICE: "service", InterfaceKind.ACTION: "action"}
 
 
@@ -204,7 +204,9 @@ class MessageLibrary:
             return {}
         if not bag.texts:
             faults.error(
-                f"message path '{path}' is a bag without definitions", source, "name the folder of its messages"
+                f"message path '{path}' is a bag without message definitions",
+                source,
+                "give the folder with the message definitions",
             )
         return {name: _Source((path,), None, texts) for name, texts in bag.texts.items()} if bag.ros == self.ros else {}
 
@@ -244,7 +246,11 @@ class MessageLibrary:
         """Report a fault if a bag's definitions of a message are not equivalent."""
         parsed = (self.ros.parse(text, name, self.ros, file, Diagnostics()) for text in source.texts)
         if len({to_text(definition) for definition in parsed}) > 1:
-            faults.error(f"'{name}' is defined in several ways", SourceRef(file, 1, 1), "name the folder of one")
+            faults.error(
+                f"the bag has different definitions of '{name}'",
+                SourceRef(file, 1, 1),
+                "give the folder with the right definition",
+            )
 
     def _collect(
         self,
@@ -274,7 +280,7 @@ class MessageLibrary:
 
     def _hint(self, name: MessageName) -> str:
         if interface := self.interface(name):
-            return f"it is a {_WORDS[interface.kind]}; its messages are {', '.join(map(str, interface.messages))}"
+            return f"'{name}' is a {_WORDS[interface.kind]} with the messages {', '.join(map(str, interface.messages))}"
         places = ", ".join([*map(str, self._places), self._store.title])
         if feature := unsupported_word(name.name):
             return f"looked in: {places}; {feature.fault}: {feature.hint}"
@@ -322,7 +328,7 @@ def libraries(paths: Sequence[Path], environment: Mapping[str, str] | None, stor
     """
     known = {ros: ros.distributions() for ros in middlewares()}
     if store is not None and not any(store in names for names in known.values()):
-        fail(f"'{store}' is not a distribution of ROS", hint=nearest(store, itertools.chain(*known.values())))
+        fail(f"unknown ROS distribution '{store}'", hint=nearest(store, itertools.chain(*known.values())))
     return Libraries(
         {
             ros: partial(MessageLibrary, ros, paths, environment, store if store in names else None)
@@ -342,7 +348,11 @@ def _read(name: str, paths: Sequence[Path], faults: Diagnostics) -> str:
     first, data = paths[0], contents[0]
     for other, content in zip(paths, contents, strict=True):
         if content != data:
-            faults.error(f"'{name}' differs from {other}", SourceRef(str(first), 1, 1), "name the folder of one")
+            faults.error(
+                f"the definition of '{name}' differs from the one in {other}",
+                SourceRef(str(first), 1, 1),
+                "give the folder with the right definition",
+            )
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as fault:
@@ -360,8 +370,8 @@ def _content(path: Path, faults: Diagnostics) -> bytes:
 
 
 def _note_depth(top: MessageName, name: MessageName, source: SourceRef | None, faults: Diagnostics) -> None:
-    hint = f"legal here: up to {MOST_LEVELS} levels of messages within messages"
-    faults.error(f"'{top}' holds '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
+    hint = f"legal here: up to {MOST_LEVELS} levels of nested messages"
+    faults.error(f"'{top}' contains '{name}' {MOST_LEVELS + 1} levels deep", source, hint)
 
 
 def _part(name: MessageName, source: _Source) -> Part:
@@ -374,7 +384,7 @@ def _check_folder(path: Path, source: SourceRef | None, faults: Diagnostics) -> 
     if any(interface_files(path, suffixes).values()):
         return
     *others, last = (f".{suffix}" for suffix in suffixes)
-    reason = f"holds no {', '.join(others)} or {last} file" if path.is_dir() else "is neither a folder nor a bag"
+    reason = f"contains no {', '.join(others)} or {last} file" if path.is_dir() else "is neither a folder nor a bag"
     faults.error(
-        f"message path '{path}' {reason}", source, "give a package, a workspace, a folder of packages or a bag"
+        f"message path '{path}' {reason}", source, "legal here: a package, a workspace, a folder of packages or a bag"
     )

@@ -46,7 +46,7 @@ class DistributionStore:
         """Select one of `distributions`, or the default for None. Raise `InputError` for any other name."""
         chosen = _DEFAULTS[version] if distribution is None else distribution
         if chosen not in distributions(version):
-            fail(f"'{chosen}' is not a distribution of ROS {version}", hint=nearest(chosen, distributions(version)))
+            fail(f"unknown ROS {version} distribution '{chosen}'", hint=nearest(chosen, distributions(version)))
         self._version = version
         self.title = f"rosbags {_prefix(version)}{chosen}"
         self._name = f"{_prefix(version)}{chosen}"

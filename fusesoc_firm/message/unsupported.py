@@ -24,7 +24,7 @@ class Feature:
     @property
     def fault(self) -> str:
         """The message for the user."""
-        return f"{self.name} are not supported by .msg"
+        return f"{self.name} are not supported in .msg files"
 
 
 def _feature(name: str, words: str, forms: tuple[str, ...], hint: str) -> Feature:
@@ -39,49 +39,49 @@ FEATURES = (
         "multi-dimensional arrays",
         "",
         (r"[^\s\[\]=]+\[[^\[\]]*\]\s*\[[^\[\]]*\]", r"[^\s\[\]=]+\[\s*[1-9]\d*\s*[,x*]\s*\d+[^\]]*\]"),
-        "write one dimension, such as 'float64[9] x' for 3 by 3; its element (i, j) is x[3*i + j]",
+        "use one dimension, such as 'float64[9] x' for 3 by 3 elements; element (i, j) is x[3*i + j]",
     ),
     _feature(
         "maps",
         "map dict",
         (r"(?:std::)?(?:unordered_map|map|dict)\s*<[^>]*>?",),
-        "write an array of a message that has the fields 'key' and 'value'",
+        "use an array of a message with the fields 'key' and 'value'",
     ),
     _feature(
         "optional fields",
         "optional",
         (r"@optional\b", r"(?:std::)?optional\s*<[^>]*>?", _DECLARATION.format("optional"), r"\w+(?:/\w+)*\?(?=\s)"),
-        "write an array of at most one element, or add a bool beside the field",
+        "use an array of at most one element, or add a bool field",
     ),
     _feature(
         "unions",
         "union variant oneof",
         (r"(?:std::)?variant\s*<[^>]*>?", _DECLARATION.format("(?:union|oneof)")),
-        "write a number for the kind, and a field for each kind",
+        "use a number for the variant, and a field for each variant",
     ),
     _feature(
         "typedefs",
         "typedef",
         (_DECLARATION.format("typedef"), r"using\s+\w+\s*=.*"),
-        "write the type itself, or a message that has it as its field",
+        "use the type itself, or a message with a field of this type",
     ),
     _feature(
-        "any types",
+        "'any' types",
         "any",
         (r"(?:std::)?any\s*<[^>]*>?",),
-        "write 'string type' and 'uint8[] data'",
+        "use the fields 'string type' and 'uint8[] data'",
     ),
     _feature(
         "inherited fields",
         "extends inherits",
         (r"(?:extends|inherits)(?=\s+\w+/\w)",),
-        "put the base into a field, such as 'Base base'",
+        "use a field for the base message, such as 'Base base'",
     ),
     _feature(
         "enum types",
         "enum",
         (_DECLARATION.format("enum"),),
-        "write a number and constants, such as 'uint8 mode' and 'uint8 MODE_IDLE=0'",
+        "use a number and constants, such as 'uint8 mode' and 'uint8 MODE_IDLE=0'",
     ),
 )
 

@@ -58,8 +58,8 @@ def doubts(modules: Modules) -> list[str]:
             if gate.kind.startswith("$concat"):
                 found |= dict.fromkeys(_mixed(gate, drivers))
     return [
-        f"{place}: warning: if one branch assigns a constant to all of a signal, and another assigns parts of it, GHDL "
-        "mixes up the constant's bits; assign it in the same parts"
+        f"{place}: warning: if one branch assigns a constant to a whole signal and another assigns parts of the "
+        "signal, GHDL mixes up the constant's bits; assign the constant in the same parts"
         for place in found
     ]
 

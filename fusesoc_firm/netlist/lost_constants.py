@@ -433,8 +433,8 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
     if lost:
         raise NetlistError(
             "\n".join(
-                f"{place}: error: GHDL turns a constant of {width} bits into zero if only its highest {_WORD} bits are "
-                "not zero; assign it in two slices, or an array by its elements"
+                f"{place}: error: GHDL turns a {width}-bit constant into zero if only its highest {_WORD} bits are "
+                "not zero; assign the constant in two slices, or an array element by element"
                 for place, width in dict.fromkeys(lost)
             )
         )
@@ -443,6 +443,6 @@ def refuse(lost: Sequence[tuple[str, int]]) -> None:
 def doubt(widths: Iterable[int], message: str) -> str:
     """Return a warning that constants of some widths were not examined, with GHDL's reason."""
     return (
-        f"warning: GHDL turns constants of {', '.join(map(str, sorted(widths)))} bits into zero if only their "
-        f"highest {_WORD} bits are not zero, and cannot tell whether there are any: {message.splitlines()[0]}"
+        f"warning: GHDL turns constants with {', '.join(map(str, sorted(widths)))} bits into zero if only their "
+        f"highest {_WORD} bits are not zero; the search for such constants failed: {message.splitlines()[0]}"
     )

@@ -50,12 +50,12 @@ _LOST = re.compile(r"latch|no assignment for|multiple assignments|never assigned
 _CRASH = "GHDL Bug occurred"
 # The places in GHDL 2.0 where it crashes, with the input that causes each crash.
 _CRASHES = {
-    "netlists-builders.adb:929": "\nIs there an integer whose range has one number, such as `range 0 to N - 1` with "
-    "N = 1? It has no bits, which GHDL does not expect.",
+    "netlists-builders.adb:929": "\nA possible cause is an integer whose range contains only one number, such as "
+    "`range 0 to N - 1` with N = 1: GHDL does not support integers without bits.",
     **dict.fromkeys(
         ("netlists.adb:774", "STORAGE_ERROR"),
-        "\nGHDL 2.0 does so where a table of it grows while some bits of a signal are assigned. That depends on how "
-        "many assignments there are before it: one more or less, or another order of processes, avoids it.",
+        "\nGHDL 2.0 crashes if one of its tables grows while some bits of a signal are assigned. To avoid the crash, "
+        "add or remove an assignment before this place, or reorder the processes.",
     ),
 }
 _OF_MEMORIES = "netlists-memories.adb"
@@ -70,9 +70,9 @@ _PAUSE = 0.005
 # GHDL's option that disables memory inference, which loses some registers.
 _NO_MEMORIES = "-dm"
 _WITHOUT_MEMORIES = (
-    "; GHDL loses a register that is written by a dynamic index and read by a constant one, and crashes at some "
-    "memories. So all memories of this netlist are registers; read such a register by dynamic indices alone, or write "
-    "it by constant ones, to get memories."
+    "; GHDL loses a register that is written with a dynamic index and read with a constant index, and crashes at some "
+    "memories. Therefore, all memories in this netlist are registers. To get memories, read such a register only with "
+    "dynamic indices, or write the register with constant indices."
 )
 
 
@@ -172,9 +172,7 @@ def _netlist(ghdl: _Ghdl) -> tuple[str, str]:
     text, warnings = ghdl.synthesise("dump")
     lost = [line for line in warnings.splitlines() if _LOST.search(line)]
     if lost:
-        raise NetlistError(
-            "\n".join([*lost, "error: GHDL drops this, so the hardware would not do what the VHDL says"])
-        )
+        raise NetlistError("\n".join([*lost, "error: GHDL drops this, so the hardware would not match the VHDL"]))
     modules = dump.read(text)
     if ghdl.translation.refuses_loops and (found := loops(modules)):
         raise NetlistError("\n".join(found))
@@ -286,8 +284,8 @@ def _components(modules: Modules, sources: Sequence[str]) -> list[Module]:
             continue
         if not (name := _module(module.name, sources)):
             raise instance.error(
-                f"instance '{instance.name}' is of '{module.name}', which is neither an entity of this build's VHDL "
-                f"nor a module of its Verilog ({', '.join(sources) or 'it has none'})"
+                f"instance '{instance.name}' uses '{module.name}', which is neither an entity in this build's VHDL "
+                f"nor a module in the build's Verilog ({', '.join(sources) or 'no modules'})"
             )
         module.name = name
         found[instance.kind] = module
@@ -317,7 +315,7 @@ def _errors(text: str) -> str:
     if _CRASH in text:
         what = re.search(r"^raised (.*)", text, re.MULTILINE)
         return (
-            f"error: GHDL crashed and does not say at which line of the VHDL: {what[1] if what else 'nothing is known'}"
+            f"error: GHDL crashed without reporting a line of the VHDL: {what[1] if what else 'no details are known'}"
             f"{next((hint for place, hint in _CRASHES.items() if place in text), '')}"
         )
     found = "\n".join(line for item in _messages(text) if not re.search(r":(note|warning):", item[0]) for line in item)

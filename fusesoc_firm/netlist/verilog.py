@@ -464,7 +464,7 @@ class _Writer:
         net = gate.input(index)
         clock = self.driver.get(net.number)
         if clock is None or clock.kind not in _EDGES:
-            raise gate.error("a register without a clock")
+            raise gate.error("a register has no clock")
         return f"{_EDGES[clock.kind]} {self.value(clock.input(0))}"
 
     def _register(self, gate: Instance) -> Iterator[str]:
@@ -498,7 +498,7 @@ class _Writer:
             bits = self._first_value(gate, source.input(0))
             end = len(bits) - source.numbers[0]
             return bits[end - net.width : end]
-        raise gate.error("the first value is not constant")
+        raise gate.error("the initial value is not constant")
 
     def _memory_ports(self, memory: Instance) -> list[Instance]:
         """Return a memory's ports in the order in which they operate."""
@@ -513,7 +513,7 @@ class _Writer:
         for reader in self.readers[net]:
             if reader.inputs[0] and reader.inputs[0].number == net:
                 return reader
-        raise port.error("a memory whose ports GHDL did not connect")
+        raise port.error("GHDL did not connect the ports of a memory")
 
     def _memory_size(self, memory: Instance) -> tuple[int, int]:
         """Return the number of bits per word and the number of words."""

@@ -291,7 +291,7 @@ class Ros2(Ros):
                     known = str(getattr(end, "topic_type_hash", topic["signature"]))
                     if (end.node_name, end.node_namespace) == mine and known != topic["signature"]:
                         raise BridgeError(
-                            "the installed '{}' ({}) differs from the system's ({})".format(
+                            "the installed definition of '{}' ({}) differs from the system's definition ({})".format(
                                 topic["type"], known, topic["signature"]
                             )
                         )
@@ -352,7 +352,7 @@ def _message_class(name: str) -> Any:
         return getattr(importlib.import_module(f"{package}.{kind}"), message)
     except (ImportError, AttributeError):
         raise BridgeError(
-            f"the message '{name}' is not installed for {sys.executable}; ROS 2 needs its package built and sourced"
+            f"the message '{name}' is not installed for {sys.executable}; build and source the message's ROS 2 package"
         ) from None
 
 

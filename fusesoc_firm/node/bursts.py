@@ -67,7 +67,7 @@ class BurstJoiner:
             frame = bytearray(burst)
         else:
             if len(burst) <= self._beat_bytes:
-                raise BurstError(f"the burst that resumes the frame of id {identifier} holds nothing but the id")
+                raise BurstError(f"the burst that resumes the frame with id {identifier} contains nothing but the id")
             # The first beat of the burst is inserted and not part of the frame; the following bytes stay in their
             # lanes.
             frame = begun
@@ -77,7 +77,7 @@ class BurstJoiner:
             return JoinedFrame(identifier, bytes(memoryview(frame)[_HEADER_BYTES:]))
         if len(burst) % self._beat_bytes:
             raise BurstError(
-                f"a burst of id {identifier} ends within a beat: {len(burst)} bytes at {self._beat_bytes} per beat,"
+                f"a burst with id {identifier} ends within a beat: {len(burst)} bytes at {self._beat_bytes} per beat,"
                 f" and the frame is incomplete"
             )
         self._begun[identifier] = frame
@@ -87,7 +87,9 @@ class BurstJoiner:
         """End the stream. Raise `BurstError` if a frame is incomplete."""
         if not self._begun:
             return
-        parts = ", ".join(f"{len(self._begun[identifier])} bytes of id {identifier}" for identifier in self.unfinished)
+        parts = ", ".join(
+            f"{len(self._begun[identifier])} bytes with id {identifier}" for identifier in self.unfinished
+        )
         self._begun.clear()
         raise BurstError(f"the stream ends within frames: {parts}")
 
@@ -108,11 +110,12 @@ class BurstJoiner:
         length = int.from_bytes(frame[ID_BYTES:_HEADER_BYTES], "little")
         if self._longest is not None and length > self._longest:
             raise BurstError(
-                f"the frame of id {identifier} announces {length} bytes of payload; the longest has {self._longest}"
+                f"the frame with id {identifier} announces {length} bytes of payload;"
+                f" the longest payload has {self._longest} bytes"
             )
         beyond = len(frame) - _HEADER_BYTES - length
         if beyond > 0:
-            raise BurstError(f"the frame of id {identifier} is {beyond} bytes longer than it announces")
+            raise BurstError(f"the frame with id {identifier} is {beyond} bytes longer than its header announces")
         return _HEADER_BYTES + length
 
 
@@ -129,7 +132,7 @@ def split_frame(frame: bytes, width: int, runs: Iterable[int]) -> list[bytes]:
     for beats in runs:
         last = first + beats * beat_bytes
         if beats < 1 or last >= len(frame):
-            raise ValueError(f"run {len(bursts)} has {beats} beats; legal: 1 and more, fewer than remain")
+            raise ValueError(f"run {len(bursts)} has {beats} beats; legal: 1 or more, but fewer than remain")
         bursts.append(_burst(frame, first, last, beat_bytes))
         first = last
     return [*bursts, _burst(frame, first, len(frame), beat_bytes)]

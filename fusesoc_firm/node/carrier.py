@@ -105,7 +105,7 @@ class RosCarrier:
         except OSError as error:
             mine.close()
             raise CarrierError(
-                f"the Python of {self.title}, {self._python}, cannot be started: {error.strerror}"
+                f"{self._python}, the Python for {self.title}, cannot be started: {error.strerror}"
             ) from None
         finally:
             its.close()
@@ -194,7 +194,7 @@ class RosCarrier:
 
     def _fault(self, parcel: bridge.Parcel | None) -> CarrierError:
         if parcel is None:
-            return CarrierError(f"the process of {self.title} ({self._python}) has ended")
+            return CarrierError(f"the process for {self.title} ({self._python}) has ended")
         return CarrierError(f"{self.title}: {parcel.data.decode(errors='replace')}")
 
 
@@ -225,6 +225,6 @@ def _python_of(ros: int) -> str:
         if not subprocess.run([path, "-c", f"import {module}"], capture_output=True, check=False).returncode:
             return path
     raise CarrierError(
-        f"no Python here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
-        f" source ROS's setup file, or name its Python by --ros-python"
+        f"no Python found here can import {module}, which ROS {ros} installs: {', '.join(candidates)};"
+        f" source the setup file of ROS, or select a Python with --ros-python"
     )

@@ -102,11 +102,11 @@ def _only_version(description: NodeDescription, ros: Middleware | None) -> int:
     found = description.versions
     if len(found) > 1:
         titles = " and ".join(middleware_of(version).title for version in found)
-        fail(f"the topics of '{description.name}' are of {titles}, but a node in C++ speaks one of them")
+        fail(f"the topics of '{description.name}' use {titles}, but a C++ node supports only one ROS version")
     if ros is not None and ros.number != found[0]:
         title = middleware_of(found[0]).title
-        hint = "the hardware handles one version: set it with 'middleware' of blocks and interfaces"
-        fail(f"the topics of '{description.name}' are of {title}, not of {ros.title}", hint=hint)
+        hint = "the hardware supports one ROS version; select the version with 'middleware' in blocks and interfaces"
+        fail(f"the topics of '{description.name}' use {title}, not {ros.title}", hint=hint)
     return found[0]
 
 

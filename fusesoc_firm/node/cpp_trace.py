@@ -110,7 +110,8 @@ def _read(steps: Path, description: NodeDescription) -> Iterator[_Step]:
             step = _step(row, f"{steps}:{number}")
             known = outputs if step.event in ("burst", "published") else inputs
             if step.converter not in known:
-                fail(f"{steps}:{number}: '{description.name}' has no topic of converter {step.converter}, {step.event}")
+                end = f"converter {step.converter} and step '{step.event}'"
+                fail(f"{steps}:{number}: '{description.name}' has no topic for {end}")
             yield step
 
 
@@ -120,7 +121,7 @@ def _step(row: dict[str, str], place: str) -> _Step:
         first, last = row["first_cycle"], row["last_cycle"]
         cycles = (int(first), int(last)) if first and last else None
     except (TypeError, ValueError):
-        fail(f"{place} is not a step of a node")
+        fail(f"{place} is not a step in a node's trace")
     if row["event"] not in _EVENTS:
         fail(f"{place}: unknown step '{row['event']}'", hint=f"legal: {', '.join(_EVENTS)}")
     return _Step(time_ns, row["event"], converter, message, size, cycles)

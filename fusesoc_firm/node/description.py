@@ -132,7 +132,8 @@ def _topic(topic: Topic, loaded: LoadedSystem) -> NodeTopic:
     frame = topic.frame
     if frame.ros not in (ROS1, ROS2):
         fail(
-            f"'{topic.block}' uses {frame.ros.title}, which nodes do not support", hint="nodes support ROS 1 and ROS 2"
+            f"'{topic.block}' uses {frame.ros.title}, which nodes do not support",
+            hint="nodes support only ROS 1 and ROS 2",
         )
     definitions = loaded.libraries[frame.ros].closure(frame.message)
     is_first = frame.ros is ROS1

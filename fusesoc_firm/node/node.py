@@ -364,7 +364,7 @@ class Node:
 
     def _forget(self, transport: Transport, why: str) -> None:
         """Continue with hardware that was reset, and forget all messages that the hardware held."""
-        self._report(f"{why}; it is restarted, and the messages in it are lost")
+        self._report(f"{why}; the hardware is restarted, and the messages in it are lost")
         self.statistics.restarts += 1
         if self._trace:
             self._trace.forget()
@@ -382,7 +382,7 @@ class _Reporter:
         if self._left > 0:
             self._report(text)
         elif self._left == 0:
-            self._report("further reports of this kind are only counted")
+            self._report("further reports of this kind are counted, but not printed")
         self._left -= 1
 
 

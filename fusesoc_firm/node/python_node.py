@@ -29,7 +29,7 @@ def python_node(
     """
     description = describe(loaded)
     if ros is not None and ros.number not in description.versions:
-        fail(f"system '{description.name}' has no topic of {ros.title}")
+        fail(f"system '{description.name}' has no {ros.title} topics")
     has_software = any(block.type.accelerator.sources for block in loaded.system.software.blocks)
     name = f"{description.name}_node.py"
     call = "main(NODE)"

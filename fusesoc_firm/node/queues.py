@@ -135,7 +135,7 @@ class SubscriberQueues(Generic[Item]):
     ) -> None:
         """Create queues of `capacity` frames each; the default `policy` is least recently used; `clock` returns ns."""
         if subscribers < 1 or capacity < 1:
-            raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 and more")
+            raise ValueError(f"subscribers is {subscribers}, capacity is {capacity}; legal: 1 or more")
         self._policy = policy or LeastRecentlyUsed(subscribers)
         self._capacity = capacity
         self._overflow = overflow
@@ -180,7 +180,7 @@ class SubscriberQueues(Generic[Item]):
             if not waiting:
                 if self._closed:
                     raise ClosedError("the queues are closed and empty")
-                raise EmptyError(f"no frame came in {timeout} s")
+                raise EmptyError(f"no frame arrived in {timeout} s")
             subscriber = min(waiting, key=lambda index: self._policy.key(index, self._queues[index][0][0]))
             _, item = self._queues[subscriber].popleft()
             self._policy.served(subscriber)

@@ -42,11 +42,14 @@ def run_options(
     """
     if ros is not None and ros not in description.versions:
         known = " and ".join(map(str, description.versions))
-        hint = "the hardware handles one version: set it with 'middleware' of blocks and interfaces"
-        fail(f"system '{description.name}' has no topic of ROS {ros}, but of ROS {known}", hint=hint)
+        hint = "the hardware supports one ROS version; select the version with 'middleware' in blocks and interfaces"
+        fail(f"system '{description.name}' has no ROS {ros} topics, only topics of ROS {known}", hint=hint)
     versions = description.versions if ros is None else (ros,)
     if arguments.ros_args and 2 not in versions:
-        fail(f"'{ROS_ARGUMENTS}' is for ROS 2, and the topics are of ROS 1", hint="ROS 1 takes NAME:=VALUE without it")
+        fail(
+            f"'{ROS_ARGUMENTS}' is for ROS 2, but the topics use ROS 1",
+            hint="for ROS 1, write NAME:=VALUE without '{ROS_ARGUMENTS}'",
+        )
     passed = [*rest, *([ROS_ARGUMENTS, *arguments.ros_args] if arguments.ros_args else ())]
     return RunOptions(
         versions,

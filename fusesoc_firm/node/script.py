@@ -25,7 +25,7 @@ def main(description: NodeDescription, script: str = "", specification: str = ""
     messages, all relative to `script`.
     """
     accept_interrupts()
-    parser = argparse.ArgumentParser(description=f"The node of the system {description.name}.")
+    parser = argparse.ArgumentParser(description=f"Run the node of the system {description.name}.")
     parser.add_argument("--transport", required=True, metavar="ADDRESS", help="the transport to the hardware")
     add_node_options(parser)
     arguments, rest = parser.parse_known_args()

@@ -83,4 +83,4 @@ def _decoded(block: str, frame: Frame, payload: bytes) -> Message:
     try:
         return decode(frame, payload)
     except CodecError as error:
-        fail(f"a message from '{block}' is not a valid {frame.message}: {error}")
+        fail(f"a message from '{block}' is not a valid {frame.message} message: {error}")

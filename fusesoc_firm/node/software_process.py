@@ -92,14 +92,14 @@ def _frames(row: BinaryIO, ids: int) -> Iterator[tuple[int, bytes]]:
         if len(header) < _HEADER_BYTES or len(payload := row.read(length)) < length:
             fail("the input ends within a frame")
         if header[0] >= ids:
-            fail(f"a frame has id {header[0]}, but the software's inputs have the ids 0 to {ids - 1}")
+            fail(f"a frame has the id {header[0]}, but the software's inputs have the ids 0 to {ids - 1}")
         yield header[0], payload
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("spec", type=Path, help="the specification of the system")
+    parser.add_argument("spec", type=Path, help="the system's YAML specification")
     parser.add_argument("--path", type=Path, action="append", default=[], metavar="DIR", help="message definitions")
     parser.add_argument("--distro", metavar="NAME", help="the ROS distribution that provides the standard messages")
     given = parser.parse_args(arguments)

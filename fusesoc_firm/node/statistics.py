@@ -16,7 +16,7 @@ class Input:
     dropped: int = 0
     sent: int = 0
     refused: int = 0
-    """rejected by the hardware because of faults in their frames"""
+    """messages that the hardware rejected because of broken frames"""
 
 
 @dataclass
@@ -37,7 +37,7 @@ class Statistics:
     software_faults: int = 0
     restarts: int = 0
     unfinished: int = 0
-    """messages still in queues, and incomplete frames, when the time limit for ending had passed"""
+    """messages in queues, and incomplete frames, when the time limit for ending expired"""
 
     @classmethod
     def of(cls, description: NodeDescription) -> Statistics:
@@ -57,8 +57,8 @@ class Statistics:
         rows.append(("to", "frames", "published", "", ""))
         rows += [(name, str(item.frames), str(item.published), "", "") for name, item in self.outputs.items()]
         notes = {
-            "faults on the way from the hardware": self.faults,
-            "faults of software": self.software_faults,
+            "faults on the route from the hardware": self.faults,
+            "faults in software": self.software_faults,
             "restarts": self.restarts,
             "messages unfinished at the end": self.unfinished,
         }

@@ -49,7 +49,7 @@ def draw_trace(table: Path, picture: Path) -> None:
     check_output(picture, SUFFIXES)
     ways = _ways(table)
     if not ways:
-        fail(f"{table} has no message that came back")
+        fail(f"{table} contains no messages with a response")
     plots = _plots()
     size = (_WIDTH_INCHES, _ROW_INCHES * len(ways) + 0.4)
     drawing, axes = plots.subplots(len(ways), 2, figsize=size, squeeze=False, layout="constrained")
@@ -92,7 +92,7 @@ def _ways(table: Path) -> dict[tuple[str, str], list[_Row]]:
         with table.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             if tuple(reader.fieldnames or ()) != COLUMNS:
-                fail(f"{table} is not the trace of a node", hint="firm live ... --trace F.csv writes one")
+                fail(f"{table} is not a node's trace", hint="'firm live ... --trace F.csv' writes a trace")
             found = [*reader]
     except OSError as error:
         fail(f"cannot read {table}: {error.strerror}")
@@ -110,11 +110,11 @@ def _values(row: dict[str, str], place: str) -> _Row:
     try:
         return {name: text if name in words else float(text) if text else None for name, text in row.items()}
     except (TypeError, ValueError):
-        fail(f"{place} is not a row of a trace")
+        fail(f"{place} is not a valid row of a trace")
 
 
 def _number(value: float | str | None) -> float:
-    assert isinstance(value, float), "only a row with all its values can be drawn"
+    assert isinstance(value, float), "only a row without missing values can be drawn"
     return value
 
 
@@ -122,7 +122,7 @@ def _plots() -> Any:
     try:
         matplotlib: Any = import_module("matplotlib")
     except ImportError:
-        fail("a picture needs matplotlib", hint="pip install 'fusesoc-firm[plots]'")
+        fail("pictures require matplotlib", hint="pip install 'fusesoc-firm[plots]'")
     matplotlib.use("Agg")
     plots: Any = import_module("matplotlib.pyplot")
     plots.rcParams.update(_SETTINGS)

@@ -34,8 +34,8 @@ from fusesoc_firm.text.diagnostics import Diagnostics, InputError, SourceRef, fa
 from fusesoc_firm.tools.programs import explanation, missing
 
 # FuseSoC removes this folder at the start of every run of a target.
-_REMOVED = """this generator's folder was removed during its run: the same target is being run twice at once
-      = 'firm build' can do this safely"""
+_REMOVED = """this generator's folder was removed while the generator was running: the same target is run twice at once
+      = 'firm build' runs targets safely in parallel"""
 
 
 class _NotStoredError(Exception):
@@ -67,7 +67,7 @@ def main(command: str, argv: list[str], generators: Mapping[str, Generator] = GE
     try:
         if len(argv) != 1:
             fail(
-                f"{command} is a generator that FuseSoC calls with one file; use it in the 'generate' section of a core"
+                f"{command} is a generator that FuseSoC calls with one file; add it to the 'generate' section of a core"
             )
         _answer(command, generators[command], Path(argv[0]), run_of(os.getppid()))
     except InputError as error:
@@ -207,7 +207,8 @@ def _folders_of_run(names: Mapping[str, SourceRef | None], generated: str, run: 
         current = message_folders(generated, core_name(name), run)
         if not current:
             hint = (
-                "the requesting core must depend on it, and its target 'default' must use the generator firm_messages"
+                f"the requesting core must depend on '{name}', whose target 'default' must use"
+                " the generator firm_messages"
             )
             faults.error(f"core '{name}' provides no messages", source, hint)
         found += map(Path, current)
@@ -226,7 +227,7 @@ def _check_locked(loaded: LoadedRequest) -> bool:
         places.append(request.files_root / str(name))
     if name := os.environ.get(LOCKED):
         if not Path(name).is_absolute():
-            fail(f"{LOCKED} is '{name}'", hint=f"a generator runs in its own folder; write {LOCKED}=$PWD/{name}")
+            fail(f"{LOCKED} is '{name}'", hint=f"generators run in other folders, so write {LOCKED}=$PWD/{name}")
         places.append(Path(name))
     for place in places:
         from fusesoc_firm.plugin.lock_file import check_request
@@ -244,7 +245,8 @@ def _check_declared(of_build: Reads, of_key: Reads) -> None:
     for file, covered in found:
         if os.path.realpath(file) not in covered and Path(file).is_file():
             faults.error(
-                f"{file} was read, but is not an input", hint="list it under the generator's parameter 'files'"
+                f"{file} was read, but is not listed as an input",
+                hint="add the file to the generator's parameter 'files'",
             )
     faults.raise_if_any()
 
@@ -260,9 +262,9 @@ def _write(files: Files, request: Request, marks: str, run: str) -> None:
     if found:
         unit, other = found
         fail(
-            f"{request.vlnv} and {other} define the design unit '{unit}' differently, and tools keep only one",
+            f"{request.vlnv} and {other} define the design unit '{unit}' differently, but tools keep only one",
             find_requesting_core(request.files_root, request.name).instance(),
-            "give the units of one core distinct names by the parameter 'name' of generator 'firm', such as name: left",
+            "rename the units of one core with the parameter 'name' of generator 'firm', such as name: left",
         )
 
 

@@ -31,7 +31,7 @@ Lock = Mapping[str, Mapping[str, Mapping[str, str]]]
 """Facts by kind (`messages`, `cores`, `tools`), by the item's name, and by the fact's name."""
 
 _PACKAGES = ("chevron", "edalize", "fusesoc", "fusesoc-firm", "numpy", "pyyaml", "rosbags")
-_HEAD = "# Written by 'firm lock', compared by 'firm lock --locked'. Keep it under version control.\n"
+_HEAD = "# Written by 'firm lock', checked by 'firm lock --locked'. Keep this file under version control.\n"
 _WORDS = {"messages": "message", "cores": "core", "tools": "tool"}
 
 
@@ -74,9 +74,9 @@ def read_lock(path: Path) -> Lock:
         data: Any = yaml_data(read_regular(path, LARGE.bytes).decode())
         return {kind: {str(name): dict(facts) for name, facts in data[kind].items()} for kind in _WORDS}
     except OSError as error:
-        fail(f"cannot read {path}: {error.strerror}", hint="'firm lock' writes it")
+        fail(f"cannot read {path}: {error.strerror}", hint="run 'firm lock' to write the file")
     except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError):
-        fail(f"{path} is not a lock file", hint="'firm lock' rewrites it")
+        fail(f"{path} is not a lock file", hint="run 'firm lock' to rewrite the file")
 
 
 def check_lock(locked: Lock, used: Lock) -> None:
@@ -97,11 +97,11 @@ def check_request(path: Path, loaded: LoadedRequest) -> None:
     for label, now in _messages(loaded).items():
         was = locked["messages"].get(_of_request(label, loaded), locked["messages"].get(label))
         for difference in _difference("message", label, was, now):
-            faults.error(difference, hint=f"by {path}")
+            faults.error(difference, hint=f"according to {path}")
     for name, now in packages(_PACKAGES).items():
         if (was := locked["tools"].get(name)) is not None:
             for difference in _difference("tool", name, was, now):
-                faults.error(difference, hint=f"by {path}")
+                faults.error(difference, hint=f"according to {path}")
     faults.raise_if_any()
 
 
@@ -122,7 +122,7 @@ def _difference(word: str, name: str, was: Mapping[str, str] | None, now: Mappin
         return
     for fact in sorted(was.keys() | now.keys()):
         if was.get(fact) != now.get(fact):
-            yield f"{word} {name}: {fact} is {now.get(fact)}, but {was.get(fact)} is locked"
+            yield f"{word} {name}: {fact} is {now.get(fact)}, but the lock file has {was.get(fact)}"
 
 
 def _messages(loaded: LoadedRequest) -> dict[str, dict[str, str]]:

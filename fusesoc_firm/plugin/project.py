@@ -70,7 +70,7 @@ def message_folders(named: Mapping[str, SourceRef | None]) -> tuple[Path, ...]:
         core = cores.get(core_name(name))
         requests = [_request(call) for call in core.calls if call.generator == MESSAGES] if core else []
         if not requests:
-            fail(f"'{name}' is not a known core with messages", source)
+            fail(f"no known core '{name}' provides messages", source)
         found += [folder for request in requests if request for folder in folders(request)]
     return tuple(found)
 

@@ -61,7 +61,7 @@ def why(path: Path) -> list[Reason]:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        fail(f"{path} is not a readable text: {error}")
+        fail(f"cannot read {path} as text: {error}")
     loaded = GENERATORS[command].load(request)
     rendering = rendering_of(loaded.generate, name, text, loaded.inputs)
     return reasons(rendering, _names(request))
@@ -73,8 +73,8 @@ def _generator(path: Path) -> str:
     generator = find_requesting_core(Path(call.files_root), call.vlnv.split(":")[2]).generator
     if generator not in GENERATORS:
         fail(
-            f"no core in {call.files_root} generates {call.vlnv} any more",
-            hint="generate it again with fusesoc run --setup",
+            f"no core in {call.files_root} generates {call.vlnv} any longer",
+            hint="run 'fusesoc run --setup' to generate it again",
         )
     return generator
 
@@ -97,18 +97,21 @@ def rendering_of(
     with recorded() as renderings:
         core = generate()
     if name not in core.files:
-        fail(f"'{name}' is not a file of the generated core", hint=f"its files: {', '.join(core.files)}")
+        fail(f"'{name}' is not a file of the generated core", hint=f"the core's files: {', '.join(core.files)}")
     content = core.files[name].content
     made = content if isinstance(content, str) else content.decode(errors="replace")
     if made != text:
-        fail(f"'{name}' is outdated or was edited", hint="generate it again with fusesoc run --setup")
+        fail(f"'{name}' is outdated or was edited", hint="run 'fusesoc run --setup' to generate it again")
     if made not in renderings:
         copied = [
             str(item)
             for item in inputs
             if isinstance(item, Path) and item.is_file() and item.read_bytes() == text.encode()
         ]
-        fail(f"'{name}' does not come from a template", hint=f"it is a copy of {copied[0]}" if copied else "it is data")
+        fail(
+            f"'{name}' was not generated from a template",
+            hint=f"the file is a copy of {copied[0]}" if copied else "the file contains data",
+        )
     return renderings[made]
 
 
@@ -228,7 +231,7 @@ def call_file(path: Path) -> tuple[Path, str]:
     if call is None:
         fail(
             f"{path} is not a generated file",
-            hint="generated files are in a build, below 'generator_cache' or in the folder of a core <core>-<instance>",
+            hint="generated files are in a build folder, below 'generator_cache' or in a folder <core>-<instance>",
         )
     return call, path.relative_to(folder).as_posix()
 

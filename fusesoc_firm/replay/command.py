@@ -84,11 +84,11 @@ def replay(
     May raise `InputError`, also if messages were rejected; the responses to all other messages are then recorded.
     """
     if source.path.exists() and target.path.exists() and source.path.samefile(target.path):
-        fail(f"{target.path} is the bag to replay; write to another")
+        fail(f"cannot write {target.path}: it is the bag to replay")
     check_writable(target.path, force=target.force)
     system = loaded.system
     if settings.has_latency and system.clock is None:
-        fail("the latency in seconds is unknown: the specification has no 'clock'")
+        fail("cannot compute the latency in seconds: the specification has no 'clock'")
     clock = system.clock if settings.has_latency else None
     _check_names(settings.names, [item.block for item in (*stimulated(system), *published(system))])
     subscribers = renamed(stimulated(system), settings.names)
@@ -109,7 +109,7 @@ def replay(
         going.print_summary(target.path)
     if going.errors:
         errors = "1 error" if going.errors == 1 else f"{going.errors} errors"
-        fail(f"{errors}; {going.refused} of {going.played.total()} messages did not go through")
+        fail(f"{errors}; {going.refused} of {going.played.total()} messages had errors")
 
 
 @dataclass
@@ -157,7 +157,7 @@ class _Replay:
             for subscriber in () if route.misfit else route.subscribers:
                 self.run.take(subscriber, recorded.payload, recorded.stamp)
         except (StuckError, TransportError) as error:
-            faults.append(f"the rest of the bag is not replayed: {error}")
+            faults.append(f"the rest of the bag was not replayed: {error}")
             self.is_over = True
         for sent in self.run.sent:
             self._record(sent)
@@ -195,7 +195,7 @@ class _Replay:
             print(*(word.ljust(width) for word, width in zip(words, widths, strict=False)), count.rjust(widths[-1]))
         dropped = {stream: count for stream, count in self.bag.streams.items() if stream not in self.routes}
         for stream, number in dropped.items():
-            print(f"no subscriber for {stream.topic} of {stream.type}: {number}")
+            print(f"no subscriber for {stream.topic} ({stream.type}): {number}")
         print(
             f"{path}: {self.played.total()} in, {self.sent.total()} out, {sum(dropped.values())} dropped,"
             f" {self.errors} errors, {self.run.simulator.cycle} cycles"
@@ -226,7 +226,7 @@ def _check_names(names: Mapping[str, str], blocks: Sequence[str]) -> None:
     faults = Diagnostics()
     for block in names:
         if block not in blocks:
-            faults.error(f"the system has neither a subscriber nor a publisher '{block}'", hint=nearest(block, blocks))
+            faults.error(f"the system has no subscriber or publisher '{block}'", hint=nearest(block, blocks))
     faults.raise_if_any()
 
 
@@ -234,7 +234,7 @@ def _form(target: Target, like: Form) -> Form:
     """Return the format of the bag to write."""
     said = form_of(target.path)
     if target.form and said and target.form is not said:
-        fail(f"the format of {target.path} is to be {target.form.value}, but its ending means {said.value}")
+        fail(f"cannot write {target.path}: --format is {target.form.value}, but the file's ending means {said.value}")
     return target.form or said or like
 
 
@@ -243,8 +243,8 @@ def _check_speaks(topics: Sequence[Topic], path: Path, form: Form) -> None:
     faults = Diagnostics()
     for topic in topics:
         if topic.frame.ros != form.ros:
-            message = f"'{topic.block}' uses {topic.frame.ros.title}, but {path} would be a bag of {form.ros.title}"
-            faults.error(message, hint="choose another format with --format")
+            message = f"'{topic.block}' uses {topic.frame.ros.title}, but {path} would be a {form.ros.title} bag"
+            faults.error(message, hint="select another format with --format")
     faults.raise_if_any()
 
 
@@ -260,9 +260,9 @@ def _routes(
     faults.raise_if_any()
     routes = routes_of(bag, subscribers, _signatures(loaded, subscribers))
     if not routes:
-        wanted = ", ".join(f"{item.name} of {item.frame.message}" for item in subscribers)
-        there = ", ".join(f"{stream.topic} of {stream.type}" for stream in bag.streams) or "nothing"
-        fail(f"{bag.path} holds no topic that the system takes: {wanted}", hint=f"it holds {there}")
+        wanted = ", ".join(f"{item.name} ({item.frame.message})" for item in subscribers)
+        there = ", ".join(f"{stream.topic} ({stream.type})" for stream in bag.streams) or "nothing"
+        fail(f"{bag.path} contains no topic for the system, which takes {wanted}", hint=f"the bag contains {there}")
     return routes
 
 

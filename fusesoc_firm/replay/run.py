@@ -127,7 +127,7 @@ class SystemRun:
     def unfinished(self) -> str:
         """The fault of an incomplete last frame from the hardware; empty if all frames were complete."""
         blocks = [self.system.publishers[number].block for number in self._joiner.unfinished]
-        return f"the system has not sent the rest of a frame of {', '.join(blocks)}" if blocks else ""
+        return f"the system has not completed a frame of {', '.join(blocks)}" if blocks else ""
 
     def _reached(self, block: str) -> set[str]:
         """Return a block and all blocks that its messages reach."""
@@ -176,7 +176,7 @@ class SystemRun:
                     case ErrorPulse(converter=converter):
                         self.faults.append(self._error(converter))
             if self._waiting and self.simulator.cycle >= self._deadline:
-                raise StuckError(f"the system does not accept it at '{self._waiting[0].block}'")
+                raise StuckError(f"the system does not accept the message at '{self._waiting[0].block}'")
 
     def _is_busy(self) -> bool:
         return self.simulator.quiet < self.quiet and self.simulator.cycle < self._deadline

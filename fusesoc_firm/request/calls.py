@@ -20,7 +20,7 @@ def read_call(path: Path, generator: str = "") -> GeneratorCall:
         call = yaml_data(path.read_text(encoding="utf-8"))
         return GeneratorCall(generator, str(call["vlnv"]), str(Path(call["files_root"])), call.get("parameters") or {})
     except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
-        fail(f"{path} is not a generator call of FuseSoC: {error}")
+        fail(f"{path} is not a FuseSoC generator call: {error}")
 
 
 def make_request(call: GeneratorCall, parameters: Iterable[Parameter], find: CoreFolders) -> Request:

@@ -36,7 +36,11 @@ def _core(request: Request, found: list[tuple[str, Path]]) -> GeneratedCore:
         # If two folders contain the same file, the first folder takes precedence.
         files.setdefault(name, GeneratedFile(path.read_bytes(), "user"))
     if not files:
-        fail(f"{request.name} has no messages", request_place(request), "'paths' lists their folders")
+        fail(
+            f"{request.name} contains no messages",
+            request_place(request),
+            "list the folders of the messages in 'paths'",
+        )
     return GeneratedCore(f"Message definitions of {request.name}", files)
 
 

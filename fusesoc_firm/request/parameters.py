@@ -65,12 +65,12 @@ def check_parameters(given: Mapping[str, Any], known: Iterable[Parameter], origi
         if name not in table:
             faults.error(f"unknown parameter '{name}'", origin.key(name), nearest(name, table))
         elif replacing.get(name) in given:
-            hint = "remove one of them"
+            hint = "remove one of these parameters"
             faults.error(f"parameter '{name}' cannot be combined with '{replacing[name]}'", origin.key(name), hint)
     for name, parameter in table.items():
         if name not in given:
             if parameter.is_required and replacing.get(name) not in given:
-                hint = f"or give '{replacing[name]}' instead" if name in replacing else ""
+                hint = f"alternatively, set '{replacing[name]}'" if name in replacing else ""
                 faults.error(f"parameter '{name}' is missing: {parameter.meaning}", origin.instance(), hint)
         elif fault := _fault(parameter, given[name]):
             faults.error(f"parameter '{name}' is {given[name]!r}, but must be {fault}", origin.value(name))

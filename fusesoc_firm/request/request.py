@@ -26,7 +26,11 @@ CoreFolders = Callable[[Mapping[str, SourceRef | None]], Sequence[Path]]
 def no_core_folders(names: Mapping[str, SourceRef | None]) -> Sequence[Path]:
     """Raise `InputError` for every core, since message cores cannot be looked up."""
     for name, source in names.items():
-        fail(f"core '{name}' cannot be looked up here", source, "name the folder of its messages")
+        fail(
+            f"message cores such as '{name}' cannot be looked up here",
+            source,
+            "give the folder with the message definitions",
+        )
     return ()
 
 
@@ -138,7 +142,7 @@ def _checked(path: str) -> str:
     """
     for part in path.split("/"):
         if (size := len(part.encode())) > _LONGEST_FILE_NAME:
-            fail(f"the file '{part[:40]}...' would have a name of {size} bytes; file systems take {_LONGEST_FILE_NAME}")
+            fail(f"the name of the file '{part[:40]}...' would have {size} bytes; legal: at most {_LONGEST_FILE_NAME}")
     return path
 
 

@@ -269,9 +269,9 @@ def choose(
     Raise `ValueError` if tasks are missing or share a name.
     """
     if not tasks:
-        raise ValueError("there are no tasks")
+        raise ValueError("at least one task is required")
     if len({task.name for task in tasks}) < len(tasks):
-        raise ValueError("two tasks have the same name")
+        raise ValueError("task names must be unique")
     analyses = sorted(
         (analyse(policy, tasks, channel, is_ordered=is_ordered) for policy in TABLE_ORDER), key=_RANKS[criterion]
     )
@@ -300,33 +300,35 @@ _RANKS: Mapping[Criterion, Callable[[Analysis], tuple[float, ...]]] = {
 
 def _reasons(analyses: Sequence[Analysis], criterion: Criterion, load: float, names: tuple[str, ...]) -> list[str]:
     best = analyses[0]
-    found = [f"The publishers ask for {100 * load:.1f} % of the channel."]
+    found = [f"The publishers request {100 * load:.1f} % of the channel."]
     if load > 1:
         found[0] += " The channel is overloaded: each sends less often than its period allows."
     holding = [each for each in analyses if each.is_schedulable]
     finishing = [each for each in analyses if each.all_finish]
     if criterion is Criterion.FINISH:
-        found.append(f"All publishers finish under {len(finishing)} of {len(analyses)} policies.")
+        found.append(f"All publishers finish with {len(finishing)} of {len(analyses)} policies.")
     elif holding:
-        found.append(f"All deadlines hold under {len(holding)} of {len(analyses)} policies.")
+        found.append(f"All deadlines are met with {len(holding)} of {len(analyses)} policies.")
     else:
-        found.append("No policy is certain to hold all deadlines.")
+        found.append("No policy is guaranteed to meet all deadlines.")
     found.append(f"{best.policy} {_MERITS[criterion](best)}")
     if best.priorities == names:
-        found.append("Its priorities are the publishers' order in the specification.")
+        found.append("The priorities match the order of the publishers in the specification.")
     elif best.priorities:
-        found.append(f"Put the publishers in the order of its priorities: {', '.join(best.priorities)}.")
+        found.append(
+            f"List the publishers in the specification in the order of priority: {', '.join(best.priorities)}."
+        )
     return found
 
 
 def _lut_words(analysis: Analysis) -> str:
     if analysis.lut is None:
-        return "takes an unknown number of LUTs"
+        return "needs an unknown number of LUTs"
     if not area.measured():
-        source = "by the dissertation's table 4.1"
+        source = "from the dissertation's table 4.1"
     else:
         source = "measured, with the Manager's bursts" if POLICIES[analysis.policy].is_preemptive else "measured"
-    return f"takes the fewest LUTs of these, {analysis.lut} ({source})"
+    return f"needs the fewest LUTs of these policies, {analysis.lut} ({source})"
 
 
 _MERITS: Mapping[Criterion, Callable[[Analysis], str]] = {
@@ -343,5 +345,5 @@ def end_of(analysis: Analysis) -> str:
     if lateness is None:
         return f"'{name}' may never be served."
     if lateness <= 0:
-        return f"the closest end, that of '{name}', is {-lateness} cycles before its deadline."
+        return f"'{name}' ends closest to its deadline, {-lateness} cycles early."
     return f"'{name}' may end {lateness} cycles after its deadline."

@@ -82,7 +82,7 @@ def _text(choice: Choice) -> str:
         for analysis in choice.analyses
     ]
     columns = ("publisher", "period", "transfer time", "deadline", "response", "lateness", "buffer")
-    others = ("policy", "all deadlines hold", "all finish", "worst lateness", "buffers", "LUT")
+    others = ("policy", "all deadlines met", "all finish", "worst lateness", "buffers", "LUT")
     parts = [
         f"scheduler: {best.policy}\n",
         "\n".join(choice.reasons) + "\n",

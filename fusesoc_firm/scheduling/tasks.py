@@ -22,4 +22,4 @@ class Task:
     def __post_init__(self) -> None:
         for key in ("period", "transfer_time", "deadline"):
             if getattr(self, key) < 1:
-                raise ValueError(f"{key} of '{self.name}' is {getattr(self, key)}; legal: 1 and more cycles")
+                raise ValueError(f"{key} of '{self.name}' is {getattr(self, key)}; legal: 1 or more cycles")

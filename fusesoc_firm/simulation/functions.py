@@ -45,8 +45,8 @@ def importable_sources(accelerators: Sequence[Accelerator], folder: Path) -> Ite
         yield
         for _, file, place in _imported(known, owners):
             if file not in listed:
-                message = f"software imports {file.relative_to(place)}, which is not one of its sources"
-                fail(message, owners[place].sources[0].source, "list all its files in 'sources'")
+                message = f"software imports {file.relative_to(place)}, which is not one of the sources"
+                fail(message, owners[place].sources[0].source, "list all files of the accelerator in 'sources'")
     finally:
         sys.path[:], sys.dont_write_bytecode = paths, writes
         for name, _, _ in [*_imported(known, owners)]:
@@ -186,10 +186,10 @@ def _expected(outputs: Sequence[MessageSide]) -> str:
     messages = ", ".join(str(side.frame.message) for side in outputs)
     match len(outputs):
         case 0:
-            return "it has no output, so it returns nothing"
+            return "the accelerator has no output, so the function must return nothing"
         case 1:
-            return f"it returns {messages} as a mapping, or None to send nothing"
-    return f"it returns a tuple of {messages}, each a mapping, or None to send nothing"
+            return f"the function must return {messages} as a mapping, or None to send nothing"
+    return f"the function must return a tuple of {messages}, each as a mapping, or None to send nothing"
 
 
 def _joined(one: Any, other: Any) -> Any:

@@ -76,7 +76,7 @@ def _compile(accelerator: AcceleratorType, folder: Path, shim: str) -> bytes:
         try:
             result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
         except FileNotFoundError:
-            fail(f"'{_COMPILER}' is needed to simulate '{name}' and is not installed")
+            fail(f"'{_COMPILER}' is required to simulate '{name}', but is not installed")
         if result.returncode:
             fail(
                 f"the C++ of '{name}' does not compile:\n{result.stderr.rstrip()}",
@@ -98,7 +98,7 @@ def _check_included(accelerator: AcceleratorType, folder: Path, place: Path) -> 
     missing = sorted(str(path) for path in included - sources if not path.is_relative_to(place.resolve()))
     if missing:
         fail(
-            f"'{accelerator.accelerator.name}' includes {', '.join(missing)}",
+            f"'{accelerator.accelerator.name}' includes files that are not sources: {', '.join(missing)}",
             accelerator.accelerator.sources[0].source,
-            "list it under 'sources', too, so that a change of it is noticed",
+            "list all included files in 'sources', so that changes to these files are noticed",
         )

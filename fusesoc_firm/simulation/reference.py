@@ -22,7 +22,7 @@ from fusesoc_firm.simulation.user_code import UserFunction, load_function
 from fusesoc_firm.system.derived.model import Topic
 from fusesoc_firm.text.diagnostics import nearest
 
-_ANSWER = "it returns a list of (publisher, message), the message a mapping of fields"
+_ANSWER = "'respond' must return a list of (publisher, message), where the message is a mapping of fields"
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class _Model:
     def response(self, item: object, cause: int, when: str, known: Mapping[str, Topic]) -> Response:
         """Return an item of the function's result as a response."""
         if not isinstance(item, tuple | list) or len(item) != 2:
-            self.respond.fail(f"for {when}, 'respond' returned {item!r} in its list", _ANSWER)
+            self.respond.fail(f"for {when}, 'respond' returned a list that contains {item!r}", _ANSWER)
         block, message = item
         if not isinstance(block, str) or block not in known:
             self.respond.fail(

@@ -111,24 +111,28 @@ def _check_simulator(system: DerivedSystem, simulator: str, target: str) -> None
     known = SIMULATORS[simulator]
     if not known.reads_vhdl and system.clocks:
         fail(
-            f"{simulator} cannot simulate a system of several clocks",
-            hint=f"the additional clocks are generated in VHDL: use --target={target}",
+            f"{simulator} cannot simulate a system with several clocks",
+            hint=f"the additional clocks are generated in VHDL; use --target={target}",
         )
     if not known.reads_vhdl and system.link:
         fail(
-            f"{simulator} cannot simulate interconnect '{system.link.kind.value}'",
-            hint=f"the host's end of a link is written in VHDL: use --target={target}",
+            f"{simulator} cannot simulate the interconnect '{system.link.kind.value}'",
+            hint=f"the host's end of a link is written in VHDL; use --target={target}",
         )
     for type_ in system.accelerator_types:
         accelerator = type_.accelerator
         if known.reads_vhdl and accelerator.type == "Verilog":
             others = " or ".join(f"'{name}'" for name in fitting(has_verilog=True)).replace("'", "'simulator: ", 1)
-            hint = f"{others} link it with the Verilog that GHDL makes of the VHDL"
+            hint = f"use {others}, for which GHDL translates the VHDL to Verilog"
             message = f"{known.title} cannot simulate Verilog, the language of '{accelerator.name}'"
             fail(message, accelerator.name.source, hint)
         if not known.calls_functions and accelerator.type == "HLS":
-            hint = f"only GHDL calls a C++ function from within a simulation: --target={target}"
-            fail(f"{simulator} cannot simulate '{accelerator.name}' of type HLS", accelerator.name.source, hint)
+            hint = f"only GHDL can call C++ functions during a simulation; use --target={target}"
+            fail(
+                f"{simulator} cannot simulate '{accelerator.name}', which has the type HLS",
+                accelerator.name.source,
+                hint,
+            )
 
 
 def _vhdl_bench(configuration: Context) -> dict[str, GeneratedFile]:
@@ -162,7 +166,7 @@ def _beats(expected: list[Response], width: int) -> int:
 def _path(request: Request, parameter: str) -> Path:
     value = request.parameters[parameter]
     if value is None:
-        fail(f"{request.name}: product 'simulation' needs the parameter '{parameter}'")
+        fail(f"{request.name}: the product 'simulation' needs the parameter '{parameter}'")
     return request.files_root / str(value)
 
 

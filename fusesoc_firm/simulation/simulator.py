@@ -86,7 +86,7 @@ def build_simulator(
     if not spec.is_file():
         fail(f"there is no specification '{spec}'")
     if absent := missing(dict.fromkeys([*simulation_programs(tool), "make"])):
-        fail(f"not installed: {' '.join(absent)}", hint="; ".join(ways(program) for program in absent))
+        fail(f"missing programs: {', '.join(absent)}", hint="; ".join(ways(program) for program in absent))
     spec = spec.resolve()
     folder = _build_folder(spec, tool, build_root or Path(default_root()) / "simulators")
     with locked(folder):
@@ -141,10 +141,10 @@ def _build(spec: Path, core: CoreFile, tool: str, work: Path) -> None:
     """Set up the target with FuseSoC, and run make."""
     targets, target = core.section("targets"), "live" if tool == default_simulator(is_live=True) else f"live_{tool}"
     if target not in targets:
-        fail(f"{core.path} has no target '{target}'", hint=f"firm system core {spec}")
+        fail(f"{core.path} has no target '{target}'", hint=f"run 'firm system core {spec}' to add the target")
     made_with = targets[target].get("flow_options", {}).get("tool", tool)
     if made_with != tool:
-        fail(f"{core.path}: target '{target}' is for {made_with}", hint=f"--tool {made_with}")
+        fail(f"target '{target}' of {core.path} is for {made_with}", hint=f"use --tool {made_with}")
     command = [sys.executable, "-m", "fusesoc.main", "--cores-root", library_root(), "--cores-root", core.path.parent]
     command += ["run", "--setup", "--build", f"--target={target}", "--work-root", work, core.data.get("name", "")]
     _run(spec, list(map(str, command)), _project_folder(spec))
@@ -173,7 +173,7 @@ def _run(spec: Path, command: Sequence[str], folder: Path) -> str:
     if done.returncode:
         lines = [line for line in done.stdout.splitlines() if not line.startswith("INFO:")]
         shown = "\n".join(lines[-_SHOWN_LINES:])
-        fail(f"cannot build the simulator of {spec}: {shlex.join(command)} in {folder} failed:\n{shown}")
+        fail(f"cannot build the simulator for {spec}: {shlex.join(command)} in {folder} failed:\n{shown}")
     return done.stdout
 
 
@@ -193,5 +193,5 @@ def _words(work: Path, tool: str) -> list[str]:
 def _live(tool: str) -> Live:
     """Return the tool's support for live simulation. Raise `InputError` if the tool has no support."""
     if tool not in (known := fitting(is_live=True)) or not (live := known[tool].live):
-        fail(f"unknown simulator '{tool}' of live systems", hint=f"legal: {', '.join(known)}")
+        fail(f"unknown simulator '{tool}' for live systems", hint=f"legal: {', '.join(known)}")
     return live

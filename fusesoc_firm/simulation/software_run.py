@@ -95,13 +95,13 @@ def _check_complete(system: DerivedSystem, stimuli: Sequence[Stimulus], response
     for topic, end in sent_elsewhere(system).items():
         if topic.block not in sent:
             hint = f"'{end.block}' has no sources, so the stimuli must contain its messages"
-            faults.error(f"the stimuli hold no message of '{topic.block}'", hint=hint)
+            faults.error(f"the stimuli contain no message for '{topic.block}'", hint=hint)
     said = {response.publisher.block for response in responses}
     here = {block.block for block in system.software.blocks if block.type.accelerator.sources}
     for publisher in system.publishers:
         if publisher.software and publisher.software.block in here and publisher.block not in said:
             message = f"the model returns no message from hardware to '{publisher.software.block}'"
-            faults.error(message, hint=f"'respond' returns it among the others: ('{publisher.block}', message)")
+            faults.error(message, hint=f"'respond' must also return ('{publisher.block}', message)")
     faults.raise_if_any()
 
 
@@ -175,9 +175,9 @@ def _check_published(system: DerivedSystem, published: dict[str, list[Message]],
                 sent, said = decode(topic.frame, payload), decode(topic.frame, response.payload)
                 name, *values = next(_differences(sent, said, ""), ("it", sent, said))
                 one, other = map(shown, values)
-                fail(f"message {number} from software to '{topic.block}': {name} is {one}, but {other} in the model")
+                fail(f"message {number} from software to '{topic.block}': {name} is {one}, but the model has {other}")
         if len(found) != len(wanted):
-            fail(f"software sends {len(found)} messages to '{topic.block}', but {len(wanted)} in the model")
+            fail(f"software sends {len(found)} messages to '{topic.block}', but the model sends {len(wanted)}")
 
 
 def _differences(one: Any, other: Any, path: str) -> Iterator[tuple[str, Any, Any]]:

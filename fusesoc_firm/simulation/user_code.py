@@ -48,7 +48,7 @@ def load_function(path: Path, name: str, what: str, parameters: str, hint: str) 
     if spec is None or spec.loader is None or not path.is_file():
         fail(
             f"there is no {what.removeprefix('the ')} at {path}",
-            hint=f"it is a Python file (.py) with a function '{name}({parameters})'; {hint}",
+            hint=f"write a Python file (.py) with a function '{name}({parameters})'; {hint}",
         )
     module = importlib.util.module_from_spec(spec)
     # The module must be registered, since dataclasses, for example, look up their module.
@@ -74,7 +74,7 @@ def _fail_in(path: Path, what: str, error: BaseException, when: str, otherwise: 
     if isinstance(error, SyntaxError) and error.filename == str(path):
         line, column = error.lineno or 1, error.offset or 1
         fail(
-            f"{what} is not Python: {error.msg}",
+            f"{what} is not valid Python: {error.msg}",
             SourceRef(str(path), line, column, (error.text or "").rstrip("\n")),
         )
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]

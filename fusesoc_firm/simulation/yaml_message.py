@@ -96,7 +96,7 @@ class _Reader:
         what = f"'{path}'" if path else f"a {self.name}"
         if not isinstance(node, yaml.MappingNode):
             fields = ", ".join(branch.fields)
-            self._error(f"{what} is a mapping of its fields, not {kind(node)}", node, f"its fields: {fields}")
+            self._error(f"{what} must be a mapping of fields, not {kind(node)}", node, f"legal fields: {fields}")
             return {}
         found: dict[str, Any] = {}
         hints = []
@@ -117,10 +117,10 @@ class _Reader:
             return self._element(node, branch, path)
         size = "" if branch.count is None else f" of {branch.count}"
         if not isinstance(node, yaml.SequenceNode):
-            self._error(f"'{path}' is a list{size}, not {kind(node)}", node)
+            self._error(f"'{path}' must be a list{size}, not {kind(node)}", node)
             return None
         if branch.count is not None and len(node.value) != branch.count:
-            self._error(f"'{path}' is a list{size}, not of {len(node.value)}", node)
+            self._error(f"'{path}' must be a list{size}, not of {len(node.value)}", node)
         elif branch.array is not None:
             self._check_bound(branch.array, len(node.value), node)
         return [self._element(item, branch, f"{path}[{number}]") for number, item in enumerate(node.value)]
@@ -131,17 +131,19 @@ class _Reader:
         if branch.type is None:
             return self.message(node, branch, path)
         if not isinstance(node, yaml.ScalarNode) or is_null(node) or node.style:
-            self._error(f"'{path}' is a {branch.type.name}, not {kind(node)}", node)
+            self._error(f"'{path}' must be of type {branch.type.name}, not {kind(node)}", node)
             return None
         try:
             return _value(str(node.value), branch.type)
         except ValueError as error:
-            self._error(f"'{path}' is a {branch.type.name}, not '{node.value}'", node, str(error))
+            self._error(f"'{path}' must be of type {branch.type.name}, not '{node.value}'", node, str(error))
             return None
 
     def _text(self, node: yaml.Node, text: Data, path: str) -> str | None:
         if not isinstance(node, yaml.ScalarNode) or is_null(node):
-            self._error(f"'{path}' is a {text.kind.value}, not {kind(node)}", node, "an empty one is ''")
+            self._error(
+                f"'{path}' must be of type {text.kind.value}, not {kind(node)}", node, "write an empty text as ''"
+            )
             return None
         self._check_bound(text, len(units_of(text, node.value)) // text.element.size, node)
         return str(node.value)
@@ -192,9 +194,9 @@ def _float(text: str, type_: WireType) -> float:
         value = float(text)
         is_too_large = math.isinf(struct.unpack(f"<{type_.code}", struct.pack(f"<{type_.code}", value))[0])
     except ValueError:
-        raise ValueError("a number such as 1, -0.5, 1e-3, .inf, .nan") from None
+        raise ValueError("legal here: numbers such as 1, -0.5, 1e-3, .inf, .nan") from None
     except OverflowError:
         is_too_large = True
     if is_too_large:
-        raise ValueError("it is too large; infinity is written .inf")
+        raise ValueError("the number is too large; write infinity as .inf")
     return value

@@ -60,7 +60,7 @@ LONGEST_TEXT = 200
 # The maximum length of a path, such as the path of a source file or of a field in a deeply nested message.
 LONGEST_PATH = 4096
 
-PREFIX_RULE = "lower-case letters, digits and single '_' between them, a letter first, at most 100"
+PREFIX_RULE = "at most 100 lower-case letters, digits and single '_' between them, starting with a letter"
 """The form of a legal prefix of design units."""
 
 _PREFIX = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -79,7 +79,7 @@ def text_fault(text: str, longest: int = LONGEST_TEXT) -> tuple[str, str] | None
     if len(text) > longest:
         return f"has {len(text)} characters", legal
     if unprintable := next((character for character in text if not character.isprintable()), None):
-        return f"holds the character U+{ord(unprintable):04X}", legal
+        return f"contains the character U+{ord(unprintable):04X}", legal
     return None
 
 

@@ -15,11 +15,11 @@ def check_output(path: Path, endings: Sequence[str] = ()) -> None:
     """
     if endings and path.suffix not in endings:
         fail(
-            f"cannot write {path}: its ending does not name a format",
+            f"cannot write {path}: the file's ending does not select a format",
             hint=f"legal endings: {', '.join(endings)}",
         )
     if path.is_dir():
-        fail(f"cannot write {path}: it is a folder")
+        fail(f"cannot write {path}: the path is a folder")
     check_parent(path)
 
 

@@ -38,7 +38,7 @@ class Question:
     def fault(self, answer: str) -> str | None:
         """Return the fault in an answer, or None."""
         if not answer:
-            return f"'{self.name}' is needed: {self.meaning}" if self.is_required and not self.default else None
+            return f"'{self.name}' is required: {self.meaning}" if self.is_required and not self.default else None
         if self.is_choice and answer not in self.words:
             return f"'{self.name}' cannot be '{answer}'; {nearest(answer, self.words)}"
         return self.check(answer)

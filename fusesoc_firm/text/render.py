@@ -289,7 +289,7 @@ def _printed(value: object, path: str) -> str:
 
 def _sum(value: object, addend: int, path: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise TemplateError(f"'{path}' is {_kind(value)}; only to an integer can {addend} be added")
+        raise TemplateError(f"'{path}' is {_kind(value)}; {addend} can be added only to an integer")
     return value + addend
 
 

@@ -230,7 +230,7 @@ def _words_of_keys(section: type[Section]) -> str:
     """Return a phrase with the keys that a section requires or, if it requires no keys, the keys that it may have."""
     keys = keys_of(section)
     required = [name for name, (_, entry) in keys.items() if entry.is_required]
-    return f"keys that it needs: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
+    return f"required keys: {', '.join(required)}" if required else f"legal keys: {', '.join(keys)}"
 
 
 def _section_type(entry: Key) -> type[Section]:

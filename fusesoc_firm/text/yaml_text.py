@@ -163,7 +163,7 @@ def _note_control_characters(text: str, file: str, faults: Diagnostics) -> None:
     for number, line in enumerate(_LINE_END.split(text)):
         for found in _CONTROL_CHARACTERS.finditer(line):
             shown = _CONTROL_CHARACTERS.sub("?", line)
-            message = f"this is not YAML: it holds the control character 0x{ord(found.group()):02x}"
+            message = f"invalid YAML: it contains the control character 0x{ord(found.group()):02x}"
             faults.error(message, SourceRef(file, number + 1, found.start() + 1, shown))
 
 
@@ -177,7 +177,7 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
         mark, context = context, None
     hint = ""
     if "'\\t'" in problem:
-        hint = "YAML is indented with blanks, never with tabs"
+        hint = "indent YAML with blanks, not with tabs"
     elif error.context and context is not None:
         hint = f"{error.context}, which begins at {file}:{context.line + 1}:{context.column + 1}"
     elif error.context and is_late:
@@ -187,7 +187,7 @@ def _note_syntax(error: yaml.MarkedYAMLError, file: str, lines: tuple[str, ...],
         line, column = mark.line, mark.column
         if problem.startswith(_INDENTATION_PROBLEMS):
             hint = _indentation_hint(lines, line) or hint
-    faults.error(f"this is not YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
+    faults.error(f"invalid YAML: {problem}", SourceRef(file, line + 1, column + 1, lines[line]), hint)
 
 
 def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
@@ -202,7 +202,7 @@ def _indentation_hint(lines: tuple[str, ...], number: int) -> str:
     if indent in open_blocks or not open_blocks:
         return ""
     legal = ", ".join(f"{blanks} ({begin})" for blanks, begin in open_blocks.items())
-    return f"the line is indented by {indent}, but the open blocks above it by {legal}"
+    return f"the line is indented by {indent}, but the open blocks above are indented by {legal}"
 
 
 def _block_begins(line: str) -> Iterator[tuple[int, str]]:

@@ -21,8 +21,8 @@ def check_picture(path: Path | None, form: str | None) -> None:
     check_output(path, ENDINGS)
     if form and path.suffix != f".{form}":
         fail(
-            f"{path} is not a picture in the format {form}",
-            hint=f"without --format, the ending sets the format: {', '.join(ENDINGS)}",
+            f"the ending of {path} does not match the format {form}",
+            hint=f"without --format, the ending selects the format: {', '.join(ENDINGS)}",
         )
 
 
@@ -41,6 +41,6 @@ def picture(dot: str, form: str) -> bytes:
     try:
         return subprocess.run(["dot", f"-T{form}"], input=dot.encode(), capture_output=True, check=True).stdout
     except subprocess.CalledProcessError as error:
-        fail(f"Graphviz cannot draw this as {form}: {error.stderr.decode(errors='replace').strip()}")
+        fail(f"Graphviz cannot draw the picture as {form}: {error.stderr.decode(errors='replace').strip()}")
     except FileNotFoundError:
-        fail("pictures need the program 'dot' of Graphviz", hint="Debian and Ubuntu: apt install graphviz")
+        fail("pictures require Graphviz's program 'dot'", hint="on Debian and Ubuntu: apt install graphviz")

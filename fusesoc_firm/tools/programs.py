@@ -53,7 +53,7 @@ PROGRAMS: Mapping[str, Program] = {
     "openFPGALoader": Program("openfpgaloader", version="-V"),
     **{f"quartus_{name}": _QUARTUS for name in ("sh", "map", "syn", "fit", "asm", "sta", "pgm")},
     "verilator": Program("verilator"),
-    "vivado": Program(maker="Vivado, from AMD's site; its settings64.sh puts it into PATH", version="-version"),
+    "vivado": Program(maker="Vivado, from AMD's site; source settings64.sh to add it to PATH", version="-version"),
     "vvp": Program("iverilog", version="-V"),
     # Edalize controls the program through Tcl, which YoWASP's build does not support.
     "yosys": Program("yosys", version="-V"),
@@ -108,14 +108,14 @@ def ways(program: str) -> str:
     known = PROGRAMS.get(program, Program())
     found = [f"apt-get install --no-install-recommends {known.debian}"] if known.debian else []
     found += [f"pip install {known.pypi}"] if known.pypi else []
-    return " or ".join(found) or known.maker or "see the tool's own page"
+    return " or ".join(found) or known.maker or "see the tool's website"
 
 
 def explanation(programs: Iterable[str]) -> str:
     """Return the instructions for installing missing programs, one line for each."""
     names = list(programs)
     lines = (f"      = {name}: {ways(name)}" for name in names)
-    return "\n".join([f"error: not installed: {' '.join(names)}", *lines])
+    return "\n".join([f"error: missing programs: {', '.join(names)}", *lines])
 
 
 def facts_of(program: str, path: Path) -> dict[str, str]:

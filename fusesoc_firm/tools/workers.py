@@ -80,21 +80,21 @@ def cluster_workers(address: str) -> Iterator[Workers]:
         # Dask's type hints are incomplete.
         distributed: Any = import_module("distributed")
     except ImportError:
-        fail("--cluster needs the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
+        fail("--cluster requires the package 'distributed'", hint="pip install 'fusesoc-firm[cluster]'")
     # A lost connection is reported only here, in one sentence.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     security = _security(distributed, address)
     with _connected(distributed, address, security) as client:
         count = sum(client.ncores().values())
         if not count:
-            fail(f"the Dask cluster at '{address}' has no workers", hint=f"start some: dask worker {address}")
+            fail(f"the Dask cluster at '{address}' has no workers", hint=f"start workers: dask worker {address}")
         _check_versions(client, address)
         executor = client.get_executor(pure=False)
         try:
             yield Workers(executor, count)
         except (CancelledError, distributed.KilledWorker) as error:
             fail(
-                f"the Dask cluster at '{address}' was lost", hint=" ".join(str(error).split()) or "its scheduler ended"
+                f"the Dask cluster at '{address}' was lost", hint=" ".join(str(error).split()) or "the scheduler ended"
             )
         finally:
             executor.shutdown(wait=False)
@@ -120,9 +120,9 @@ def _security(distributed: Any, address: str) -> Any:
                 "Dask's configuration names the certificates: ca-file, client.cert and client.key "
                 "(docs/explanation/security.md)"
             )
-            fail(f"'{address}' needs distributed.comm.tls.{name}", hint=hint)
+            fail(f"'{address}' requires distributed.comm.tls.{name}", hint=hint)
         if not Path(file).is_file():
-            fail(f"the file '{file}' of distributed.comm.tls.{name} in Dask's configuration is missing")
+            fail(f"the file '{file}', set by distributed.comm.tls.{name} in Dask's configuration, is missing")
     return security
 
 
@@ -145,7 +145,7 @@ def _connected(distributed: Any, address: str, security: Any) -> Any:
     # A discarded client stops its loop when it is garbage-collected. If this happened while another client starts, both
     # would wait for the same lock forever.
     gc.collect()
-    return fail(f"no Dask scheduler answers at '{address}'", hint=reason)
+    return fail(f"no Dask scheduler responds at '{address}'", hint=reason)
 
 
 def _check_versions(client: Any, address: str) -> None:
@@ -153,9 +153,9 @@ def _check_versions(client: Any, address: str) -> None:
     found = client.run(_version, on_error="return")
     for worker, version in sorted(found.items()):
         if version != __version__:
-            has = f"has {version}" if isinstance(version, str) else "cannot import it"
+            has = f"has {version}" if isinstance(version, str) else "cannot import fusesoc-firm"
             fail(
-                f"the Dask cluster at '{address}' cannot do this: its worker {worker} {has}",
+                f"the Dask cluster at '{address}' is not compatible: worker {worker} {has}",
                 hint=f"all workers need fusesoc-firm {__version__}",
             )
 

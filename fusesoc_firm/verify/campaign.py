@@ -55,7 +55,7 @@ def select(library: MessageLibrary, patterns: Sequence[str]) -> list[MessageName
     for pattern in patterns:
         names = list(_matching(library, pattern)) if set(pattern) & set("*?[") else _named(library, pattern)
         if not names:
-            fail(f"no message matches '{pattern}'", hint="`firm message list` shows all")
+            fail(f"no message matches '{pattern}'", hint="'firm message list' lists all messages")
         found |= set(names)
     return sorted(found)
 

@@ -44,7 +44,7 @@ def verify_messages(library: MessageLibrary, patterns: Sequence[str], settings: 
     """
     if settings.width not in WIDTHS:
         legal = ", ".join(map(str, WIDTHS))
-        fail(f"a converter cannot have a stream of {settings.width} bits", hint=f"legal here: {legal}")
+        fail(f"converters do not support {settings.width}-bit streams", hint=f"legal here: {legal}")
     if places.report:
         check_output(places.report, (".json",))
     if places.keep:

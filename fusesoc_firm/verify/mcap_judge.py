@@ -55,7 +55,7 @@ def check(
         try:
             found = decode(payload)
         except Exception as error:
-            raise NoJudgementError(f"{TITLE} refuses the bytes: {type(error).__name__}: {error}") from error
+            raise NoJudgementError(f"{TITLE} rejects the bytes: {type(error).__name__}: {error}") from error
         if not _is_same_message(found, definitions[name], definitions, value):
             raise NoJudgementError(f"{TITLE} reads a different value")
 

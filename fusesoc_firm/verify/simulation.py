@@ -91,7 +91,7 @@ def ghdl() -> str:
     """Return the path of GHDL. Raise `InputError` if it is not installed."""
     path = shutil.which("ghdl")
     if path is None:
-        fail("GHDL is not installed, and messages are verified in simulation", hint="apt-get install ghdl-mcode")
+        fail("GHDL is not installed, but messages are verified in simulation", hint="apt-get install ghdl-mcode")
     return path
 
 
@@ -133,5 +133,7 @@ def _detail(output: str) -> str:
     lines = output.splitlines()
     faults = [line.partition(": ")[2] for line in lines if line.startswith("fault in cycle")]
     faults += [_REPORT.sub("", line) for line in lines if "(assertion failure)" in line and "FAIL" not in line]
-    faults = faults or [line for line in lines if "error" in line] or lines[:1] or ["GHDL ended without a message"]
+    faults = (
+        faults or [line for line in lines if "error" in line] or lines[:1] or ["GHDL ended without an error message"]
+    )
     return "; ".join(faults[:_DETAIL_LINES])

@@ -47,10 +47,10 @@ class Status(IntFlag):
 
 _FAULTS = {
     1 << 4: "DMAIntErr (internal)",
-    1 << 5: "DMASlvErr (memory's answer)",
+    1 << 5: "DMASlvErr (response from memory)",
     1 << 6: "DMADecErr (address)",
     1 << 8: "SGIntErr (descriptor)",
-    1 << 9: "SGSlvErr (memory's answer)",
+    1 << 9: "SGSlvErr (response from memory)",
     1 << 10: "SGDecErr (address)",
 }
 
@@ -220,16 +220,18 @@ class DmaTransport:
         size = size or most
         if min(self._buffers.send, self._buffers.receive) < 2 or size % _ALIGNMENT or not 0 < size <= most:
             raise TransportError(
-                f"the DMA has {self._buffers.send} and {self._buffers.receive} buffers of {size} bytes; legal: 2 and"
-                f" more, a multiple of {_ALIGNMENT}, and all within the memory's {len(self._device.memory)}"
+                f"the DMA has {self._buffers.send} and {self._buffers.receive} buffers of {size} bytes; legal: 2 or"
+                f" more, a multiple of {_ALIGNMENT}, and all within the {len(self._device.memory)} bytes of memory"
             )
         return size
 
     def _start(self) -> None:
         if not self._reset():
-            raise TransportError("the DMA engine does not leave its reset: does it have a clock?")
+            raise TransportError("the DMA engine does not leave reset; check the engine's clock")
         if not self._device.read(TO_SYSTEM + STATUS) & Status.HAS_SCATTER_GATHER:
-            raise TransportError("the DMA engine lacks scatter-gather, so it is not from a generated block design")
+            raise TransportError(
+                "the DMA engine does not support scatter-gather, so it is not from a generated block design"
+            )
         self._to_system.start(Control.INTERRUPT_ON_ERROR)
         self._from_system.start(Control.INTERRUPT_ON_COMPLETE | Control.INTERRUPT_ON_ERROR)
         if not all(_soon(self._runs(channel)) for channel in (TO_SYSTEM, FROM_SYSTEM)):
@@ -264,7 +266,7 @@ class DmaTransport:
         """Append the content of a buffer; return whether the burst is complete."""
         size = status & LENGTH
         if size > self._from_system.size:
-            raise TransportError("the DMA engine wrote beyond a buffer")
+            raise TransportError("the DMA engine wrote past the end of a buffer")
         if status & START_OF_FRAME:
             self._burst.clear()
         self._burst += self._from_system.buffer(self._next_received)[:size]
@@ -278,7 +280,7 @@ class DmaTransport:
         status = self._device.read(channel + STATUS)
         found = [text for bit, text in _FAULTS.items() if status & bit]
         if status & Status.HALTED and not found:
-            found = ["it has halted"]
+            found = ["the channel has halted"]
         if found and not self._closing.is_set():
             raise TransportError(f"the DMA engine's {_NAMES[channel]}: {', '.join(found)}")
 

@@ -74,7 +74,7 @@ class LinuxDmaDevice:
             finally:
                 os.close(shared)
         except (OSError, ValueError) as error:
-            raise TransportError(f"the DMA devices {uio} and {buffer} cannot be used: {error}") from None
+            raise TransportError(f"cannot use the DMA devices {uio} and {buffer}: {error}") from None
         self._wake, self._woken = os.pipe()
 
     @property
@@ -106,7 +106,7 @@ class LinuxDmaDevice:
             if self._interrupt in select.select([self._interrupt, self._wake], [], [], timeout)[0]:
                 os.read(self._interrupt, _WORD_BYTES)
         except OSError as error:
-            raise TransportError(f"the DMA engine's interrupt: {error.strerror}") from None
+            raise TransportError(f"cannot wait for the DMA engine's interrupt: {error.strerror}") from None
 
     def end(self) -> None:
         """Wake all threads that wait, now and later."""
@@ -119,6 +119,6 @@ def _number(path: Path) -> int:
         text = path.read_text(encoding="ascii").strip()
         return int(text, 0)
     except OSError:
-        raise TransportError(f"{path} cannot be read: is its driver loaded?") from None
+        raise TransportError(f"cannot read {path}; check whether the driver is loaded") from None
     except ValueError:
-        raise TransportError(f"{path} holds '{text}', which is not a number") from None
+        raise TransportError(f"{path} contains '{text}', which is not a number") from None

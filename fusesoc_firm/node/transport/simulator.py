@@ -104,13 +104,13 @@ class Simulator:
     def request(self, frame: bytes) -> None:
         """Append a frame to the frames that wait to be sent to the system. May raise `TransportError`."""
         if not 1 <= len(frame) <= MOST_CYCLES:
-            raise ValueError(f"a frame of {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
+            raise ValueError(f"the frame has {len(frame)} bytes; legal: 1 to {MOST_CYCLES}")
         self._write(b"F" + len(frame).to_bytes(4, "little"), frame)
 
     def run(self, cycles: int) -> list[Event]:
         """Run for `cycles`, or until the end of the first cycle with an event. May raise `TransportError`."""
         if not 0 <= cycles <= MOST_CYCLES:
-            raise ValueError(f"{cycles} cycles; legal: 0 to {MOST_CYCLES}")
+            raise ValueError(f"cycles is {cycles}; legal: 0 to {MOST_CYCLES}")
         self._write(b"R" + cycles.to_bytes(4, "little"))
         return self._events()
 
@@ -194,7 +194,7 @@ class Simulator:
         if kind == b"E":
             converter = self._number(2)
             return ErrorPulse(None if converter == _ID_ERROR else converter, self._number(8))
-        return self._fail(f"the simulator sent 0x{kind.hex()} where a report begins")
+        return self._fail(f"the simulator sent 0x{kind.hex()} instead of the start of a report")
 
     def _wait(self) -> int | None:
         """Return the simulator's exit status, or None if the simulator does not end."""

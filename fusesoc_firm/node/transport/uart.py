@@ -55,9 +55,7 @@ class UartTransport:
         self._is_closed = False
         speed = getattr(termios, f"B{baud}", None)
         if not speed:
-            raise TransportError(
-                f"{baud} is not a legal baud rate; legal are 115200, 1000000 and 2000000, among others"
-            )
+            raise TransportError(f"{baud} is not a legal baud rate; legal: 115200, 1000000, 2000000 and others")
         try:
             self._line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except OSError as error:
@@ -142,7 +140,7 @@ class UartTransport:
         while self._is_readable(_SILENT_SECONDS):
             self._read()
             if time.monotonic() > end:
-                raise TransportError(f"{self._device} is never silent, so frames cannot be told apart")
+                raise TransportError(f"{self._device} is never silent, so the start of a frame cannot be found")
         self._begun.clear()
 
     def _begin_anew(self, why: str) -> None:
@@ -176,7 +174,7 @@ class UartTransport:
         except OSError as error:
             raise self._gone(error.strerror) from None
         if not data:
-            raise self._gone("it hung up")
+            raise self._gone("the device hung up")
         return data
 
     def _write(self, data: memoryview) -> int:

@@ -106,7 +106,10 @@ def write(evaluation: chapter.Evaluation, selection: Selection, folder: Path) ->
         for timeline in lines:
             pictures.draw_timeline(timeline, folder)
     else:
-        print("No pictures: they need matplotlib (pip install 'fusesoc-firm[plots]')", file=sys.stderr)
+        print(
+            "No pictures are drawn, because matplotlib is not installed: pip install 'fusesoc-firm[plots]'",
+            file=sys.stderr,
+        )
     path = folder / REPORT
     path.write_text(_report(selection, tables, figures, lines), encoding="utf-8")
     return path
@@ -131,7 +134,7 @@ def _workers(places: Places) -> AbstractContextManager[Workers]:
 def _report(selection: Selection, tables: Sequence[Table], figures: Sequence[Figure], lines: Sequence[Timeline]) -> str:
     settings = selection.settings
     data_sets = "\n".join(f"* {_heading(name, settings)}" for name in selection.data_sets)
-    intro = f"""The dissertation's section 4.3 again, by `firm scheduler bench`: {_of_all(settings)}.
+    intro = f"""The dissertation's section 4.3, reproduced with `firm scheduler bench`: {_of_all(settings)}.
 Times are in clock cycles; docs/explanation/scheduler-evaluation.md defines the metrics.
 
 {data_sets}
@@ -161,7 +164,7 @@ def _of_all(settings: Settings) -> str:
     if settings.shortest_run > 1:
         found += f", a shortest run of {settings.shortest_run} beats"
     if settings.resume_beats:
-        found += f", {settings.resume_beats} more beats in each resumed run"
+        found += f", {settings.resume_beats} additional beats in each resumed run"
     return found
 
 
@@ -203,6 +206,6 @@ def numbers_of(text: str, most: int = 256) -> tuple[int, ...]:
     found = set()
     for word in text.split(","):
         if not word.strip().isdecimal() or not 1 <= int(word) <= most:
-            fail(f"'{word.strip()}' is not a number of accelerators", hint=f"legal: 1 to {most}, such as 2,8,256")
+            fail(f"'{word.strip()}' is not a legal number of accelerators", hint=f"legal: 1 to {most}, such as 2,8,256")
         found.add(int(word))
     return tuple(sorted(found))

@@ -42,11 +42,13 @@ class Generics:
             if times is None:
                 continue
             if times.shape != self.periods.shape or times.ndim != 2:
-                raise ValueError(f"{name} has the shape {times.shape}; legal: (batch, requesters) as the periods")
+                raise ValueError(
+                    f"{name} has the shape {times.shape}; legal: (batch, requesters), the shape of the periods"
+                )
             if times.min() < 1:
-                raise ValueError(f"a time in {name} is {times.min()}; legal: 1 and more cycles")
+                raise ValueError(f"a time in {name} is {times.min()}; legal: 1 or more cycles")
         if self.shortest_run < 1:
-            raise ValueError(f"shortest_run is {self.shortest_run}; legal: 1 and more beats")
+            raise ValueError(f"shortest_run is {self.shortest_run}; legal: 1 or more beats")
 
     @property
     def batch(self) -> int:

@@ -20,7 +20,10 @@ class Combined(Scheduler):
         sizes = [group.requesters for group in groups]
         super().__init__(top.batch, sum(sizes))
         if top.requesters != len(groups) or any(group.batch != top.batch for group in groups):
-            raise ValueError(f"{len(groups)} groups below a scheduler of {top.requesters}; legal: as many, one batch")
+            raise ValueError(
+                f"the scheduler has {top.requesters} requesters and {len(groups)} groups; legal: one group for each"
+                " requester, and the same batch size in all groups"
+            )
         self._groups = groups
         self._top = top
         self._first = np.cumsum([0, *sizes[:-1]])

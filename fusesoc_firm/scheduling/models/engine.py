@@ -261,7 +261,7 @@ def check_times(name: str, times: Ints, time_bits: int | None) -> None:
     longest = int(times.max())
     if longest >= 2 ** (time_bits - 3):
         needed = longest.bit_length() + 3
-        raise ValueError(f"time_bits is {time_bits}; legal: {needed} and more for a {name} of {longest} cycles")
+        raise ValueError(f"time_bits is {time_bits}; legal: {needed} or more for a {name} of {longest} cycles")
 
 
 class Times(Keys):

@@ -51,7 +51,7 @@ def word_fault(text: str) -> tuple[str, str] | None:
     """Return the reason why `text` is not a legal name of an FPGA, a family or a pin, or None if the name is legal."""
     if fault := text_fault(text):
         return fault
-    legal = "legal are letters, digits, blanks and '_.,:+/()-', a letter or digit first"
+    legal = "legal here: letters, digits, blanks and '_.,:+/()-', starting with a letter or digit"
     return None if _WORD.fullmatch(text) else (f"cannot be '{text}'", legal)
 
 
@@ -60,10 +60,10 @@ class BoardPin(Section):
     """An FPGA pin that the top level uses."""
 
     port: Text = key(
-        "the connected port of the top level: a standard one, or a pin of an accelerator", is_required=True
+        "the connected port of the top level: a standard port, or a pin of an accelerator", is_required=True
     )
-    site: Text = key("the pin's name by the FPGA's manufacturer", is_required=True, rule=word_fault)
-    standard: Text | None = key("its electrical standard, if it is not the board's", rule=word_fault)
+    site: Text = key("the FPGA manufacturer's name for the pin", is_required=True, rule=word_fault)
+    standard: Text | None = key("the pin's electrical standard, if different from the board's", rule=word_fault)
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def read_board(name: str, folder: Path = Path()) -> Board:
     """Read the board file that `board_path` identifies; may raise `InputError`."""
     path = board_path(name, folder)
     if not path.is_file():
-        fail(f"there is no board '{name}'", hint=nearest(name, boards()) + "; or the path of a YAML file")
+        fail(f"unknown board '{name}'", hint=nearest(name, boards()) + "; the path of a YAML file is legal, too")
     faults = Diagnostics()
     text = read_yaml(path, name if path.parent != FOLDER else path.name, faults)
     if text.root is None or is_null(text.root):
@@ -141,7 +141,11 @@ def read_board(name: str, folder: Path = Path()) -> Board:
 
 def _check_pins(board: Board, faults: Diagnostics) -> None:
     if board.interconnect not in LINKS:
-        faults.error(f"flow '{board.flow}' has no processor for streams", board.interconnect.source, nearest("", LINKS))
+        faults.error(
+            f"boards with flow '{board.flow}' have no processor for streams",
+            board.interconnect.source,
+            nearest("", LINKS),
+        )
         return
     seen: dict[str, Text] = {}
     for pin in board.pins:
@@ -151,7 +155,9 @@ def _check_pins(board: Board, faults: Diagnostics) -> None:
     source = board.pins[-1].source if board.pins else board.source
     needed = {_CLOCK, *(name for name, _, _ in LINK_PINS[LinkKind(board.interconnect)])} - _OPTIONAL
     for port in sorted(needed - seen.keys()):
-        faults.error(f"the board has no pin for '{port}'", source, f"'{board.interconnect}' needs it")
+        faults.error(
+            f"the board has no pin for '{port}'", source, f"interconnect '{board.interconnect}' needs this pin"
+        )
 
 
 def _check_streams(board: Board, faults: Diagnostics) -> None:
@@ -163,12 +169,14 @@ def _check_streams(board: Board, faults: Diagnostics) -> None:
     }
     for name in _NEEDED[board.flow]:
         if given[name] is None:
-            faults.error(f"a board of flow '{board.flow}' needs the key '{name}'", board.source)
+            faults.error(f"a board with flow '{board.flow}' needs the key '{name}'", board.source)
     if board.interconnect != AXI_STREAM:
-        faults.error(f"flow '{board.flow}' takes streams", board.interconnect.source, f"legal here: {AXI_STREAM}")
+        faults.error(
+            f"flow '{board.flow}' supports only streams", board.interconnect.source, f"legal here: {AXI_STREAM}"
+        )
     if board.pins:
-        message = f"flow '{board.flow}' takes no pins"
-        faults.error(message, board.place("pins"), "put your own constraints into a fileset of the core")
+        message = f"flow '{board.flow}' does not support pins"
+        faults.error(message, board.place("pins"), "add constraints to a fileset of the core")
 
 
 def on_board(specification: Specification, board: Board) -> Specification:
@@ -190,7 +198,7 @@ def check_fits(system: DerivedSystem, board: Board) -> None:
         return
     faults = Diagnostics()
     for clock in system.clocks:
-        faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="a board has one clock, clk")
+        faults.error(f"board '{board.name}' has no clock '{clock.name}'", hint="this board has only the clock clk")
     _check_places(_accelerator_pins(system), board, faults)
     faults.raise_if_any()
 
@@ -202,7 +210,7 @@ def _check_places(pins: Sequence[_Port], board: Board, faults: Diagnostics) -> N
         if pin.name in _PORTS:
             faults.error(f"{pin.what} has the name '{pin.name}', which is reserved for boards", pin.source)
         elif missing := next((bit for bit in pin.bits() if bit not in places), None):
-            hint = f"add '{{port: {missing}, site: ...}}' to a board file of your own"
+            hint = f"add '{{port: {missing}, site: ...}}' to your own board file"
             faults.error(f"{pin.what} has no site on board '{board.name}'", pin.source, hint)
     known = (*_PORTS, *(bit for pin in pins for bit in pin.bits()))
     for place in board.pins:

@@ -84,8 +84,8 @@ class Wiring:
             if outgoing.name not in self.ambiguous and rival:
                 name, first = rival
                 what = f"'{dotted(name)}'" if outgoing.include or outgoing.exclude else "this message"
-                hint = f"a field comes from one block; this one is named at {first.name.source}"
-                self.faults.error(f"'{outgoing.name}' already gets {what}", outgoing.name.source, hint)
+                hint = f"a field can come from only one block; the first connection is at {first.name.source}"
+                self.faults.error(f"'{outgoing.name}' already receives {what}", outgoing.name.source, hint)
             return False
         pair = self._chosen(block, free)
         source, sink = self._source(block, pair), self._sink(outgoing, pair)
@@ -106,12 +106,12 @@ class Wiring:
             return False
         target = self.blocks[name]
         if block.type is None and block.mode == "publisher":
-            message = f"'{block.name}' is a publisher; its message goes to the host"
-            self.faults.error(message, name.source, "'outgoing' belongs to subscribers and accelerators")
+            message = f"'{block.name}' is a publisher, whose message goes to the host"
+            self.faults.error(message, name.source, "'outgoing' is legal only in subscribers and accelerators")
             return False
         if target.type is None and target.mode == "subscriber":
-            message = f"'{name}' is a subscriber; its message comes from the host"
-            self.faults.error(message, name.source, "'outgoing' names accelerators and publishers")
+            message = f"'{name}' is a subscriber, whose message comes from the host"
+            self.faults.error(message, name.source, "'outgoing' can name only accelerators and publishers")
             return False
         return block.name in self.outputs and name in self.inputs
 
@@ -121,7 +121,7 @@ class Wiring:
         alike = [(given, taken) for given in gives for taken in takes if given.kind == taken.kind]
         if not alike:
             self.faults.error(
-                f"'{block.name}' gives {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
+                f"'{block.name}' outputs {_messages(gives)}, but '{outgoing.name}' takes {_messages(takes)}",
                 outgoing.name.source,
                 _what_lacks(block, gives, "output")
                 or _what_lacks(self.blocks[outgoing.name], takes, "input")
@@ -136,9 +136,9 @@ class Wiring:
         pairs = {pair: names for pair, names in pairs.items() if names}
         if not pairs:
             self.faults.error(
-                f"no field goes from '{block.name}' to '{outgoing.name}'",
+                f"the connection from '{block.name}' to '{outgoing.name}' carries no field",
                 outgoing.name.source,
-                "a connection carries the fields of both ends that 'include' and 'exclude' leave",
+                "a connection carries the fields that both ends have and that 'include' and 'exclude' select",
             )
         return pairs
 
@@ -175,13 +175,14 @@ class Wiring:
             self.faults.error(
                 f"{_words('input', side)} of '{block.name}' ({side.frame.message}) has no source",
                 block.name.source,
-                f"name '{block.name}' as 'outgoing' of a block that gives {side.frame.message}",
+                f"add '{block.name}' to 'outgoing' of a block that outputs {side.frame.message}",
             )
         elif missing and block.type is not None:
             self.faults.error(
-                f"{_words('input', side)} of '{block.name}' ({side.frame.message}) lacks {', '.join(missing)}",
+                f"{_words('input', side)} of '{block.name}' ({side.frame.message}) has no source for"
+                f" {', '.join(missing)}",
                 block.name.source,
-                "include it in a connection, or exclude it in the accelerator's interface",
+                "include each field in a connection, or exclude the field in the accelerator's interface",
             )
 
     def _check_sources(self) -> None:
@@ -192,7 +193,7 @@ class Wiring:
                     self.faults.error(
                         f"{_words('output', side)} of '{block.name}' ({side.frame.message}) has no destination",
                         block.name.source,
-                        f"name a block that takes {side.frame.message} as 'outgoing' of '{block.name}'",
+                        f"add a block that takes {side.frame.message} to 'outgoing' of '{block.name}'",
                     )
 
     def _check_cycles(self) -> None:

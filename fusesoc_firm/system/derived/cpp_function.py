@@ -108,19 +108,19 @@ def check_kernel(accelerator: AcceleratorType, faults: Diagnostics) -> None:
     name, sources = accelerator.accelerator.name, accelerator.accelerator.sources
     function = function_name(accelerator)
     if identifier(function) != function:
-        hint = "letters, digits and single '_' between them; not a keyword of VHDL or Verilog"
-        message = f"the function has the name of its file, but '{function}' is not a legal name"
+        hint = "legal here: letters, digits and single '_' between them, except VHDL and Verilog keywords"
+        message = f"the function is named after its file, but '{function}' is not a legal name"
         faults.error(message, sources[0].source, hint)
     if not accelerator.inputs or not accelerator.outputs:
         lacking = "output" if accelerator.inputs else "input"
-        message = f"'{name}' is of type HLS, which needs at least one input and one output"
-        faults.error(message, name.source, f"its interface has no '{lacking}'")
+        message = f"'{name}' has the type HLS, which needs at least one input and one output"
+        faults.error(message, name.source, f"the accelerator's interface has no '{lacking}'")
     interface = accelerator.accelerator.interface
     for side, item in zip(
         (*accelerator.inputs, *accelerator.outputs), (*interface.input, *interface.output), strict=True
     ):
         for problem in _problems(side.frame):
-            message = f"'{name}' is of type HLS, which takes {problem}"
+            message = f"'{name}' has the type HLS, which supports only {problem}"
             faults.error(message, item.message.source, "write this accelerator in VHDL")
 
 

@@ -61,7 +61,7 @@ from fusesoc_firm.text.yaml_sections import keys_only_of
 from fusesoc_firm.text.yaml_text import Text
 
 Libraries = Mapping[Middleware, MessageLibrary]
-_KINDS_OF_BLOCKS = "a block is an accelerator, with 'type', or a converter, with 'middleware', 'mode' and 'message'"
+_KINDS_OF_BLOCKS = "a block is either an accelerator with 'type' or a converter with 'middleware', 'mode' and 'message'"
 
 
 def derive(
@@ -188,7 +188,7 @@ class _Analysis:
                 self.faults.error(f"there is no source file '{source}'", source.source, hint)
             elif legal and PurePosixPath(source).suffix.lower() not in legal:
                 hint = f"legal here: {', '.join(legal)}"
-                self.faults.error(f"'{source}' is not a source of type {accelerator.type}", source.source, hint)
+                self.faults.error(f"'{source}' is not a source file for type {accelerator.type}", source.source, hint)
 
     def _sides(self, word: str, interface: Sequence[InterfaceType]) -> tuple[MessageSide, ...] | None:
         """Return an interface's message sides, numbered if there are several, or None if a message has a fault."""
@@ -242,12 +242,12 @@ class _Analysis:
         # The block's accelerator may be one that could not be read.
         are_known = all(names) and (names or self.specification.is_sound) and not self.specification.is_cut
         if are_known and block.type not in names:
-            hint = nearest(block.type, names) or "add it to 'accelerators'"
+            hint = nearest(block.type, names) or "add this accelerator to 'accelerators'"
             self.faults.error(f"unknown accelerator '{block.type}'", block.type.source, hint)
         for key in keys_only_of(Block, CONVERTER):
             if value := getattr(block, key):
                 source = value[0].source if isinstance(value, tuple) else value.source
-                message = f"'{key}' belongs to a converter, but '{block.name}' has a type"
+                message = f"'{key}' is legal only for converters, but '{block.name}' has a 'type'"
                 self.faults.error(message, source, _KINDS_OF_BLOCKS)
         if not any(item.is_software for item in self.specification.accelerators if item.name == block.type):
             self._check_no_publisher_keys(block)
@@ -277,7 +277,7 @@ class _Analysis:
     def _check_no_publisher_keys(self, block: Block) -> None:
         for key in keys_only_of(Block, PUBLISHER):
             if getattr(block, key) is not None:
-                message = f"'{key}' belongs to a publisher, but '{block.name}' is not one"
+                message = f"'{key}' is legal only for publishers, but '{block.name}' is not a publisher"
                 self.faults.error(message, block.place(key), "a publisher is a block with 'mode: publisher'")
 
     def _check_count(self, mode: str) -> None:
@@ -285,7 +285,7 @@ class _Analysis:
         found = [block for block in blocks if block.type is None and block.mode == mode]
         are_known = blocks and all(block.is_sound and (block.type or block.mode) for block in blocks)
         if not found and are_known:
-            message = f"the system has no {mode}; it needs at least one"
+            message = f"the system has no {mode}, but needs at least one"
             self.faults.error(message, blocks[0].name.source, f"a {mode} is a block with 'mode: {mode}'")
         elif len(found) > MOST_CONVERTERS:
             self.faults.error(

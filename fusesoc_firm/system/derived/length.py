@@ -21,7 +21,7 @@ from fusesoc_firm.text.naming import identifier
 
 # More than the on-chip memory of any FPGA.
 _LARGEST_BUFFER = 2**24
-_ADD_BUFFER = "add 'buffer: <bytes of its longest payload>'"
+_ADD_BUFFER = "add 'buffer: <bytes of the longest payload>'"
 
 
 def with_lengths(
@@ -70,7 +70,7 @@ def _check_whole(
             )
             faults.error(text, place, "all blocks that take a message of variable size must take the same fields")
         if sum(end in other.sinks for other in connections) > 1:
-            text = f"'{end.block}' gets {message} from several blocks"
+            text = f"'{end.block}' receives {message} from several blocks"
             faults.error(text, place, "a message of variable size must come from one block")
 
 
@@ -82,10 +82,10 @@ def _subscriber_length(frame: Frame, *, is_sent: bool) -> PayloadLength:
     """
     unused = [node for node in all_nodes(frame.nodes) if isinstance(node, Data | Loop) and not node.is_used]
     if not unused or not is_sent:
-        return PayloadLength(LengthSource.GIVEN, "the subscriber has it")
+        return PayloadLength(LengthSource.GIVEN, "the subscriber has the length")
     length = sent_length_of(frame)
     if length.minimum == length.maximum:
-        return PayloadLength(LengthSource.COMPUTED, "it is constant without the unused parts")
+        return PayloadLength(LengthSource.COMPUTED, "the length is constant without the unused parts")
     names = ", ".join(dict.fromkeys(f"'{dotted(node.names)}'" for node in unused))
     return PayloadLength(LengthSource.BUFFERED, f"the subscriber's length includes {names}, which no block uses")
 
@@ -94,8 +94,8 @@ def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> Payloa
     """Return the source for the length of an accelerator's output, or None if it is constant or faulty."""
     if frame.is_fixed_size:
         if item.length is not None:
-            message = f"'length' is given for {frame.message}, which is of fixed size"
-            faults.error(message, item.length.source, "leave it out: the length is always the same")
+            message = f"'length' is set for {frame.message}, which has a fixed size"
+            faults.error(message, item.length.source, "remove the key: the length is constant")
         return None
     length = sent_length_of(frame)
     if item.length == LengthSource.COMPUTED.value and not length.is_computed:
@@ -103,9 +103,9 @@ def output_length(item: OutputType, frame: Frame, faults: Diagnostics) -> Payloa
         faults.error(message, item.length.source, "legal here: given, buffered")
         return None
     if item.length is not None:
-        return PayloadLength(LengthSource(item.length), "the specification says so")
+        return PayloadLength(LengthSource(item.length), "the specification selects this source")
     if length.is_computed:
-        return PayloadLength(LengthSource.COMPUTED, "the lengths at the output's ports determine it")
+        return PayloadLength(LengthSource.COMPUTED, "the lengths at the output's ports determine the payload's length")
     return PayloadLength(LengthSource.BUFFERED, _doubt(length))
 
 
@@ -137,8 +137,8 @@ def _buffer(block: Block, frame: Frame, need: _Need | None, faults: Diagnostics)
     """Return the size of a publisher's buffer in bytes, or None without a buffer; note faults."""
     if frame.is_fixed_size:
         if block.buffer is not None:
-            message = f"'{block.name}' has a 'buffer', but {frame.message} is of fixed size"
-            faults.error(message, block.place("buffer"), "leave it out: only messages of variable size are stored")
+            message = f"'{block.name}' has a 'buffer', but {frame.message} has a fixed size"
+            faults.error(message, block.place("buffer"), "remove the key: only messages of variable size are stored")
         return None
     length = sent_length_of(frame)
     size = block.buffer
@@ -167,7 +167,7 @@ def _needs(connections: Sequence[Connection], publishers: Mapping[str, Block]) -
         if connection.length.source is LengthSource.BUFFERED:
             source = connection.source.block
             reason = f"the length of the message from '{source}' must be counted, because {connection.length.reason}"
-            hint = f"{_ADD_BUFFER}, or 'length: given' to the output of '{source}' if a port has the length"
+            hint = f"{_ADD_BUFFER}, or add 'length: given' to the output of '{source}' if a port provides the length"
             counted = (end.block for end in connection.sinks if end.block in publishers)
             needs |= dict.fromkeys(counted, _Need(reason, hint))
     return needs
@@ -189,4 +189,4 @@ def _doubt(length: Length) -> str:
     outer = next(term for term in length.terms if isinstance(term, Repeat) and term.stride is None)
     inner = next(term for term in outer.body if isinstance(term, Repeat))
     name = "" if inner.part.path == outer.part.path else f", '{dotted(inner.part.names)}'"
-    return f"each element of '{dotted(outer.part.names)}' has a length of its own{name}"
+    return f"each element of '{dotted(outer.part.names)}' has a separate length{name}"

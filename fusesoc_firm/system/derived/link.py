@@ -24,7 +24,7 @@ def link_of(project: Project, clock: Fraction | None, scheduling: Scheduling, fa
         faults.error(
             f"interconnect '{kind.value}' cannot carry the bursts of scheduler '{scheduling.policy}'",
             project.interconnect.source,
-            "a sequence of bytes does not mark the end of a burst: use a non-preemptive scheduler or 'axi_stream'",
+            "a byte link does not mark the end of a burst; use a non-preemptive scheduler or 'axi_stream'",
         )
     return Link(kind, _clock_hz(project, clock, faults))
 
@@ -36,13 +36,13 @@ def _clock_hz(project: Project, clock: Fraction | None, faults: Diagnostics) -> 
             faults.error(
                 f"interconnect '{project.interconnect}' needs the clock's frequency",
                 project.interconnect.source,
-                "add 'clock' to the project, such as 'clock: 100 MHz'",
+                "add 'clock' to 'project', such as 'clock: 100 MHz'",
             )
         return 0
     if clock.denominator != 1 or clock > _FASTEST:
         faults.error(
-            f"interconnect '{project.interconnect}' cannot work at 'clock' {project.clock}",
+            f"interconnect '{project.interconnect}' does not support the clock frequency {project.clock}",
             project.clock.source,
-            "legal: a whole number of Hz, at most 1 GHz",
+            "legal here: a whole number of Hz, at most 1 GHz",
         )
     return int(clock)

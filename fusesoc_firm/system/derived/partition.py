@@ -50,14 +50,14 @@ class Parts:
         """Note the faults in the hardware of a specification with these `blocks`."""
         first = next(iter(blocks.values())).name.source
         if not self.blocks:
-            hint = "an accelerator, or a message that goes from a subscriber to a publisher, must stay there"
+            hint = "the hardware needs an accelerator, or a message that goes from a subscriber to a publisher"
             faults.error("all accelerators are software, so nothing is left for hardware", first, hint)
             return
         for mode in (SUBSCRIBER, PUBLISHER):
             found = [*self.of_mode(mode).values()]
             if not found:
                 hint = f"a {mode} is a block with 'mode: {mode}', or a message between hardware and software"
-                faults.error(f"the hardware has no {mode}; it needs at least one", first, hint)
+                faults.error(f"the hardware has no {mode}, but needs at least one", first, hint)
             elif len(found) > MOST_CONVERTERS:
                 message = f"the hardware has {len(found)} {mode}s; ids have one byte, so the limit is {MOST_CONVERTERS}"
                 faults.error(message, found[MOST_CONVERTERS].name.source)
@@ -217,8 +217,8 @@ class Parting:
 def _check_no_publisher_keys(block: Block, faults: Diagnostics) -> None:
     for key in keys_only_of(Block, PUBLISHER):
         if getattr(block, key) is not None:
-            message = f"'{key}' belongs to a publisher, but no message leaves hardware for '{block.name}'"
-            hint = "the key is for a message that a block in software takes from hardware"
+            message = f"'{key}' is legal only for publishers, but no message goes from hardware to '{block.name}'"
+            hint = "the key describes a message from hardware to a block in software"
             faults.error(message, block.place(key), hint)
 
 

@@ -44,8 +44,8 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
     """Note faults in the function, whose file at `path` is the first source; the file may be missing."""
     accelerator = type_.accelerator
     if not type_.inputs:
-        message = f"'{accelerator.name}' takes no message, so nothing would call its function"
-        hint = "without 'sources' it represents external software, which can send at any time"
+        message = f"'{accelerator.name}' takes no messages, so its function would never be called"
+        hint = "without 'sources', the accelerator represents external software, which can send at any time"
         faults.error(message, accelerator.name.source, hint)
         return
     if not is_file(path) or path.suffix.lower() not in SOURCE_SUFFIXES[SOFTWARE]:
@@ -57,7 +57,9 @@ def check_function(type_: AcceleratorType, path: Path, faults: Diagnostics) -> N
         found = _definition(ast.parse(file.text), function_name(type_))
     except (SyntaxError, ValueError) as error:
         line, column = (error.lineno, error.offset) if isinstance(error, SyntaxError) else (1, 1)
-        faults.error(f"this is not Python: {getattr(error, 'msg', error)}", file.place(line or 1, column or 1))
+        faults.error(
+            f"the file is not valid Python: {getattr(error, 'msg', error)}", file.place(line or 1, column or 1)
+        )
         return
     if found is None:
         faults.error(f"'{source}' has no function '{function_name(type_)}'", source.source, hint)

@@ -41,8 +41,8 @@ _SLOWEST, _FASTEST = 1, 10**10
 _LONGEST_RUN = 2**31 - 1
 
 # The hint for a publisher that lacks a time.
-_PERIOD = "add 'period: <cycles, a time, or a rate>', such as 'period: 100 Hz'"
-_WCET = "add 'wcet: <cycles or a time>', or 'buffer: <bytes of its longest payload>'"
+_PERIOD = "add 'period: <cycles, time or rate>', such as 'period: 100 Hz'"
+_WCET = "add 'wcet: <cycles or time>', or 'buffer: <bytes of the longest payload>'"
 
 Rounding = Callable[[Fraction], int]
 
@@ -73,11 +73,11 @@ def tasks_of(system: DerivedSystem) -> tuple[Task, ...]:
     faults = Diagnostics()
     for publisher, times in zip(system.publishers, system.scheduling.times, strict=True):
         if times.period is None:
-            hint = "the least time between its messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
+            hint = "add the minimum time between messages, such as 'period: 50 Hz' or 'period: 20000' (cycles)"
             faults.error(f"publisher '{publisher.block}' needs a 'period'", hint=hint)
         if times.transfer_time is None:
-            hint = "the cycles that its longest frame takes to be sent"
-            message = f"publisher '{publisher.block}' needs a 'wcet': the size of its message has no bound"
+            hint = "add the number of cycles that the longest frame takes"
+            message = f"publisher '{publisher.block}' needs a 'wcet', because its message has no size limit"
             faults.error(message, hint=hint)
     faults.raise_if_any()
     return _tasks(system.publishers, system.scheduling.times)
@@ -149,7 +149,7 @@ def frequency(key: str, text: Text, faults: Diagnostics) -> Fraction | None:
     found = _QUANTITY.fullmatch(text)
     hertz = Fraction(found[1]) * _HERTZ[found[2]] if found and found[2] in _HERTZ else Fraction(0)
     if not _SLOWEST <= hertz <= _FASTEST:
-        hint = "a frequency from 1 Hz to 10 GHz, such as 100 MHz or 12.5 MHz"
+        hint = "legal here: frequencies from 1 Hz to 10 GHz, such as 100 MHz or 12.5 MHz"
         faults.error(f"'{key}' cannot be '{text}'", text.source, hint)
         return None
     return hertz
@@ -171,10 +171,10 @@ def _check_complete(policy: str, blocks: Iterable[Block], times: Iterable[Publis
         if is_auto and item.period is None and block.period is None:
             faults.error(f"scheduler '{policy}' needs the 'period' of '{block.name}'", block.name.source, _PERIOD)
         if has_deadlines and item.deadline is None and block.period is None and block.deadline is None:
-            message = f"scheduler '{policy}' needs a 'period' or a 'deadline' of '{block.name}'"
+            message = f"scheduler '{policy}' needs a 'period' or a 'deadline' for '{block.name}'"
             faults.error(message, block.name.source, _PERIOD)
         if has_transfer_times and item.transfer_time is None and block.wcet is None:
-            message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose size has no bound"
+            message = f"scheduler '{policy}' needs the 'wcet' of '{block.name}', whose message has no size limit"
             faults.error(message, block.name.source, _WCET)
 
 
@@ -204,12 +204,12 @@ class _Reader:
         found = _QUANTITY.fullmatch(time)
         units = (*_SECONDS, *_HERTZ) if key == "period" else tuple(_SECONDS)
         if not found or found[2] not in ("", *units) or (not found[2] and "." in found[1]):
-            hint = f"a number of cycles, or a number with one of {', '.join(units)}"
+            hint = f"legal here: a number of cycles, or a number with one of the units {', '.join(units)}"
             self.faults.error(f"'{key}' cannot be '{time}'", time.source, hint)
             return None
         number, unit = Fraction(found[1]), found[2]
         if unit and self.clock is None:
-            message = f"'{key}' is '{time}', but the clock's frequency is not given"
+            message = f"'{key}' is '{time}', but the clock's frequency is missing"
             self.faults.error(message, time.source, "add 'clock' to 'project', such as 'clock: 100 MHz'")
             return None
         cycles = number if not unit else self._of_unit(number, unit)

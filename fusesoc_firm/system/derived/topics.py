@@ -13,7 +13,7 @@ from fusesoc_firm.text.yaml_text import Text
 # The names that both ROS 1 and ROS 2 accept.
 _WORD = r"[A-Za-z](?:_?[A-Za-z0-9])*_?"
 _NAME = re.compile(rf"/?{_WORD}(?:/{_WORD})*")
-_LEGAL = "legal here: /arm/left, or arm/left, which is relative to the node's namespace; letters, digits and single '_'"
+_LEGAL = "legal here: letters, digits and single '_', as in /arm/left, or in arm/left relative to the node's namespace"
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ def check_topics(uses: Iterable[TopicUse], faults: Diagnostics) -> None:
 def _check_type(name: str, first: TopicUse, other: TopicUse, faults: Diagnostics) -> None:
     one, two = (use.topic.frame.message for use in (first, other))
     if one != two:
-        message = f"topic {name} of '{other.topic.block}' has the type {two}, but that of '{first.topic.block}' {one}"
-        faults.error(message, other.source, f"a topic has one type; '{first.topic.block}' is at {first.source}")
+        message = f"topic {name} has the type {two} at '{other.topic.block}', but {one} at '{first.topic.block}'"
+        faults.error(message, other.source, f"a topic has only one type; '{first.topic.block}' is at {first.source}")
 
 
 def _check_loop(name: str, uses: Iterable[TopicUse], faults: Diagnostics) -> None:

@@ -100,12 +100,17 @@ def updated_core(system: DerivedSystem, path: Path) -> str:
     """
     core = read_core(path)
     if not isinstance(core.data.get("generate"), dict):
-        fail(f"{path} is not a core with a section 'generate'")
+        fail(f"the core {path} has no section 'generate'")
     instances, text = core.section("generate"), path.read_text(encoding="utf-8")
     if _GENERATORS in text and _SYSTEM_CORE not in text:
-        fail(f"{path} does not depend on '{_SYSTEM_CORE}', which has the generator 'far'", hint=f"{_GENERATORS} had it")
+        fail(
+            f"{path} does not depend on '{_SYSTEM_CORE}', which provides the generator 'far'",
+            hint=f"{_GENERATORS} provided it earlier",
+        )
     if _SYSTEM not in instances:
-        fail(f"{path} has no instance '{_SYSTEM}' under 'generate'; remove the file, and this command writes a new one")
+        fail(
+            f"{path} has no instance '{_SYSTEM}' under 'generate'", hint="remove the file, then run this command again"
+        )
     is_simulated = _SIMULATION in instances
     has_environment = is_simulated and bool(core.parameters(_SIMULATION).get("environment"))
     targets = _targets(system, is_simulated=is_simulated, has_environment=has_environment)

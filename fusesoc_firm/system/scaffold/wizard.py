@@ -123,12 +123,12 @@ class _Wizard:
 
     def _fault_of_path(self, answer: str) -> str | None:
         is_there = is_core(answer) or (self.folder / answer).exists()
-        return None if is_there else f"'{answer}' is neither a folder, a bag nor a core"
+        return None if is_there else f"'{answer}' is not a folder, a bag or a core"
 
     def _connect_blocks(self) -> None:
         """Ask for further connections from existing blocks of the file."""
         blocks = {str(block["name"]): block for block in self.content.get("blocks", [])}
-        question = Question("block", "a block to which further connections are added", [*blocks], is_choice=True)
+        question = Question("block", "the block to which connections are added", [*blocks], is_choice=True)
         while name := self.asker.ask(question):
             if added := self._sections("outgoing", _key(Block, "outgoing"), name):
                 blocks[name].setdefault("outgoing", []).extend(added)

@@ -29,7 +29,7 @@ def diagram(system: DerivedSystem) -> str:
     try:
         import graphviz
     except ModuleNotFoundError:
-        fail("pictures need the Python package graphviz", hint="pip install 'fusesoc-firm[diagram]'")
+        fail("pictures require the Python package graphviz", hint="pip install 'fusesoc-firm[diagram]'")
     graph = graphviz.Digraph(system.name, node_attr={"fontname": "sans-serif"}, edge_attr={"fontname": "sans-serif"})
     graph.attr(rankdir="LR", label=f"{system.name}: streams of {system.width} bits", fontname="sans-serif")
     with graph.subgraph(**_FPGA) as fpga:

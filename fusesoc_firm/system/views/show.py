@@ -185,7 +185,7 @@ def _converter(converter: Converter, entity: str) -> dict[str, Any]:
 def _payload_bytes(frame: Frame) -> int | str:
     length = length_of(frame)
     if length.maximum is None:
-        return f"{length.minimum} and more"
+        return f"{length.minimum} or more"
     return length.minimum if frame.is_fixed_size else f"{length.minimum} to {length.maximum}"
 
 

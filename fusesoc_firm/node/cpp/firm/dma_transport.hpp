@@ -129,9 +129,9 @@ class DmaTransport : public Transport {
         count_(dma),
         to_system_(ring(dma::kMm2s, dma.send_buffers, 0)),
         from_system_(ring(dma::kS2mm, dma.receive_buffers, dma.send_buffers)) {
-    if (!reset()) throw TransportError("the DMA engine does not leave its reset: does it have a clock?");
+    if (!reset()) throw TransportError("the DMA engine does not leave reset; check the engine's clock");
     if ((device_->read(dma::kMm2s + dma::kStatus) & dma::kHasScatterGather) == 0) {
-      throw TransportError("the DMA engine lacks scatter-gather, so it is not from a generated block design");
+      throw TransportError("the DMA engine does not support scatter-gather, so it is not from a generated block design");
     }
     to_system_.start(dma::kInterruptOnError);
     from_system_.start(dma::kInterruptOnComplete | dma::kInterruptOnError);
@@ -193,8 +193,8 @@ class DmaTransport : public Transport {
     const std::size_t bytes = count_.buffer_bytes == 0 ? std::min(fitting, most) : count_.buffer_bytes;
     if (count < 2 || bytes == 0 || bytes % dma::kAlignment != 0 || bytes > std::min(fitting, most)) {
       throw TransportError("the DMA has " + std::to_string(count) + " buffers of " + std::to_string(bytes) +
-                           " bytes; legal: 2 and more, a multiple of 64, and all within the memory's " +
-                           std::to_string(device_->memory_bytes()));
+                           " bytes; legal: 2 or more, a multiple of 64, and all within the " +
+                           std::to_string(device_->memory_bytes()) + " bytes of memory");
     }
     return DmaRing(*device_, channel, count, before * dma::kDescriptorBytes, descriptors + before * bytes, bytes);
   }
@@ -236,7 +236,7 @@ class DmaTransport : public Transport {
   bool take(std::uint32_t status) {
     const std::size_t size = status & dma::kLength;
     const std::size_t longest = options_.longest_payload + kFrameHeaderBytes + dma::kAlignment;
-    if (size > from_system_.buffer_bytes()) throw TransportError("the DMA engine wrote beyond a buffer");
+    if (size > from_system_.buffer_bytes()) throw TransportError("the DMA engine wrote past the end of a buffer");
     if (status & dma::kStartOfFrame) burst_.data.clear(), is_too_long_ = false;
     is_too_long_ = is_too_long_ || burst_.data.size() + size > longest;
     if (!is_too_long_) {
@@ -259,16 +259,16 @@ class DmaTransport : public Transport {
       std::uint32_t bit;
       const char* text;
     };
-    static constexpr Fault kFaults[] = {{1U << 4, "DMAIntErr (internal)"},      {1U << 5, "DMASlvErr (memory's answer)"},
+    static constexpr Fault kFaults[] = {{1U << 4, "DMAIntErr (internal)"},      {1U << 5, "DMASlvErr (response from memory)"},
                                         {1U << 6, "DMADecErr (address)"},       {1U << 8, "SGIntErr (descriptor)"},
-                                        {1U << 9, "SGSlvErr (memory's answer)"}, {1U << 10, "SGDecErr (address)"}};
+                                        {1U << 9, "SGSlvErr (response from memory)"}, {1U << 10, "SGDecErr (address)"}};
     const std::uint32_t status = device_->read(channel + dma::kStatus);
     if (is_closed_) return;
     std::string text;
     for (const auto& fault : kFaults) {
       if (status & fault.bit) text += (text.empty() ? "" : ", ") + std::string(fault.text);
     }
-    if (text.empty() && (status & dma::kHalted)) text = "it has halted";
+    if (text.empty() && (status & dma::kHalted)) text = "the channel has halted";
     if (!text.empty()) throw TransportError(std::string("the DMA engine's ") + name + ": " + text);
   }
 

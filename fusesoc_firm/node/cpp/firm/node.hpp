@@ -92,8 +92,8 @@ class Node {
     }
     if (size > configuration_.longest_payload) {
       throw std::length_error("a payload for subscriber " + std::to_string(subscriber) + " has " +
-                              std::to_string(size) + " bytes; the longest has " +
-                              std::to_string(configuration_.longest_payload));
+                              std::to_string(size) + " bytes; the longest payload has " +
+                              std::to_string(configuration_.longest_payload) + " bytes");
     }
     const std::uint64_t number = received_++;
     trace_.write("received", subscriber, number, size);
@@ -124,7 +124,7 @@ class Node {
     // The queues have no reader any more, so wake all threads that wait for space.
     queues_.close();
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (is_abandoned_) fault = "the time limit for stopping is over, but some frames were not sent or received";
+    if (is_abandoned_) fault = "the time limit for stopping expired before all frames were sent and received";
     if (fault) log(error_ = *fault);
     has_ended_ = true;
     changed_.notify_all();

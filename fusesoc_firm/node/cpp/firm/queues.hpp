@@ -139,7 +139,7 @@ class SubscriberQueues {
         dropped_(subscribers, 0) {
     if (subscribers < 1 || capacity < 1) {
       throw std::invalid_argument("subscribers is " + std::to_string(subscribers) + ", capacity is " +
-                                  std::to_string(capacity) + "; legal: 1 and more");
+                                  std::to_string(capacity) + "; legal: 1 or more");
     }
   }
 

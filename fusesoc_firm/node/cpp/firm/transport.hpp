@@ -93,7 +93,7 @@ inline std::uint32_t payload_length(const std::uint8_t* frame) {
 
 // Return a frame with this payload. Throws std::length_error if the length does not fit its field.
 inline Bytes pack_frame(std::uint8_t id, const std::uint8_t* payload, std::size_t size) {
-  if (size > UINT32_MAX) throw std::length_error("a payload of 4 GiB and more does not fit a frame");
+  if (size > UINT32_MAX) throw std::length_error("a payload of 4 GiB or more does not fit into a frame");
   Bytes frame;
   frame.reserve(kFrameHeaderBytes + size);
   frame.push_back(id);

@@ -49,7 +49,7 @@ class UartTransport : public Transport {
     cut();
     const Deadline deadline(uart_.patience);
     while (is_dropping_ && !deadline.is_over()) receive_within(deadline);
-    if (is_dropping_) throw TransportError(device_ + ": the board is never silent, so frames cannot be told apart");
+    if (is_dropping_) throw TransportError(device_ + ": the board is never silent, so the start of a frame cannot be found");
   }
 
   void send(const std::uint8_t* frame, std::size_t size) override {
